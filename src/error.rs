@@ -1,0 +1,91 @@
+//! The one error type of the crate.
+//!
+//! Errors stay data until the edge: the binary prints them, the Python binding maps each variant to
+//! one exception class. Every message names the argument, what was expected and what came.
+
+use std::path::{Path, PathBuf};
+
+/// What can go wrong, by the kind of mending it asks for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument has an unusable value, shape or combination (Python: `ValueError`).
+    #[error("{argument}: expected {expected}, got {got}")]
+    Argument {
+        /// Name of the argument as the user wrote it.
+        argument: &'static str,
+        /// What would have been accepted.
+        expected: String,
+        /// What came instead.
+        got: String,
+    },
+    /// An argument has an unusable type (Python: `TypeError`).
+    #[error("{argument}: expected {expected}, got {got}")]
+    Type {
+        /// Name of the argument as the user wrote it.
+        argument: &'static str,
+        /// What would have been accepted.
+        expected: String,
+        /// What came instead.
+        got: String,
+    },
+    /// The operating system refused a file operation (Python: `OSError`).
+    #[error("{path}: {source}", path = .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's own words.
+        source: std::io::Error,
+    },
+    /// A file's content is not what its format demands (Python: `jacoflow.FormatError`).
+    #[error("{path}: {message}", path = .path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what would be right.
+        message: String,
+    },
+    /// A combination that theory rules out (Python: `jacoflow.NotObservableError`).
+    #[error("not observable: {0}")]
+    NotObservable(String),
+    /// A computation lost its numerical footing (Python: `jacoflow.NumericalError`).
+    #[error("numerical failure: {0}")]
+    Numerical(String),
+    /// A program or optional part that is not there (Python: `jacoflow.MissingDependencyError`).
+    #[error("{0}")]
+    Missing(String),
+    /// The user asked to stop (Ctrl-C; Python: `KeyboardInterrupt`).
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An unusable value: `argument: expected ..., got ...`.
+    pub fn argument(argument: &'static str, expected: impl Into<String>, got: impl std::fmt::Display) -> Self {
+        Self::Argument { argument, expected: expected.into(), got: got.to_string() }
+    }
+
+    /// A failed file operation on `path`.
+    pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_path_buf(), source }
+    }
+
+    /// A file whose content breaks its format.
+    pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
+        Self::Format { path: path.as_ref().to_path_buf(), message: message.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn message_names_argument_expectation_and_value() {
+        let error = Error::argument("stride", "a positive integer", 0);
+        assert_eq!(error.to_string(), "stride: expected a positive integer, got 0");
+    }
+}

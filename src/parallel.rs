@@ -1,0 +1,119 @@
+//! Threads: fixed row bands, so that results are bit-identical for any number of threads.
+
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// Rows of one task. Fixed, so that the split never depends on the number of threads.
+pub const BAND_ROWS: usize = 16;
+
+/// How many threads a computation may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Threads(Option<usize>);
+
+impl Threads {
+    /// `None`: the environment variable `JACOFLOW_THREADS` where it holds a positive number, else every processor.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for zero.
+    pub fn new(count: Option<usize>) -> Result<Self> {
+        match count {
+            Some(0) => Err(Error::argument("threads", "a positive integer", 0)),
+            other => Ok(Self(other)),
+        }
+    }
+
+    /// The number of threads this resolves to.
+    pub fn count(self) -> usize {
+        self.0
+            .or_else(|| std::env::var("JACOFLOW_THREADS").ok()?.parse().ok().filter(|&n| n > 0))
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    }
+
+    /// Runs `work` where rayon's parallel iterators use exactly this many threads. One thread runs in place.
+    pub fn install<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
+        pool(self.count()).install(work)
+    }
+}
+
+/// The shared pool of `count` threads; made on first use and kept.
+fn pool(count: usize) -> Arc<rayon::ThreadPool> {
+    type Pools = Mutex<Vec<(usize, Arc<rayon::ThreadPool>)>>;
+    static POOLS: OnceLock<Pools> = OnceLock::new();
+    let mut pools = POOLS.get_or_init(Pools::default).lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if let Some((_, pool)) = pools.iter().find(|(n, _)| *n == count) {
+        return Arc::clone(pool);
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .thread_name(|i| format!("jacoflow-{i}"))
+        .build()
+        .map(Arc::new)
+        .expect("the operating system starts threads");
+    pools.push((count, Arc::clone(&pool)));
+    pool
+}
+
+/// Calls `work(band, rows, band_slice)` for every band of [`BAND_ROWS`] rows of a row-major buffer with `row_len` values a row.
+///
+/// Call it inside [`Threads::install`].
+pub fn for_each_band<T: Send>(
+    buffer: &mut [T],
+    row_len: usize,
+    work: impl Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync,
+) {
+    if row_len == 0 {
+        return;
+    }
+    let rows = buffer.len() / row_len;
+    buffer.par_chunks_mut(BAND_ROWS * row_len).enumerate().for_each(|(band, slice)| {
+        let start = band * BAND_ROWS;
+        work(band, start..(start + BAND_ROWS).min(rows), slice);
+    });
+}
+
+/// Told how far long work has come; may stop it.
+///
+/// The binary draws a bar, the Python binding looks for signals.
+pub trait Progress: Sync {
+    /// `done` of `total` steps (0: unknown) are finished.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] (or any other) makes the caller stop and clean up.
+    fn step(&self, done: usize, total: usize) -> Result<()>;
+}
+
+/// Says nothing and never stops.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn step(&self, _done: usize, _total: usize) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_every_row_once_for_any_thread_count() {
+        for threads in [1, 2, 3] {
+            let mut buffer = vec![0u32; 37 * 5];
+            Threads::new(Some(threads)).unwrap().install(|| {
+                for_each_band(&mut buffer, 5, |band, rows, slice| {
+                    assert_eq!(rows.start, band * BAND_ROWS);
+                    assert_eq!(slice.len(), rows.len() * 5);
+                    slice.iter_mut().for_each(|v| *v += 1);
+                });
+            });
+            assert!(buffer.iter().all(|&v| v == 1));
+        }
+    }
+
+    #[test]
+    fn zero_threads_are_refused() {
+        assert!(Threads::new(Some(0)).unwrap_err().to_string().contains("threads"));
+    }
+}

@@ -1,0 +1,218 @@
+//! 256- and 512-bit lanes.
+//!
+//! # Safety
+//! The methods are safe to call only because values of these types are made solely inside functions that
+//! [`dispatch`](super::dispatch) enters after checking the processor: the types are private to `simd`
+//! and reach kernels only as `SimdReal::Avx2` and `SimdReal::Avx512`.
+
+use super::lanes::Lanes;
+#[allow(clippy::wildcard_imports)]
+use core::arch::x86_64::*;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+macro_rules! lanes {
+    (
+        $name:ident, $vector:ty, $scalar:ty, $count:literal, $mask:ty,
+        $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident, $div:ident,
+        $fmadd:ident, $fnmadd:ident, $sqrt:ident, $min:ident, $max:ident,
+        |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr, |$x:ident| $abs:expr
+    ) => {
+        #[derive(Clone, Copy)]
+        pub(crate) struct $name($vector);
+
+        impl Add for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $add(self.0, other.0) })
+            }
+        }
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $sub(self.0, other.0) })
+            }
+        }
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $mul(self.0, other.0) })
+            }
+        }
+        impl Div for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $div(self.0, other.0) })
+            }
+        }
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $sub($set1(-0.0), self.0) })
+            }
+        }
+        impl Lanes for $name {
+            type Scalar = $scalar;
+            type Mask = $mask;
+            const LANES: usize = $count;
+            #[inline(always)]
+            fn splat(value: $scalar) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $set1(value) })
+            }
+            #[inline(always)]
+            fn load(source: &[$scalar]) -> Self {
+                let source = &source[..$count];
+                // SAFETY: see the module's note; the slice holds enough values, and the load is unaligned.
+                Self(unsafe { $load(source.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self, target: &mut [$scalar]) {
+                let target = &mut target[..$count];
+                // SAFETY: see the module's note; the slice holds enough values, and the store is unaligned.
+                unsafe { $store(target.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $fmadd(self.0, factor.0, term.0) })
+            }
+            #[inline(always)]
+            fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $fnmadd(self.0, factor.0, term.0) })
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                let $x = self.0;
+                // SAFETY: see the module's note.
+                Self(unsafe { $abs })
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $min(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $max(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> $mask {
+                let ($la, $lb) = (self.0, other.0);
+                // SAFETY: see the module's note.
+                unsafe { $lt }
+            }
+            #[inline(always)]
+            fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                let ($sm, $sy, $sn) = (mask, yes.0, no.0);
+                // SAFETY: see the module's note.
+                Self(unsafe { $select })
+            }
+        }
+    };
+}
+
+lanes!(
+    F32x8,
+    __m256,
+    f32,
+    8,
+    __m256,
+    _mm256_set1_ps,
+    _mm256_loadu_ps,
+    _mm256_storeu_ps,
+    _mm256_add_ps,
+    _mm256_sub_ps,
+    _mm256_mul_ps,
+    _mm256_div_ps,
+    _mm256_fmadd_ps,
+    _mm256_fnmadd_ps,
+    _mm256_sqrt_ps,
+    _mm256_min_ps,
+    _mm256_max_ps,
+    |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
+    |m, y, n| _mm256_blendv_ps(n, y, m),
+    |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x)
+);
+lanes!(
+    F64x4,
+    __m256d,
+    f64,
+    4,
+    __m256d,
+    _mm256_set1_pd,
+    _mm256_loadu_pd,
+    _mm256_storeu_pd,
+    _mm256_add_pd,
+    _mm256_sub_pd,
+    _mm256_mul_pd,
+    _mm256_div_pd,
+    _mm256_fmadd_pd,
+    _mm256_fnmadd_pd,
+    _mm256_sqrt_pd,
+    _mm256_min_pd,
+    _mm256_max_pd,
+    |a, b| _mm256_cmp_pd::<_CMP_LT_OQ>(a, b),
+    |m, y, n| _mm256_blendv_pd(n, y, m),
+    |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x)
+);
+lanes!(
+    F32x16,
+    __m512,
+    f32,
+    16,
+    __mmask16,
+    _mm512_set1_ps,
+    _mm512_loadu_ps,
+    _mm512_storeu_ps,
+    _mm512_add_ps,
+    _mm512_sub_ps,
+    _mm512_mul_ps,
+    _mm512_div_ps,
+    _mm512_fmadd_ps,
+    _mm512_fnmadd_ps,
+    _mm512_sqrt_ps,
+    _mm512_min_ps,
+    _mm512_max_ps,
+    |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
+    |m, y, n| _mm512_mask_blend_ps(m, n, y),
+    |x| _mm512_abs_ps(x)
+);
+lanes!(
+    F64x8,
+    __m512d,
+    f64,
+    8,
+    __mmask8,
+    _mm512_set1_pd,
+    _mm512_loadu_pd,
+    _mm512_storeu_pd,
+    _mm512_add_pd,
+    _mm512_sub_pd,
+    _mm512_mul_pd,
+    _mm512_div_pd,
+    _mm512_fmadd_pd,
+    _mm512_fnmadd_pd,
+    _mm512_sqrt_pd,
+    _mm512_min_pd,
+    _mm512_max_pd,
+    |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b),
+    |m, y, n| _mm512_mask_blend_pd(m, n, y),
+    |x| _mm512_abs_pd(x)
+);

@@ -1,0 +1,148 @@
+//! The result of an estimator: planes of motion parameters, their covariance and their status.
+
+use super::{AffineFlow, Sites, Status};
+use crate::error::Result;
+use crate::math::Real;
+
+/// What a field holds at each site and where the sites are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldLayout {
+    /// Size `(width, height)` of the frames.
+    pub frame_size: (usize, usize),
+    /// Where the estimates are.
+    pub sites: Sites,
+    /// Name of the motion model.
+    pub model: String,
+    /// Names of the model's parameters, in plane order. The first two are always `u`, `v`.
+    pub parameters: Vec<String>,
+    /// Seconds between frames; `None`: rates are per frame.
+    pub frame_period: Option<f64>,
+    /// Physical size `(dx, dy)` of a pixel. Flow is in these units per frame.
+    pub pixel_pitch: (f64, f64),
+    /// Index of the frame the estimate belongs to, counted from the first frame of the sequence.
+    pub frame_index: usize,
+}
+
+/// Flow with its Jacobian at `width x height` sites (points: one row), as planes.
+///
+/// Plane `p` of `motion` is parameter `layout.parameters[p]`; each plane is row-major. For the affine model they
+/// are `u, v, u_x, v_x, u_y, v_y` in px/frame and 1/frame (or in `pixel_pitch` units per frame).
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowField<T> {
+    /// What the planes mean.
+    pub layout: FieldLayout,
+    /// Columns of the result.
+    pub width: usize,
+    /// Rows of the result.
+    pub height: usize,
+    /// `P` planes of `width * height` values; NaN where the status says so.
+    pub motion: Vec<T>,
+    /// `P (P + 1) / 2` planes: the upper triangle of the covariance, row by row (0,0), (0,1), ... (1,1) ...
+    pub covariance: Option<Vec<T>>,
+    /// Status of each site.
+    pub status: Vec<Status>,
+    /// Root mean square of the equations' residual, in grey levels.
+    pub residual: Option<Vec<T>>,
+    /// Rank of the equations.
+    pub rank: Option<Vec<u8>>,
+    /// Condition number of the (column-scaled) equations: largest over smallest singular value.
+    pub condition: Option<Vec<T>>,
+}
+
+impl<T: Real> FlowField<T> {
+    /// A field of NaN with status `Border`, to be filled by an estimator.
+    ///
+    /// # Errors
+    /// As [`Sites::shape`].
+    pub fn empty(layout: FieldLayout, covariance: bool) -> Result<Self> {
+        let (width, height) = layout.sites.shape(layout.frame_size)?;
+        let (n, p) = (width * height, layout.parameters.len());
+        Ok(Self {
+            width,
+            height,
+            motion: vec![T::nan(); p * n],
+            covariance: covariance.then(|| vec![T::nan(); p * (p + 1) / 2 * n]),
+            status: vec![Status::Border; n],
+            residual: None,
+            rank: None,
+            condition: None,
+            layout,
+        })
+    }
+
+    /// Number of sites.
+    pub fn len(&self) -> usize {
+        self.width * self.height
+    }
+    /// No site at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// The plane of the parameter called `name`.
+    pub fn plane(&self, name: &str) -> Option<&[T]> {
+        let n = self.len();
+        let p = self.layout.parameters.iter().position(|q| q == name)?;
+        Some(&self.motion[p * n..(p + 1) * n])
+    }
+    /// Flow and Jacobian at site `index`; parameters that the model lacks are zero, as the model assumes.
+    pub fn affine(&self, index: usize) -> AffineFlow<T> {
+        let n = self.len();
+        let mut m = [T::from_f64(0.0); 6];
+        for (p, name) in self.layout.parameters.iter().enumerate() {
+            if let Some(k) = super::MOTION_NAMES.iter().position(|known| known == name) {
+                m[k] = self.motion[p * n + index];
+            }
+        }
+        if m[0].finite() { AffineFlow::from_array(m) } else { AffineFlow::from_array([T::nan(); 6]) }
+    }
+    /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`, px/frame and 1/frame; rows of parameters that the model lacks are zero.
+    pub fn covariance_at(&self, index: usize) -> Option<[[f64; 6]; 6]> {
+        let planes = self.covariance.as_ref()?;
+        let (n, p) = (self.len(), self.layout.parameters.len());
+        let place: Vec<Option<usize>> = self
+            .layout
+            .parameters
+            .iter()
+            .map(|name| super::MOTION_NAMES.iter().position(|known| known == name))
+            .collect();
+        let mut out = [[0.0; 6]; 6];
+        let mut plane = 0;
+        for i in 0..p {
+            for j in i..p {
+                if let (Some(a), Some(b)) = (place[i], place[j]) {
+                    let value = planes[plane * n + index].to_f64();
+                    out[a][b] = value;
+                    out[b][a] = value;
+                }
+                plane += 1;
+            }
+        }
+        Some(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_found_by_name_and_missing_parameters_are_zero() {
+        let layout = FieldLayout {
+            frame_size: (3, 2),
+            sites: Sites::default(),
+            model: "translational".into(),
+            parameters: vec!["u".into(), "v".into()],
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 1,
+        };
+        let mut field = FlowField::<f32>::empty(layout, true).unwrap();
+        assert!(field.affine(0).u.is_nan() && field.plane("u_x").is_none());
+        field.motion[6 + 4] = 2.0;
+        field.motion[4] = 1.0;
+        assert_eq!(field.affine(4).to_array(), [1.0, 2.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(field.plane("v").unwrap()[4], 2.0);
+        field.covariance.as_mut().unwrap()[6 + 4] = 0.5;
+        assert_eq!(field.covariance_at(4).unwrap()[1][0], 0.5);
+    }
+}

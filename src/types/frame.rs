@@ -1,0 +1,186 @@
+//! Grey images in memory.
+
+use crate::error::{Error, Result};
+use crate::math::Real;
+
+/// A grey image: `height` rows of `width` samples, row-major, `[row, col] = [y, x]`, x right and y down.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+/// Which pixels may be used: `true` is used.
+pub type Mask = Frame<bool>;
+
+impl<T> Frame<T> {
+    /// A frame from row-major samples.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when `data` does not hold `width * height` samples.
+    pub fn new(width: usize, height: usize, data: Vec<T>) -> Result<Self> {
+        if width.checked_mul(height) != Some(data.len()) {
+            return Err(Error::argument(
+                "data",
+                format!("{width} x {height} samples"),
+                format!("{} samples", data.len()),
+            ));
+        }
+        Ok(Self { width, height, data })
+    }
+
+    /// A frame whose sample at column `x`, row `y` is `value(x, y)`.
+    pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> T) -> Self {
+        let data = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
+        Self { width, height, data }
+    }
+
+    /// Columns.
+    #[inline]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+    /// Rows.
+    #[inline]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+    /// `(width, height)`.
+    #[inline]
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+    /// All samples, row-major.
+    #[inline]
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+    /// All samples, row-major, to be changed.
+    #[inline]
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+    /// The samples themselves.
+    pub fn into_data(self) -> Vec<T> {
+        self.data
+    }
+    /// Row `y`.
+    #[inline]
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+    /// Row `y`, to be changed.
+    #[inline]
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        &mut self.data[y * self.width..(y + 1) * self.width]
+    }
+    /// Every sample changed by `f`.
+    pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Frame<U> {
+        Frame { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
+    }
+}
+
+impl<T: Copy> Frame<T> {
+    /// A frame of one value.
+    pub fn filled(width: usize, height: usize, value: T) -> Self {
+        Self { width, height, data: vec![value; width * height] }
+    }
+    /// The sample at column `x`, row `y`.
+    #[inline]
+    pub fn get(&self, x: usize, y: usize) -> T {
+        self.data[y * self.width + x]
+    }
+}
+
+/// A type that image samples come in.
+pub trait Sample: Copy + Send + Sync + 'static {
+    /// numpy's name of the type.
+    const DTYPE: &'static str;
+    /// The value of white: 255, 65535, or 1 for floats.
+    const FULL_SCALE: f64;
+    /// The sample in working precision, unscaled.
+    fn to_real<T: Real>(self) -> T;
+}
+
+macro_rules! samples {
+    ($($t:ty, $name:literal, $full:expr;)*) => {$(
+        impl Sample for $t {
+            const DTYPE: &'static str = $name;
+            const FULL_SCALE: f64 = $full;
+            #[inline(always)]
+            fn to_real<T: Real>(self) -> T {
+                T::from_f64(f64::from(self))
+            }
+        }
+    )*};
+}
+samples! {
+    u8, "uint8", 255.0;
+    u16, "uint16", 65535.0;
+    f32, "float32", 1.0;
+    f64, "float64", 1.0;
+}
+
+/// A frame as it came from a file or an array, in its own sample type.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyFrame {
+    /// 8-bit samples.
+    U8(Frame<u8>),
+    /// 16-bit samples.
+    U16(Frame<u16>),
+    /// Single precision.
+    F32(Frame<f32>),
+    /// Double precision.
+    F64(Frame<f64>),
+}
+
+macro_rules! any_frame {
+    ($self:ident, $frame:ident => $body:expr) => {
+        match $self {
+            AnyFrame::U8($frame) => $body,
+            AnyFrame::U16($frame) => $body,
+            AnyFrame::F32($frame) => $body,
+            AnyFrame::F64($frame) => $body,
+        }
+    };
+}
+
+impl AnyFrame {
+    /// `(width, height)`.
+    pub fn size(&self) -> (usize, usize) {
+        any_frame!(self, frame => frame.size())
+    }
+    /// numpy's name of the sample type.
+    pub fn dtype(&self) -> &'static str {
+        match self {
+            Self::U8(_) => u8::DTYPE,
+            Self::U16(_) => u16::DTYPE,
+            Self::F32(_) => f32::DTYPE,
+            Self::F64(_) => f64::DTYPE,
+        }
+    }
+    /// The frame in working precision; values are not rescaled.
+    pub fn to_real<T: Real>(&self) -> Frame<T> {
+        any_frame!(self, frame => frame.map(|s| s.to_real()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn size_must_match_the_samples() {
+        assert!(Frame::new(3, 2, vec![0u8; 6]).is_ok());
+        assert!(Frame::new(3, 2, vec![0u8; 5]).unwrap_err().to_string().contains("data"));
+        assert!(Frame::new(usize::MAX, 2, vec![0u8; 5]).is_err());
+    }
+
+    #[test]
+    fn rows_and_samples_are_addressed_as_y_x() {
+        let frame = Frame::from_fn(3, 2, |x, y| 10 * y + x);
+        assert_eq!(frame.row(1), &[10, 11, 12]);
+        assert_eq!(frame.get(2, 1), 12);
+    }
+}

@@ -1,0 +1,13 @@
+//! Plain data: frames, masks, regions, flow fields. No algorithms.
+
+mod field;
+mod frame;
+mod motion;
+mod region;
+mod status;
+
+pub use field::{FieldLayout, FlowField};
+pub use frame::{AnyFrame, Frame, Mask, Sample};
+pub use motion::{AffineFlow, MOTION_NAMES};
+pub use region::{Rect, Sites};
+pub use status::Status;

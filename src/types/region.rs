@@ -1,0 +1,110 @@
+//! Where estimates are wanted.
+
+use crate::error::{Error, Result};
+
+/// A rectangle of pixels: columns `x .. x + width`, rows `y .. y + height`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rect {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// The pixels at which estimates are made.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sites {
+    /// Every `stride`-th column and row of a region (`None`: the whole frame), from its upper left corner.
+    Grid {
+        /// The region.
+        region: Option<Rect>,
+        /// Distance between neighbouring sites, px.
+        stride: usize,
+    },
+    /// A list of pixels `(x, y)`.
+    Points(Vec<(usize, usize)>),
+}
+
+impl Default for Sites {
+    fn default() -> Self {
+        Self::Grid { region: None, stride: 1 }
+    }
+}
+
+impl Sites {
+    /// Columns and rows of the result for frames of `size = (width, height)`: points come as one row.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a stride of 0, a region or a point outside the frame.
+    pub fn shape(&self, size: (usize, usize)) -> Result<(usize, usize)> {
+        let (w, h) = size;
+        match self {
+            Self::Grid { stride: 0, .. } => Err(Error::argument("stride", "a positive integer", 0)),
+            Self::Grid { region, stride } => {
+                let r = region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h });
+                let inside = r.x.checked_add(r.width).is_some_and(|e| e <= w)
+                    && r.y.checked_add(r.height).is_some_and(|e| e <= h);
+                if !inside || ((r.width == 0 || r.height == 0) && region.is_some()) {
+                    return Err(Error::argument(
+                        "region",
+                        format!("a non-empty rectangle inside the {w} x {h} frame"),
+                        format!("x {}, y {}, width {}, height {}", r.x, r.y, r.width, r.height),
+                    ));
+                }
+                Ok((r.width.div_ceil(*stride), r.height.div_ceil(*stride)))
+            }
+            Self::Points(points) => {
+                if let Some(&(x, y)) = points.iter().find(|&&(x, y)| x >= w || y >= h) {
+                    return Err(Error::argument(
+                        "points",
+                        format!("pixels (x, y) inside the {w} x {h} frame"),
+                        format!("({x}, {y})"),
+                    ));
+                }
+                Ok((points.len(), 1))
+            }
+        }
+    }
+
+    /// The pixel `(x, y)` of result column `col`, row `row`. Call [`Sites::shape`] first.
+    #[inline]
+    pub fn pixel(&self, col: usize, row: usize) -> (usize, usize) {
+        match self {
+            Self::Grid { region, stride } => {
+                let (x, y) = region.map_or((0, 0), |r| (r.x, r.y));
+                (x + col * stride, y + row * stride)
+            }
+            Self::Points(points) => points[col],
+        }
+    }
+
+    /// Whether this is every pixel of the frame.
+    pub fn is_dense(&self) -> bool {
+        matches!(self, Self::Grid { region: None, stride: 1 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grid_shape_and_pixels() {
+        let region = Some(Rect { x: 2, y: 1, width: 5, height: 4 });
+        let sites = Sites::Grid { region, stride: 2 };
+        assert_eq!(sites.shape((10, 6)).unwrap(), (3, 2));
+        assert_eq!(sites.pixel(2, 1), (6, 3));
+        assert!(sites.shape((6, 6)).unwrap_err().to_string().contains("region"));
+        assert!(Sites::Grid { region: None, stride: 0 }.shape((4, 4)).is_err());
+    }
+
+    #[test]
+    fn points_outside_are_named() {
+        let sites = Sites::Points(vec![(1, 1), (4, 0)]);
+        assert!(sites.shape((4, 4)).unwrap_err().to_string().contains("(4, 0)"));
+    }
+}

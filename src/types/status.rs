@@ -1,0 +1,65 @@
+//! Why a pixel has, or lacks, an estimate.
+
+/// The state of one estimate. Anything but `Ok` and `MinNorm` comes with NaN values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[repr(u8)]
+pub enum Status {
+    /// A full estimate.
+    #[default]
+    Ok = 0,
+    /// The neighbourhood reaches over the edge of the frame.
+    Border = 1,
+    /// The neighbourhood holds a NaN or infinite sample.
+    NonFinite = 2,
+    /// The pixel, or one its neighbourhood needs, is masked out.
+    Masked = 3,
+    /// The equations do not determine every unknown (theorem 1 of the patent fails here).
+    Unobservable = 4,
+    /// Unobservable, and the minimum-norm solution was asked for: values are finite but not unique.
+    MinNorm = 5,
+    /// A filter lost its positive-definite covariance and was restarted here.
+    Repaired = 6,
+}
+
+impl Status {
+    /// Every status, by code.
+    pub const ALL: [Self; 7] =
+        [Self::Ok, Self::Border, Self::NonFinite, Self::Masked, Self::Unobservable, Self::MinNorm, Self::Repaired];
+
+    /// The word used in files and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Border => "border",
+            Self::NonFinite => "non_finite",
+            Self::Masked => "masked",
+            Self::Unobservable => "unobservable",
+            Self::MinNorm => "min_norm",
+            Self::Repaired => "repaired",
+        }
+    }
+
+    /// The status with this code.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(code as usize).copied()
+    }
+
+    /// A unique, complete estimate.
+    pub fn is_valid(self) -> bool {
+        matches!(self, Self::Ok | Self::Repaired)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_round_trip() {
+        for (code, status) in Status::ALL.into_iter().enumerate() {
+            assert_eq!(status as usize, code);
+            assert_eq!(Status::from_code(code as u8), Some(status));
+        }
+        assert_eq!(Status::from_code(200), None);
+    }
+}
