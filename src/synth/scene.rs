@@ -1,0 +1,84 @@
+//! What every scene can tell.
+
+use crate::error::Result;
+use crate::parallel::for_each_band;
+use crate::types::{AffineFlow, FieldLayout, FlowField, Frame, MOTION_NAMES, Sites, Status};
+
+/// A moving picture with exact truth.
+///
+/// Coordinates `(x, y)` are scene coordinates in px, x right and y down; pixel `(column, row)` of a frame lies at
+/// `origin + (column, row)`. Time `t` is in frames.
+pub trait Scene: Send + Sync {
+    /// The scene's name in the registry.
+    fn name(&self) -> &str;
+
+    /// `(width, height)` of its frames, px.
+    fn size(&self) -> (usize, usize);
+
+    /// Scene coordinates of pixel (0, 0).
+    fn origin(&self) -> (f64, f64) {
+        (0.0, 0.0)
+    }
+
+    /// Brightness at a point and time, grey levels of an 8-bit scale (not quantised, not clipped).
+    fn brightness(&self, x: f64, y: f64, t: f64) -> f64;
+
+    /// Velocity and its Jacobian at a point and time, px/frame and 1/frame; `None` where there is no single truth
+    /// (an edge between motions).
+    fn motion(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>>;
+
+    /// How far the matter at `(x, y)` at time `t` has gone `duration` frames later, px. It differs from `duration` times the velocity
+    /// wherever paths are curved. `None` where the scene does not know.
+    fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
+        let _ = (x, y, t, duration);
+        None
+    }
+
+    /// The frame of time `t`; rows are spread over the threads of the current pool, the samples do not depend on how many.
+    fn frame(&self, t: f64) -> Frame<f64> {
+        let origin = self.origin();
+        render(self.size(), |column, row| self.brightness(origin.0 + column as f64, origin.1 + row as f64, t))
+    }
+}
+
+/// A frame of `value(column, row)`, row bands in parallel.
+pub(super) fn render((width, height): (usize, usize), value: impl Fn(usize, usize) -> f64 + Sync) -> Frame<f64> {
+    let mut frame = Frame::filled(width, height, 0.0);
+    for_each_band(frame.data_mut(), width, |_, rows, band| {
+        for (row, samples) in rows.zip(band.chunks_exact_mut(width)) {
+            for (column, sample) in samples.iter_mut().enumerate() {
+                *sample = value(column, row);
+            }
+        }
+    });
+    frame
+}
+
+/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN where the scene has none.
+///
+/// # Errors
+/// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
+pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
+    let layout = FieldLayout {
+        frame_size: scene.size(),
+        sites: Sites::default(),
+        model: "truth".into(),
+        parameters: MOTION_NAMES.map(String::from).to_vec(),
+        frame_period: None,
+        pixel_pitch: (1.0, 1.0),
+        frame_index: t.max(0.0).round() as usize,
+    };
+    let mut field = FlowField::<f64>::empty(layout, false)?;
+    let (n, width, origin) = (field.len(), field.width, scene.origin());
+    for index in 0..n {
+        let (x, y) = (origin.0 + (index % width) as f64, origin.1 + (index / width) as f64);
+        field.status[index] = Status::Masked;
+        if let Some(motion) = scene.motion(x, y, t) {
+            field.status[index] = Status::Ok;
+            for (p, value) in motion.to_array().into_iter().enumerate() {
+                field.motion[p * n + index] = value;
+            }
+        }
+    }
+    Ok(field)
+}
