@@ -42,7 +42,7 @@ impl RotatingRamp {
 }
 
 impl Scene for RotatingRamp {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "ramp"
     }
     fn size(&self) -> (usize, usize) {

@@ -10,7 +10,7 @@ use crate::types::{AffineFlow, FieldLayout, FlowField, Frame, MOTION_NAMES, Site
 /// `origin + (column, row)`. Time `t` is in frames.
 pub trait Scene: Send + Sync {
     /// The scene's name in the registry.
-    fn name(&self) -> &str;
+    fn name(&self) -> &'static str;
 
     /// `(width, height)` of its frames, px.
     fn size(&self) -> (usize, usize);

@@ -1,0 +1,73 @@
+//! A steady affine velocity field.
+
+use super::{Motion, PointMap};
+use crate::types::AffineFlow;
+use nalgebra::Matrix3;
+
+/// `u(p) = (u, v) + M (p - c)`, the same at every time: translation, rotation, expansion and shear in any mixture.
+///
+/// Particle paths are `p(t) = exp(t G) p(0)` with the 3 x 3 generator `G = [[M, (u, v) - M c], [0, 0]]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AffineField {
+    /// Velocity at the centre and its Jacobian.
+    pub at_centre: AffineFlow<f64>,
+    /// The centre `c`, px.
+    pub centre: (f64, f64),
+}
+
+impl AffineField {
+    /// Velocity and Jacobian `(u, v, u_x, v_x, u_y, v_y)` at `centre`.
+    pub fn new(motion: [f64; 6], centre: (f64, f64)) -> Self {
+        Self { at_centre: AffineFlow::from_array(motion), centre }
+    }
+
+    /// Rotation by `angular_velocity` rad/frame (from x to y, clockwise on the screen) about `centre`.
+    pub fn rotation(angular_velocity: f64, centre: (f64, f64)) -> Self {
+        Self::new([0.0, 0.0, 0.0, angular_velocity, -angular_velocity, 0.0], centre)
+    }
+}
+
+impl Motion for AffineField {
+    fn velocity(&self, x: f64, y: f64, _t: f64) -> AffineFlow<f64> {
+        let (u, v) = self.at_centre.at_offset(x - self.centre.0, y - self.centre.1);
+        AffineFlow { u, v, ..self.at_centre }
+    }
+
+    fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
+        let m = self.at_centre;
+        let generator = Matrix3::new(m.u_x, m.u_y, m.u, m.v_x, m.v_y, m.v, 0.0, 0.0, 0.0);
+        let e = (generator * (to - from)).exp();
+        let (cx, cy) = self.centre;
+        Box::new(move |x, y| {
+            let (dx, dy) = (x - cx, y - cy);
+            (cx + e[(0, 0)] * dx + e[(0, 1)] * dy + e[(0, 2)], cy + e[(1, 0)] * dx + e[(1, 1)] * dy + e[(1, 2)])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance;
+    use super::*;
+
+    #[test]
+    fn velocity_jacobian_and_paths_agree() {
+        conformance::check(&AffineField::new([0.3, -0.2, 0.01, 0.02, -0.02, 0.01], (31.5, 31.5)), 1e-7);
+        conformance::check(&AffineField::new([0.5, 0.25, 0.0, 0.0, 0.0, 0.0], (0.0, 0.0)), 1e-7);
+    }
+
+    #[test]
+    fn a_rotation_comes_back_after_a_turn() {
+        let field = AffineField::rotation(std::f64::consts::TAU / 50.0, (10.0, 20.0));
+        let (x, y) = field.path_map(0.0, 50.0)(33.0, -4.0);
+        assert!((x - 33.0).abs() < 1e-10 && (y + 4.0).abs() < 1e-10);
+        assert!(field.velocity(11.0, 20.0, 0.0).v > 0.0);
+    }
+
+    #[test]
+    fn a_pure_stretch_along_x_moves_nothing_along_y() {
+        let field = AffineField::new([0.0, 0.0, 0.05, 0.0, 0.0, 0.0], (0.0, 0.0));
+        let (x, y) = field.path_map(0.0, 3.0)(2.0, 7.0);
+        assert!((x - 2.0 * 0.15f64.exp()).abs() < 1e-12 && y == 7.0);
+    }
+}

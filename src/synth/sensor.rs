@@ -1,0 +1,95 @@
+//! What a camera does to a scene: noise, grey levels, saturation.
+
+use crate::error::{Error, Result};
+use crate::math::random::CounterRng;
+use crate::types::Frame;
+
+/// How brightness becomes whole grey levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Rounding {
+    /// Left as it is.
+    #[default]
+    None,
+    /// The next integer below, as the patent's quantiser does.
+    Floor,
+    /// The nearest integer, as a camera's converter does.
+    Nearest,
+}
+
+/// Additive white noise, then rounding, then clipping. The default changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sensor {
+    /// Standard deviation of the white normal noise, grey levels.
+    pub noise: f64,
+    /// How brightness becomes whole grey levels.
+    pub rounding: Rounding,
+    /// Whether values are clipped to 0 ..= 255.
+    pub saturate: bool,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Sensor {
+    /// An 8-bit camera: noise, the nearest grey level, clipped to 0 ..= 255.
+    pub fn eight_bit(noise: f64, seed: u64) -> Self {
+        Self { noise, rounding: Rounding::Nearest, saturate: true, seed }
+    }
+
+    /// Refuses noise that is negative or not finite.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `noise`.
+    pub fn check(&self) -> Result<()> {
+        if self.noise.is_finite() && self.noise >= 0.0 {
+            return Ok(());
+        }
+        Err(Error::argument("noise", "a finite number of grey levels, 0 or more", self.noise))
+    }
+
+    /// The frame as the camera delivers it. Noise depends on the seed, the frame's `index` and the pixel, on nothing else.
+    pub fn apply(&self, frame: &Frame<f64>, index: u64) -> Frame<f64> {
+        let rng = CounterRng::new(self.seed).stream(index);
+        let mut pixel = 0u64;
+        frame.map(|&value| {
+            let noise = if self.noise > 0.0 { self.noise * rng.normal(pixel) } else { 0.0 };
+            pixel += 1;
+            let level = match self.rounding {
+                Rounding::None => value + noise,
+                Rounding::Floor => (value + noise).floor(),
+                Rounding::Nearest => (value + noise).round(),
+            };
+            if self.saturate { level.clamp(0.0, 255.0) } else { level }
+        })
+    }
+
+    /// As [`Sensor::apply`], as 8-bit samples; what the rounding left over is cut off, and values outside 0 ..= 255 are clipped.
+    pub fn apply_u8(&self, frame: &Frame<f64>, index: u64) -> Frame<u8> {
+        self.apply(frame, index).map(|&value| value as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_has_its_spread_and_differs_between_frames() {
+        let sensor = Sensor { noise: 2.0, seed: 4, ..Sensor::default() };
+        let flat = Frame::filled(200, 100, 100.0);
+        let (first, second) = (sensor.apply(&flat, 0), sensor.apply(&flat, 1));
+        let variance = first.data().iter().map(|v| (v - 100.0).powi(2)).sum::<f64>() / 20_000.0;
+        assert!((variance - 4.0).abs() < 0.15);
+        assert_ne!(first, second);
+        assert_eq!(first, sensor.apply(&flat, 0));
+    }
+
+    #[test]
+    fn rounding_and_saturation() {
+        let frame = Frame::new(4, 1, vec![-3.2, 7.6, 300.0, 254.5]).unwrap();
+        let floor = Sensor { rounding: Rounding::Floor, ..Sensor::default() };
+        assert_eq!(floor.apply(&frame, 0).data(), [-4.0, 7.0, 300.0, 254.0]);
+        assert_eq!(Sensor::eight_bit(0.0, 0).apply(&frame, 0).data(), [0.0, 8.0, 255.0, 255.0]);
+        assert_eq!(Sensor::default().apply(&frame, 0), frame);
+        assert!(Sensor { noise: -1.0, ..Sensor::default() }.check().unwrap_err().to_string().contains("noise"));
+    }
+}
