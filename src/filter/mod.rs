@@ -1,1 +1,51 @@
-//! To be written.
+//! Kalman filters that know nothing of images: linear, extended and unscented, each over a batch of independent states.
+//!
+//! Names follow the literature and `filterpy`: `x`, `P`, `Q`, `R`, [`predict`](UnscentedFilter::predict),
+//! [`update`](UnscentedFilter::update), residual `y`, its covariance `S`, gain `K`, `log_likelihood`. Every array carries a leading batch axis and
+//! is row-major: `x` is `(B, n)`, `P` is `(B, n, n)`. A callback receives the whole batch at once, so that one vectorised function call
+//! serves every state and every sigma point.
+//!
+//! Covariances stay symmetric positive definite: updates use the Joseph form, and a matrix that loses a pivot to rounding is mended and counted in
+//! [`GaussianState::repairs`].
+//!
+//! ```
+//! use jacoflow::filter::{SigmaPoints, UnscentedFilter};
+//! # fn main() -> jacoflow::Result<()> {
+//! // A pendulum (angle, angular velocity), of which the sine of the angle is measured.
+//! let mut ukf = UnscentedFilter::new(1, 2, 1, SigmaPoints::default())?;
+//! ukf.Q = vec![1e-6, 0.0, 0.0, 1e-4];
+//! ukf.R = vec![0.01];
+//! for k in 0..50 {
+//!     ukf.predict(|points, next| {
+//!         for (p, q) in points.chunks_exact(2).zip(next.chunks_exact_mut(2)) {
+//!             q.copy_from_slice(&[p[0] + 0.1 * p[1], p[1] - 0.1 * p[0].sin()]);
+//!         }
+//!         Ok(())
+//!     })?;
+//!     let z = (0.1 * f64::from(k)).cos() * 0.5;
+//!     ukf.update(&[z], |points, out| {
+//!         for (p, z) in points.chunks_exact(2).zip(out) {
+//!             *z = p[0].sin();
+//!         }
+//!         Ok(())
+//!     })?;
+//! }
+//! assert!(ukf.P[0] > 0.0 && ukf.x[0].is_finite());
+//! # Ok(())
+//! # }
+//! ```
+
+mod dense;
+mod extended;
+mod kalman;
+mod sigma_points;
+mod state;
+#[cfg(test)]
+mod tests;
+mod unscented;
+
+pub use extended::ExtendedFilter;
+pub use kalman::KalmanFilter;
+pub use sigma_points::SigmaPoints;
+pub use state::GaussianState;
+pub use unscented::UnscentedFilter;

@@ -1,0 +1,120 @@
+//! Small dense matrices as row-major slices.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// `out = a b` with `a` of `rows x inner` and `b` of `inner x columns`.
+pub(super) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+    let columns = b.len() / inner;
+    for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
+        out.fill(0.0);
+        for (&a, b) in a.iter().zip(b.chunks_exact(columns)) {
+            for (out, &b) in out.iter_mut().zip(b) {
+                *out += a * b;
+            }
+        }
+    }
+}
+
+/// `out = a b^T` with `a` of `rows x inner` and `b` of `columns x inner`.
+pub(super) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+    let columns = b.len() / inner;
+    for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
+        for (out, b) in out.iter_mut().zip(b.chunks_exact(inner)) {
+            *out = a.iter().zip(b).map(|(&a, &b)| a * b).sum();
+        }
+    }
+}
+
+/// Replaces a square matrix by its symmetric part.
+pub(super) fn symmetrise(a: &mut [f64], n: usize) {
+    for i in 0..n {
+        for j in 0..i {
+            let mean = 0.5 * (a[i * n + j] + a[j * n + i]);
+            a[i * n + j] = mean;
+            a[j * n + i] = mean;
+        }
+    }
+}
+
+/// The lower Cholesky factor of `a` (only its lower triangle is read); false where a pivot is not positive.
+pub(super) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
+    l.fill(0.0);
+    for j in 0..n {
+        let row: f64 = l[j * n..j * n + j].iter().map(|v| v * v).sum();
+        let pivot = a[j * n + j] - row;
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return false;
+        }
+        let root = pivot.sqrt();
+        l[j * n + j] = root;
+        for i in j + 1..n {
+            let dot: f64 = (0..j).map(|k| l[i * n + k] * l[j * n + k]).sum();
+            l[i * n + j] = (a[i * n + j] - dot) / root;
+        }
+    }
+    true
+}
+
+/// The Cholesky factor of `a`, which is first mended if it must be: symmetrised, and its eigenvalues lifted to 1e-12 of the largest.
+/// Returns whether it was mended; `None` when it cannot be (NaN, infinity, no positive eigenvalue).
+pub(super) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
+    if cholesky(a, n, l) {
+        return Some(false);
+    }
+    if a.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    symmetrise(a, n);
+    let eigen = SymmetricEigen::new(DMatrix::from_row_slice(n, n, a));
+    let largest = eigen.eigenvalues.max();
+    if largest <= 0.0 {
+        return None;
+    }
+    // Lifting by rounding errors alone may leave a pivot at zero: raise the floor until the factor exists.
+    for floor in [1e-12, 1e-10, 1e-8] {
+        let lifted = eigen.eigenvalues.map(|v| v.max(floor * largest));
+        let mended = &eigen.eigenvectors * DMatrix::from_diagonal(&lifted) * eigen.eigenvectors.transpose();
+        a.copy_from_slice(mended.transpose().as_slice());
+        symmetrise(a, n);
+        if cholesky(a, n, l) {
+            return Some(true);
+        }
+    }
+    None
+}
+
+/// Solves `l l^T x = b` in place.
+pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
+    forward(l, n, b);
+    for i in (0..n).rev() {
+        let dot: f64 = (i + 1..n).map(|k| l[k * n + i] * b[k]).sum();
+        b[i] = (b[i] - dot) / l[i * n + i];
+    }
+}
+
+/// Solves `l x = b` in place.
+pub(super) fn forward(l: &[f64], n: usize, b: &mut [f64]) {
+    for i in 0..n {
+        let dot: f64 = (0..i).map(|k| l[i * n + k] * b[k]).sum();
+        b[i] = (b[i] - dot) / l[i * n + i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factor_solves_and_mends() {
+        let mut a = vec![4.0, 2.0, 2.0, 3.0];
+        let mut l = vec![0.0; 4];
+        assert_eq!(factor(&mut a, 2, &mut l), Some(false));
+        let mut b = vec![8.0, 7.0];
+        solve(&l, 2, &mut b);
+        assert!((b[0] - 1.25).abs() < 1e-15 && (b[1] - 1.5).abs() < 1e-15);
+        let mut indefinite = vec![1.0, 2.0, 2.0, 1.0];
+        assert_eq!(factor(&mut indefinite, 2, &mut l), Some(true));
+        assert!((indefinite[0] - 1.5).abs() < 1e-9, "the negative eigenvalue -1 became nearly 0");
+        assert_eq!(factor(&mut [f64::NAN], 1, &mut [0.0]), None);
+    }
+}

@@ -1,0 +1,157 @@
+//! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes and Filtering Theory", 1970, chapter 8).
+
+use super::state::{GaussianState, expect, finite, shared};
+use crate::error::Result;
+use serde::{Deserialize, Serialize};
+use std::ops::{Deref, DerefMut};
+
+/// A batch of extended Kalman filters: `x' = f(x) + w`, `z = h(x) + v`.
+///
+/// Callbacks receive states as rows, `(rows, n)`, and fill `(rows, n)` or `(rows, m)` values; Jacobian callbacks receive the `B` means and fill
+/// `(B, n, n)` or `(B, m, n)`. Errors of a callback are passed on and leave the filter unchanged.
+/// The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExtendedFilter {
+    /// The batch of Gaussians and the noise.
+    pub state: GaussianState,
+    /// Step of the central differences, relative to `max(1, |x_k|)`; 1e-5 at first.
+    pub step: f64,
+}
+
+impl ExtendedFilter {
+    /// `batch` filters with `dim_x` state and `dim_z` measurement dimensions.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) when a dimension is zero.
+    pub fn new(batch: usize, dim_x: usize, dim_z: usize) -> Result<Self> {
+        Ok(Self { state: GaussianState::new(batch, dim_x, dim_z)?, step: 1e-5 })
+    }
+
+    /// `x <- f(x)`, `P <- F P F^T + Q` with `F = df/dx` at the old mean from `jacobian`.
+    ///
+    /// # Errors
+    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or callback results that are not finite.
+    pub fn predict(
+        &mut self,
+        mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+        jacobian: impl FnOnce(&[f64], &mut [f64]) -> Result<()>,
+    ) -> Result<()> {
+        self.check()?;
+        let mut f = vec![0.0; self.P.len()];
+        jacobian(&self.x, &mut f)?;
+        finite("F", &f)?;
+        let mut next = vec![0.0; self.x.len()];
+        fx(&self.x, &mut next)?;
+        finite("fx", &next)?;
+        self.state.propagate_covariance(&f);
+        self.state.x = next;
+        Ok(())
+    }
+
+    /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2 n` rows for each state.
+    ///
+    /// # Errors
+    /// As [`predict`](Self::predict).
+    pub fn predict_by_differences(&mut self, mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
+        self.check()?;
+        let f = self.differences(self.dim_x, &mut fx)?;
+        self.predict(fx, |_, out| {
+            out.copy_from_slice(&f);
+            Ok(())
+        })
+    }
+
+    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian; a state with a NaN among its numbers is left as it is.
+    ///
+    /// # Errors
+    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) as for `predict`; [`Error::Numerical`](crate::Error::Numerical) when `S` is
+    /// not positive definite.
+    pub fn update(
+        &mut self,
+        z: &[f64],
+        mut hx: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+        jacobian: impl FnOnce(&[f64], &mut [f64]) -> Result<()>,
+    ) -> Result<()> {
+        self.check()?;
+        let (n, m) = (self.dim_x, self.dim_z);
+        expect("z", z, &[self.batch * m])?;
+        let mut h = vec![0.0; self.batch * m * n];
+        jacobian(&self.x, &mut h)?;
+        finite("H", &h)?;
+        let mut predicted = vec![0.0; self.batch * m];
+        hx(&self.x, &mut predicted)?;
+        finite("hx", &predicted)?;
+        for (item, z) in z.chunks_exact(m).enumerate() {
+            if z.iter().any(|v| v.is_nan()) {
+                self.state.skip(item);
+                continue;
+            }
+            let y: Vec<f64> = z.iter().zip(&predicted[item * m..]).map(|(z, p)| z - p).collect();
+            let r = shared(&self.state.R, item, m * m).to_vec();
+            self.state.joseph_update(item, &y, &h[item * m * n..(item + 1) * m * n], &r)?;
+        }
+        Ok(())
+    }
+
+    /// As [`update`](Self::update), with the Jacobian by central differences.
+    ///
+    /// # Errors
+    /// As [`update`](Self::update).
+    pub fn update_by_differences(
+        &mut self,
+        z: &[f64],
+        mut hx: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+    ) -> Result<()> {
+        self.check()?;
+        let h = self.differences(self.dim_z, &mut hx)?;
+        self.update(z, hx, |_, out| {
+            out.copy_from_slice(&h);
+            Ok(())
+        })
+    }
+
+    /// The Jacobians `(B, rows, n)` of a function with `rows` results, at every mean.
+    fn differences(
+        &self,
+        rows: usize,
+        function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+    ) -> Result<Vec<f64>> {
+        let n = self.dim_x;
+        let mut points = Vec::with_capacity(self.batch * 2 * n * n);
+        for x in self.x.chunks_exact(n) {
+            for k in 0..n {
+                for sign in [1.0, -1.0] {
+                    let start = points.len();
+                    points.extend_from_slice(x);
+                    points[start + k] += sign * self.step * x[k].abs().max(1.0);
+                }
+            }
+        }
+        let mut values = vec![0.0; self.batch * 2 * n * rows];
+        function(&points, &mut values)?;
+        let mut jacobian = vec![0.0; self.batch * rows * n];
+        for item in 0..self.batch {
+            for k in 0..n {
+                let plus = (item * n + k) * 2;
+                let width = points[plus * n + k] - points[(plus + 1) * n + k];
+                for row in 0..rows {
+                    jacobian[(item * rows + row) * n + k] =
+                        (values[plus * rows + row] - values[(plus + 1) * rows + row]) / width;
+                }
+            }
+        }
+        Ok(jacobian)
+    }
+}
+
+impl Deref for ExtendedFilter {
+    type Target = GaussianState;
+    fn deref(&self) -> &GaussianState {
+        &self.state
+    }
+}
+impl DerefMut for ExtendedFilter {
+    fn deref_mut(&mut self) -> &mut GaussianState {
+        &mut self.state
+    }
+}
