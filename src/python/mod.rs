@@ -1,1 +1,23 @@
-//! The Python binding.
+//! The Python binding: convert, detach from the interpreter, call, wrap.
+
+mod arrays;
+mod command;
+mod errors;
+mod field;
+
+use pyo3::prelude::*;
+
+/// The compiled part of jacoflow. Import `jacoflow` instead.
+#[pymodule(gil_used = false)]
+mod _jacoflow {
+    #[pymodule_export]
+    use super::command::run_command_line;
+    #[pymodule_export]
+    use super::errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError};
+    #[pymodule_export]
+    use super::field::{FlowField, restore_field};
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "Python's name of the attribute")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -95,6 +95,24 @@ impl<T: Real> FlowField<T> {
         }
         if m[0].finite() { AffineFlow::from_array(m) } else { AffineFlow::from_array([T::nan(); 6]) }
     }
+    /// The six planes `u, v, u_x, v_x, u_y, v_y`, one after the other; parameters that the model lacks are zero where the flow is
+    /// known and NaN elsewhere.
+    pub fn affine_planes(&self) -> Vec<T> {
+        let n = self.len();
+        let mut planes = vec![T::nan(); 6 * n];
+        for site in 0..n {
+            for (p, value) in self.affine(site).to_array().into_iter().enumerate() {
+                planes[p * n + site] = value;
+            }
+        }
+        planes
+    }
+    /// Covariance matrices of `(u, v, u_x, v_x, u_y, v_y)`, 36 values a site, as [`FlowField::covariance_at`] gives them.
+    pub fn covariance_matrices(&self) -> Option<Vec<T>> {
+        self.covariance.as_ref()?;
+        let matrices = (0..self.len()).filter_map(|site| self.covariance_at(site));
+        Some(matrices.flatten().flatten().map(T::from_f64).collect())
+    }
     /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`, px/frame and 1/frame; rows of parameters that the model lacks are zero.
     pub fn covariance_at(&self, index: usize) -> Option<[[f64; 6]; 6]> {
         let planes = self.covariance.as_ref()?;
@@ -144,5 +162,9 @@ mod tests {
         assert_eq!(field.plane("v").unwrap()[4], 2.0);
         field.covariance.as_mut().unwrap()[6 + 4] = 0.5;
         assert_eq!(field.covariance_at(4).unwrap()[1][0], 0.5);
+        let (planes, matrices) = (field.affine_planes(), field.covariance_matrices().unwrap());
+        assert_eq!((planes[4], planes[6 + 4], planes[12 + 4]), (1.0, 2.0, 0.0));
+        assert!(planes[12].is_nan());
+        assert_eq!(matrices[4 * 36 + 1], 0.5);
     }
 }

@@ -1,0 +1,61 @@
+# Verbs for people and for CI. `make test` is the whole check; it needs Rust, Python >= 3.11, gcc and make, nothing else.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+WHEELS := target/wheels
+# Wherever clippy, rustdoc and cargo test look at the binding they look at it with the same features, so that crates are built once.
+ALL := --features python
+
+.PHONY: test demo format clippy rustdoc rust-test wheel install pytest stubtest typing examples develop docs clean
+
+test: format clippy rustdoc rust-test pytest stubtest typing examples
+	@echo "everything passed"
+
+# The main job on an embedded example.
+demo:
+	cargo run --release -- demo
+
+format:
+	cargo fmt --check
+
+clippy:
+	cargo clippy -q --all-targets -- -D warnings
+	cargo clippy -q --all-targets $(ALL) -- -D warnings
+
+rustdoc:
+	RUSTDOCFLAGS="-D warnings" cargo doc -q --no-deps
+
+rust-test:
+	cargo test
+
+$(BIN)/maturin:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q "maturin>=1.9.4,<2"
+
+wheel: $(BIN)/maturin
+	rm -rf $(WHEELS)
+	$(BIN)/maturin build -q --release --out $(WHEELS) -i $(BIN)/python
+
+# The wheel as a user would get it, with what the tests need beside it.
+install: wheel
+	$(BIN)/python -m pip install -q --force-reinstall --no-deps $(WHEELS)/jacoflow-*.whl
+	$(BIN)/python -m pip install -q "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
+
+pytest: install
+	$(BIN)/python -m pytest
+
+stubtest: install
+	cd $(VENV) && bin/python -m mypy.stubtest jacoflow
+
+typing: install
+	$(BIN)/python -m mypy --strict tests/python/test_typing.py
+
+examples: install
+	@for file in examples/*.py; do [ -e "$$file" ] || continue; echo "$$file"; $(BIN)/python "$$file" >/dev/null || exit 1; done
+
+# A quick build for work on the binding: development profile, installed in place.
+develop: $(BIN)/maturin
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --extras test
+
+clean:
+	rm -rf target $(VENV) dist

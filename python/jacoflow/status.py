@@ -1,0 +1,30 @@
+"""Why a pixel has, or lacks, an estimate."""
+
+from enum import IntEnum
+
+__all__ = ["Status"]
+
+
+class Status(IntEnum):
+    """Status code of one estimate; `FlowField.status` is an array (..., H, W) of these. Codes carry no unit.
+
+    Anything but OK, MIN_NORM and REPAIRED comes with NaN values.
+
+    >>> Status(3).name
+    'MASKED'
+    """
+
+    OK = 0
+    """A full estimate."""
+    BORDER = 1
+    """The neighbourhood reaches over the edge of the frame."""
+    NON_FINITE = 2
+    """The neighbourhood holds a NaN or infinite sample."""
+    MASKED = 3
+    """The pixel, or one its neighbourhood needs, is masked out."""
+    UNOBSERVABLE = 4
+    """The equations do not determine every unknown."""
+    MIN_NORM = 5
+    """Unobservable, and the minimum-norm solution was asked for: values are finite but not unique."""
+    REPAIRED = 6
+    """A filter lost its positive-definite covariance and was restarted here."""

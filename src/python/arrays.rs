@@ -1,0 +1,251 @@
+//! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
+
+use crate::error::Error;
+use crate::types::{AnyFrame, Frame, Mask, Sample};
+use numpy::ndarray::{ArrayView, IntoDimension};
+use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// Sample types that frames may have, for messages.
+const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
+
+/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory is copied.
+pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = object.py();
+    if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
+        return Err(PyTypeError::new_err(format!(
+            "{argument}: expected a plain array, got a masked one; pass `frame.data` and the option mask=~frame.mask"
+        )));
+    }
+    let array = match object.cast::<PyUntypedArray>() {
+        Ok(array) => array.clone(),
+        Err(_) => {
+            let asarray = py.import("numpy")?.getattr("asarray")?;
+            asarray.call1((object,))?.cast_into::<PyUntypedArray>()?
+        }
+    };
+    if array.getattr("flags")?.getattr("aligned")?.extract::<bool>()? {
+        return Ok(array);
+    }
+    Ok(array.call_method0("copy")?.cast_into::<PyUntypedArray>()?)
+}
+
+/// numpy's name of the array's element type.
+fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
+    array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
+}
+
+/// The elements in row-major order, whatever the strides.
+fn elements<T: Element + Copy>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
+    let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
+    if let Ok(slice) = typed.as_slice() {
+        // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it lies.
+        if array.is_c_contiguous() {
+            return Some(slice.to_vec());
+        }
+    }
+    Some(typed.as_array().iter().copied().collect())
+}
+
+fn wrong_dtype(argument: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
+    PyTypeError::new_err(format!("{argument}: expected {ACCEPTED}, got {}", dtype_name(array)))
+}
+
+/// How a frame's dimensions are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColourRule {
+    /// Colour is refused with advice.
+    Refuse,
+    /// Colour is turned into luminance.
+    Luminance,
+}
+
+impl ColourRule {
+    /// `colour=None | "error" | "luminance"`.
+    pub fn parse(name: Option<&str>) -> PyResult<Self> {
+        match name {
+            None | Some("error") => Ok(Self::Refuse),
+            Some("luminance") => Ok(Self::Luminance),
+            Some(other) => Err(Error::argument("colour", "\"error\" or \"luminance\"", format!("{other:?}")).into()),
+        }
+    }
+}
+
+/// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
+pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> PyResult<AnyFrame> {
+    let array = as_array(argument, object)?;
+    let shape = array.shape().to_vec();
+    match shape[..] {
+        [height, width] => {
+            fn build<T: Sample + Element>(
+                array: &Bound<'_, PyUntypedArray>,
+                (w, h): (usize, usize),
+                wrap: fn(Frame<T>) -> AnyFrame,
+            ) -> Option<PyResult<AnyFrame>> {
+                Some(Frame::new(w, h, elements::<T>(array)?).map(wrap).map_err(PyErr::from))
+            }
+            let size = (width, height);
+            build(&array, size, AnyFrame::U8)
+                .or_else(|| build(&array, size, AnyFrame::U16))
+                .or_else(|| build(&array, size, AnyFrame::F32))
+                .or_else(|| build(&array, size, AnyFrame::F64))
+                .unwrap_or_else(|| Err(wrong_dtype(argument, &array)))
+        }
+        [height, width, channels @ (3 | 4)] if colour == ColourRule::Luminance => {
+            let size = (width, height);
+            luminance::<u8>(&array, size, channels)
+                .or_else(|| luminance::<u16>(&array, size, channels))
+                .or_else(|| luminance::<f32>(&array, size, channels))
+                .or_else(|| luminance::<f64>(&array, size, channels))
+                .unwrap_or_else(|| Err(wrong_dtype(argument, &array)))
+        }
+        [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
+            "{argument}: expected a grey frame (H, W), got a colour frame {shape:?}; \
+             pass colour=\"luminance\" or convert it with jacoflow.luminance(frame)"
+        ))),
+        _ => Err(PyValueError::new_err(format!("{argument}: expected a frame (H, W), got shape {shape:?}"))),
+    }
+}
+
+/// An interleaved colour frame as luminance.
+fn luminance<T: Sample + Element>(
+    array: &Bound<'_, PyUntypedArray>,
+    (width, height): (usize, usize),
+    channels: usize,
+) -> Option<PyResult<AnyFrame>> {
+    let _ = (elements::<T>(array)?, width, height, channels);
+    None
+}
+
+/// What came as `frames`: a stack along the first axis, or a list or tuple of separate frames.
+pub struct Frames<'py> {
+    object: Bound<'py, PyAny>,
+    colour: ColourRule,
+    /// Number of frames.
+    pub count: usize,
+    /// An array (whose result keeps the time axis even for one field) rather than a list.
+    pub is_array: bool,
+}
+
+impl<'py> Frames<'py> {
+    /// Checks the outer shape; each frame is converted when it is asked for, so that a long stack is never copied whole.
+    pub fn new(object: &Bound<'py, PyAny>, colour: ColourRule) -> PyResult<Self> {
+        let is_sequence =
+            object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
+        if is_sequence {
+            return Ok(Self { count: object.len()?, object: object.clone(), colour, is_array: false });
+        }
+        let array = as_array("frames", object)?;
+        let shape = array.shape().to_vec();
+        let wanted = match colour {
+            ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
+            ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
+        };
+        let refuse = |advice: &str| {
+            Err(PyValueError::new_err(format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}")))
+        };
+        match shape[..] {
+            [_, rows, 3 | 4] if rows > 4 => refuse(
+                ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
+            ),
+            [count, _, _] => Ok(Self { count, object: array.into_any(), colour, is_array: true }),
+            [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
+                Ok(Self { count, object: array.into_any(), colour, is_array: true })
+            }
+            [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
+            _ => refuse(""),
+        }
+    }
+
+    /// Frame `index`.
+    pub fn get(&self, index: usize) -> PyResult<AnyFrame> {
+        frame("frames", &self.object.get_item(index)?, self.colour)
+    }
+}
+
+/// `mask`: a boolean array `(H, W)`, true where pixels may be used.
+pub fn mask(object: &Bound<'_, PyAny>) -> PyResult<Mask> {
+    let array = as_array("mask", object)?;
+    let [height, width] = array.shape()[..] else {
+        return Err(PyValueError::new_err(format!("mask: expected shape (H, W), got {:?}", array.shape())));
+    };
+    let Some(values) = elements::<bool>(&array) else {
+        return Err(PyTypeError::new_err(format!(
+            "mask: expected a boolean array, true where pixels may be used, got {}",
+            dtype_name(&array)
+        )));
+    };
+    Ok(Frame::new(width, height, values)?)
+}
+
+/// An `(N, 2)` array of integers.
+pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> PyResult<Vec<(i64, i64)>> {
+    let array = as_array(argument, object)?;
+    let kind: String = array.dtype().getattr("kind")?.extract()?;
+    if array.shape() == [0] {
+        return Ok(Vec::new());
+    }
+    if !matches!(array.shape(), [_, 2]) {
+        return Err(Error::argument(argument, "shape (N, 2), columns x and y", format!("{:?}", array.shape())).into());
+    }
+    if !matches!(kind.as_str(), "i" | "u") {
+        return Err(PyTypeError::new_err(format!("{argument}: expected integers, got {}", dtype_name(&array))));
+    }
+    let wide = array.call_method1("astype", ("int64",))?.cast_into::<PyUntypedArray>()?;
+    let values = elements::<i64>(&wide).unwrap_or_default();
+    Ok(values.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect())
+}
+
+/// `length` or any number of doubles out of anything numpy can read as numbers.
+pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
+    let array = as_array(argument, object)?;
+    let kind: String = array.dtype().getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "f" | "i" | "u") {
+        return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, got {}", dtype_name(&array))));
+    }
+    let wide = array.call_method1("astype", ("float64",))?.cast_into::<PyUntypedArray>()?;
+    Ok((array.shape().to_vec(), elements::<f64>(&wide).unwrap_or_default()))
+}
+
+/// A new array that owns `values`, of the given shape, row-major.
+pub fn owned<'py, T: Element>(py: Python<'py>, shape: &[usize], values: Vec<T>) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    numpy::PyArray1::from_vec(py, values).reshape(shape)
+}
+
+/// A frame as a new array `(H, W)`.
+pub fn from_frame<T: Element>(py: Python<'_>, frame: Frame<T>) -> PyResult<Bound<'_, PyAny>> {
+    let (width, height) = frame.size();
+    Ok(owned(py, &[height, width], frame.into_data())?.into_any())
+}
+
+/// A frame of any sample type as a new array `(H, W)`.
+pub fn from_any_frame(py: Python<'_>, frame: AnyFrame) -> PyResult<Bound<'_, PyAny>> {
+    match frame {
+        AnyFrame::U8(frame) => from_frame(py, frame),
+        AnyFrame::U16(frame) => from_frame(py, frame),
+        AnyFrame::F32(frame) => from_frame(py, frame),
+        AnyFrame::F64(frame) => from_frame(py, frame),
+    }
+}
+
+/// A read-only view of `data` with the given shape and strides (in elements), kept alive by `owner`.
+pub fn view<'py, T: Element>(
+    owner: &Bound<'py, PyAny>,
+    data: &[T],
+    shape: &[usize],
+    strides: &[usize],
+) -> PyResult<Bound<'py, PyAny>> {
+    if shape.contains(&0) {
+        return Ok(PyArray::<T, _>::zeros(owner.py(), shape.into_dimension(), false).into_any());
+    }
+    use numpy::ndarray::ShapeBuilder;
+    let layout = shape.into_dimension().strides(strides.into_dimension());
+    let array = ArrayView::from_shape(layout, data).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    // SAFETY: callers pass memory owned by the frozen Python object `owner`, which never reallocates or frees it while it lives;
+    // `owner` becomes the base of the new array. The array is made read-only before anyone sees it, and stays so, because its
+    // base offers no writable buffer.
+    let array = unsafe { PyArrayDyn::borrow_from_array(&array, owner.clone()) };
+    array.getattr("flags")?.setattr("writeable", false)?;
+    Ok(array.into_any())
+}

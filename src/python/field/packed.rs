@@ -1,0 +1,115 @@
+//! Fields of consecutive frames in one piece of memory, so that every array seen from Python is a view.
+
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FieldLayout, FlowField as CoreField, Status};
+
+/// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1, and so on.
+#[derive(Debug, Clone)]
+pub struct Packed<T> {
+    /// Layout of the first field; the frame index counts up from it.
+    pub layout: FieldLayout,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Number of fields.
+    pub count: usize,
+    /// `count * P` planes.
+    pub motion: Vec<T>,
+    /// `count * P (P + 1) / 2` planes.
+    pub covariance: Option<Vec<T>>,
+    /// `count` planes of status codes.
+    pub status: Vec<u8>,
+    /// `count` planes.
+    pub residual: Option<Vec<T>>,
+    /// `count` planes.
+    pub rank: Option<Vec<u8>>,
+    /// `count` planes.
+    pub condition: Option<Vec<T>>,
+}
+
+impl<T: Real> Packed<T> {
+    /// One field, without copying its planes.
+    pub fn one(field: CoreField<T>) -> Self {
+        Self {
+            width: field.width,
+            height: field.height,
+            count: 1,
+            motion: field.motion,
+            covariance: field.covariance,
+            status: field.status.iter().map(|&s| s as u8).collect(),
+            residual: field.residual,
+            rank: field.rank,
+            condition: field.condition,
+            layout: field.layout,
+        }
+    }
+
+    /// No field yet, of `layout`.
+    pub fn none(layout: FieldLayout, covariance: bool) -> Result<Self> {
+        let mut packed = Self::one(CoreField::empty(layout, covariance)?);
+        packed.count = 0;
+        packed.motion.clear();
+        packed.status.clear();
+        packed.covariance = packed.covariance.map(|_| Vec::new());
+        Ok(packed)
+    }
+
+    /// Adds the field of the next frame.
+    pub fn append(&mut self, field: CoreField<T>) -> Result<()> {
+        if (field.width, field.height) != (self.width, self.height) || field.motion.len() != self.stride() {
+            return Err(Error::argument("frames", "fields of one size and model", "fields that differ"));
+        }
+        self.motion.extend(field.motion);
+        self.status.extend(field.status.iter().map(|&s| s as u8));
+        extend(&mut self.covariance, field.covariance);
+        extend(&mut self.residual, field.residual);
+        extend(&mut self.rank, field.rank);
+        extend(&mut self.condition, field.condition);
+        self.count += 1;
+        Ok(())
+    }
+
+    /// Sites of one field.
+    pub fn sites(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Values of `motion` that belong to one field.
+    fn stride(&self) -> usize {
+        self.sites() * self.layout.parameters.len()
+    }
+
+    /// A copy of field `index`, as the core takes it.
+    pub fn field(&self, index: usize) -> CoreField<T> {
+        let part = |values: &[T]| {
+            let length = values.len() / self.count.max(1);
+            values[index * length..(index + 1) * length].to_vec()
+        };
+        let sites = index * self.sites()..(index + 1) * self.sites();
+        let mut layout = self.layout.clone();
+        layout.frame_index += index;
+        CoreField {
+            layout,
+            width: self.width,
+            height: self.height,
+            motion: part(&self.motion),
+            covariance: self.covariance.as_deref().map(part),
+            status: self.status[sites.clone()]
+                .iter()
+                .map(|&code| Status::from_code(code).unwrap_or_default())
+                .collect(),
+            residual: self.residual.as_deref().map(part),
+            rank: self.rank.as_deref().map(|values| values[sites].to_vec()),
+            condition: self.condition.as_deref().map(part),
+        }
+    }
+}
+
+fn extend<T>(planes: &mut Option<Vec<T>>, more: Option<Vec<T>>) {
+    match (planes, more) {
+        (Some(planes), Some(more)) => planes.extend(more),
+        (planes, _) => *planes = None,
+    }
+}

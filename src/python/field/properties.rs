@@ -1,0 +1,216 @@
+//! What Python sees of a `FlowField`.
+
+use super::{FlowField, Slice, Store, each, state};
+use crate::python::arrays;
+use crate::types::{Sites, Status};
+use pyo3::exceptions::{PyIndexError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+#[pymethods]
+impl FlowField {
+    /// Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of `pixel_pitch` per frame.
+    ///
+    /// NaN where `status` says why. A read-only view.
+    #[getter]
+    fn flow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 0, &[(2, 1)])
+    }
+
+    /// Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame: [[u_x, u_y], [v_x, v_y]].
+    ///
+    /// A read-only view; zeros where the model assumes no derivatives.
+    #[getter]
+    fn jacobian<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 2, &[(2, 1), (2, 2)])
+    }
+
+    /// Flow along x (right), array (..., H, W), px/frame.
+    #[getter]
+    fn u<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 0, &[])
+    }
+
+    /// Flow along y (down), array (..., H, W), px/frame.
+    #[getter]
+    fn v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 1, &[])
+    }
+
+    /// du/dx, array (..., H, W), 1/frame.
+    #[getter]
+    fn u_x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 2, &[])
+    }
+
+    /// dv/dx, array (..., H, W), 1/frame.
+    #[getter]
+    fn v_x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 3, &[])
+    }
+
+    /// du/dy, array (..., H, W), 1/frame.
+    #[getter]
+    fn u_y<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 4, &[])
+    }
+
+    /// dv/dy, array (..., H, W), 1/frame.
+    #[getter]
+    fn v_y<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::motion_slice(slf, 5, &[])
+    }
+
+    /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None if it was not asked for.
+    ///
+    /// Rows and columns of parameters that the model lacks are zero. A new array at every access.
+    #[getter]
+    fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let this = slf.get();
+        each!(this.store, packed => {
+            if packed.covariance.is_none() {
+                return Ok(None);
+            }
+            let data: Vec<_> = (0..this.count).filter_map(|t| this.core(packed, t).covariance_matrices()).flatten().collect();
+            let shape: Vec<usize> = this.shape().into_iter().chain([6, 6]).collect();
+            Ok(Some(arrays::owned(slf.py(), &shape, data)?.into_any()))
+        })
+    }
+
+    /// Status code of each site, uint8 array (..., H, W), see `Status`.
+    #[getter]
+    fn status<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        each!(slf.get().store, packed => Self::show(slf, &Slice { data: &packed.status, planes: 1, first: 0, tail: &[] }))
+    }
+
+    /// Where the estimate is unique and complete, bool array (..., H, W).
+    #[getter]
+    fn valid<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let this = slf.get();
+        let (width, height) = this.size();
+        let sites = width * height;
+        let codes = each!(this.store, packed => &packed.status[this.start * sites..(this.start + this.count) * sites]);
+        let valid = codes.iter().map(|&code| Status::from_code(code).is_some_and(Status::is_valid)).collect();
+        Ok(arrays::owned::<bool>(slf.py(), &this.shape(), valid)?.into_any())
+    }
+
+    /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has none.
+    #[getter]
+    fn residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each!(slf.get().store, packed => packed.residual.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
+    }
+
+    /// Rank of the equations, uint8 array (..., H, W); None if the method has none.
+    #[getter]
+    fn rank<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each!(slf.get().store, packed => packed.rank.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
+    }
+
+    /// Condition number of the equations (largest over smallest singular value), array (..., H, W); None if the method has none.
+    #[getter]
+    fn condition<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each!(slf.get().store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
+    }
+
+    /// Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2).
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (width, height) = self.size();
+        let pixels = (0..height).flat_map(|row| (0..width).map(move |col| (col, row)));
+        let data = pixels.map(|(col, row)| self.layout().sites.pixel(col, row)).flat_map(|(x, y)| [x as i64, y as i64]);
+        let shape =
+            if matches!(self.layout().sites, Sites::Points(_)) { vec![width, 2] } else { vec![height, width, 2] };
+        Ok(arrays::owned(py, &shape, data.collect())?.into_any())
+    }
+
+    /// Index of the frame the estimate belongs to, counted from 0; of the first one for a stack.
+    #[getter]
+    fn frame_index(&self) -> usize {
+        self.layout().frame_index + self.start
+    }
+
+    /// Size (width, height) of the frames, px.
+    #[getter]
+    fn frame_size(&self) -> (usize, usize) {
+        self.layout().frame_size
+    }
+
+    /// Seconds between frames, or None.
+    #[getter]
+    fn frame_period(&self) -> Option<f64> {
+        self.layout().frame_period
+    }
+
+    /// Physical size (dx, dy) of a pixel.
+    #[getter]
+    fn pixel_pitch(&self) -> (f64, f64) {
+        self.layout().pixel_pitch
+    }
+
+    /// Name of the motion model.
+    #[getter]
+    fn model(&self) -> &str {
+        &self.layout().model
+    }
+
+    /// Names of the model's parameters.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, &self.layout().parameters)
+    }
+
+    /// Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack.
+    #[getter]
+    #[pyo3(name = "shape")]
+    fn python_shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, self.shape())
+    }
+
+    /// Number of fields of a stack. TypeError for a single field.
+    fn __len__(&self) -> PyResult<usize> {
+        if self.stack {
+            Ok(self.count)
+        } else {
+            Err(PyTypeError::new_err("a single field has no length; its arrays are (H, W, ...)"))
+        }
+    }
+
+    /// Field `index` of a stack, sharing its memory. IndexError outside, TypeError for a single field.
+    fn __getitem__(&self, index: isize) -> PyResult<Self> {
+        let count = self.__len__()?;
+        let place = if index < 0 { index + count as isize } else { index };
+        if place < 0 || place >= count as isize {
+            return Err(PyIndexError::new_err(format!("index {index}: the stack has {count} fields")));
+        }
+        Ok(Self { store: self.store.clone(), start: self.start + place as usize, count: 1, stack: false })
+    }
+
+    fn __repr__(&self) -> String {
+        let (width, height) = self.size();
+        let layout = self.layout();
+        let known = each!(self.store, packed => {
+            let sites = packed.sites();
+            packed.status[self.start * sites..(self.start + self.count) * sites]
+                .iter()
+                .filter(|&&code| Status::from_code(code).is_some_and(Status::is_valid))
+                .count()
+        });
+        let total = self.count * width * height;
+        let dtype = match self.store {
+            Store::Single(_) => "float32",
+            Store::Double(_) => "float64",
+        };
+        let share = 100.0 * known as f64 / total.max(1) as f64;
+        format!(
+            "FlowField(shape={:?}, model={:?}, dtype={dtype}, frame_index={}, valid={share:.1}%)",
+            self.shape(),
+            layout.model,
+            self.frame_index()
+        )
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+        let restore = slf.py().import("jacoflow._jacoflow")?.getattr("_restore_field")?;
+        Ok((restore, (state::save(slf.get(), slf.py())?,)))
+    }
+}
