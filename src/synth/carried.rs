@@ -45,7 +45,8 @@ impl<X: Texture, M: Motion> Scene for Carried<X, M> {
         self.texture.value(x, y)
     }
     fn motion(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>> {
-        Some(self.motion.velocity(x, y, t))
+        let motion = self.motion.velocity(x, y, t);
+        motion.to_array().iter().all(|value| value.is_finite()).then_some(motion)
     }
     fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
         let (there_x, there_y) = self.motion.path_map(t, t + duration)(x, y);

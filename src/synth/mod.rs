@@ -6,14 +6,20 @@
 
 mod affine_texture;
 mod carried;
+mod disc;
 pub mod motion;
+mod particles;
 mod ramp;
+pub mod registry;
 mod scene;
 mod sensor;
 pub mod texture;
 
 pub use affine_texture::AffineTexture;
 pub use carried::Carried;
+pub use disc::{RotatingDisc, radians_per_frame};
+pub use particles::{ParticleImages, ParticleLook};
 pub use ramp::RotatingRamp;
+pub use registry::{SceneOptions, build};
 pub use scene::{Scene, truth};
 pub use sensor::{Rounding, Sensor};

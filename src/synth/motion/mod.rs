@@ -1,8 +1,16 @@
 //! Velocity fields whose particle paths are known in closed form.
 
 mod affine;
+mod approach;
+mod shear;
+mod turbulence;
+mod vortex;
 
 pub use affine::AffineField;
+pub use approach::Approach;
+pub use shear::SinusoidalShear;
+pub use turbulence::Turbulence;
+pub use vortex::LambOseen;
 
 use crate::types::AffineFlow;
 

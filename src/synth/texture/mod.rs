@@ -1,8 +1,13 @@
 //! Brightness of matter at rest, defined and smooth at every real point of an unbounded plane.
 
 mod noise;
+mod speckle;
+mod strewn;
 
 pub use noise::Noise;
+pub use speckle::Speckle;
+pub(crate) use speckle::smooth_step;
+pub(crate) use strewn::{cell_index, poisson_of_mean_one};
 
 /// The brightness that matter carries with it.
 pub trait Texture: Send + Sync {

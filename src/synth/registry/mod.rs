@@ -1,0 +1,289 @@
+//! Scenes by name, for the binary and for Python.
+//!
+//! A scene is a motion and what it carries, or something of its own. A new motion, carrier or scene is one file here with one constant in it, plus one line in
+//! the list it belongs to: [`SCENES`] or [`CARRIERS`].
+
+mod affine;
+mod disc;
+mod noise;
+mod particles;
+mod plane;
+mod ramp;
+mod shear;
+mod speckle;
+mod turbulence;
+mod vortex;
+
+use super::Scene;
+use super::carried::Carried;
+use super::motion::Motion;
+use super::texture::Texture;
+use crate::error::{Error, Result};
+
+/// Every scene, by name.
+pub const SCENES: &[SceneKind] =
+    &[ramp::KIND, affine::KIND, plane::KIND, disc::KIND, vortex::KIND, shear::KIND, turbulence::KIND];
+
+/// Everything that a motion can carry, by name. The first is the default.
+pub const CARRIERS: &[CarrierKind] = &[noise::KIND, speckle::KIND, particles::KIND];
+
+/// A number that a scene or carrier can be given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Its default; `None`: taken from the frame, as the meaning says.
+    pub default: Option<f64>,
+    /// What it is, and its unit.
+    pub meaning: &'static str,
+}
+
+type AnyScene = Result<Box<dyn Scene>>;
+type AnyTexture = Result<Box<dyn Texture>>;
+
+/// How a scene is made.
+#[derive(Debug, Clone, Copy)]
+enum Make {
+    /// From its parameters alone.
+    Whole(fn(&Settings) -> AnyScene),
+    /// From its parameters and one texture, or two from neighbouring seeds.
+    Textured(fn(&Settings, &dyn Fn(u64) -> AnyTexture) -> AnyScene),
+    /// A motion, to be given something to carry.
+    Motion(fn(&Settings) -> Result<Box<dyn Motion>>),
+}
+
+/// A scene that can be had by name.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneKind {
+    /// Its name.
+    pub name: &'static str,
+    /// One line about it.
+    pub summary: &'static str,
+    /// What it can be given.
+    pub parameters: &'static [Parameter],
+    make: Make,
+}
+
+impl SceneKind {
+    /// Whether it takes a carrier.
+    pub fn takes_carrier(&self) -> bool {
+        !matches!(self.make, Make::Whole(_))
+    }
+}
+
+/// A carrier that can be had by name.
+#[derive(Debug, Clone, Copy)]
+pub struct CarrierKind {
+    /// Its name.
+    pub name: &'static str,
+    /// One line about it.
+    pub summary: &'static str,
+    /// What it can be given.
+    pub parameters: &'static [Parameter],
+    /// As a texture that deforms with the flow; `None` where it is not one.
+    texture: Option<fn(&Settings, u64) -> AnyTexture>,
+    /// As a scene of its own, where it is no texture.
+    carry: Option<fn(&Settings, Box<dyn Motion>) -> AnyScene>,
+}
+
+/// What a scene is made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneOptions {
+    /// Columns of a frame, px.
+    pub width: usize,
+    /// Rows of a frame, px.
+    pub height: usize,
+    /// Scene coordinates of pixel (0, 0), px.
+    pub origin: (f64, f64),
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Name of the carrier; `None`: the first of [`CARRIERS`].
+    pub carrier: Option<String>,
+    /// Parameters of the scene and its carrier that differ from their defaults.
+    pub values: Vec<(String, f64)>,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self { width: 256, height: 256, origin: (0.0, 0.0), seed: 0, carrier: None, values: Vec::new() }
+    }
+}
+
+/// The scene called `name`.
+///
+/// # Errors
+/// [`Error::Argument`] naming `scene`, `carrier`, `size`, `origin` or the parameter that is unknown or unusable.
+pub fn build(name: &str, options: &SceneOptions) -> Result<Box<dyn Scene>> {
+    let kind = find(SCENES, "scene", name, |kind| kind.name)?;
+    let carrier = match (&options.carrier, kind.takes_carrier()) {
+        (Some(name), true) => Some(find(CARRIERS, "carrier", name, |kind| kind.name)?),
+        (None, true) => Some(&CARRIERS[0]),
+        (Some(name), false) => {
+            return Err(Error::argument("carrier", format!("none: the scene {} has its own picture", kind.name), name));
+        }
+        (None, false) => None,
+    };
+    let settings = Settings::new(kind, carrier, options)?;
+    match (kind.make, carrier) {
+        (Make::Textured(make), Some(carrier)) => {
+            let texture = carrier.texture.ok_or_else(|| {
+                Error::argument("carrier", format!("a texture for the scene {}", kind.name), carrier.name)
+            })?;
+            make(&settings, &|seed| texture(&settings, seed))
+        }
+        (Make::Motion(make), Some(carrier)) => {
+            let motion = make(&settings)?;
+            match (carrier.texture, carrier.carry) {
+                (Some(texture), _) => {
+                    let texture = texture(&settings, options.seed)?;
+                    let carried = Carried::new(kind.name, settings.size(), texture, motion);
+                    Ok(Box::new(Carried { origin: options.origin, ..carried }))
+                }
+                (None, Some(carry)) => carry(&settings, motion),
+                (None, None) => Err(Error::argument("carrier", "one that makes pictures", carrier.name)),
+            }
+        }
+        (Make::Whole(make), _) => make(&settings),
+        (Make::Textured(_) | Make::Motion(_), None) => Err(Error::argument("carrier", "a name", "none")),
+    }
+}
+
+/// The entry called `name`, or an error that lists every name.
+fn find<'a, K>(kinds: &'a [K], argument: &'static str, name: &str, name_of: impl Fn(&K) -> &str) -> Result<&'a K> {
+    kinds.iter().find(|kind| name_of(kind) == name).ok_or_else(|| {
+        let names: Vec<_> = kinds.iter().map(&name_of).collect();
+        Error::argument(argument, format!("one of {}", names.join(", ")), name)
+    })
+}
+
+/// Options that have been checked against what a scene knows.
+struct Settings<'a> {
+    scene: &'static str,
+    options: &'a SceneOptions,
+    known: Vec<Parameter>,
+}
+
+impl<'a> Settings<'a> {
+    fn new(kind: &SceneKind, carrier: Option<&CarrierKind>, options: &'a SceneOptions) -> Result<Self> {
+        let known: Vec<Parameter> =
+            kind.parameters.iter().chain(carrier.map_or(&[][..], |c| c.parameters)).copied().collect();
+        let (width, height) = (options.width, options.height);
+        if width == 0 || height == 0 || width.checked_mul(height).is_none_or(|n| n > 1 << 30) {
+            return Err(Error::argument("size", "1 to 2^30 pixels", format!("{width} x {height}")));
+        }
+        if !(options.origin.0.is_finite() && options.origin.1.is_finite()) {
+            return Err(Error::argument("origin", "finite coordinates", format!("{:?}", options.origin)));
+        }
+        for (name, value) in &options.values {
+            if !known.iter().any(|p| p.name == name) {
+                let names: Vec<_> = known.iter().map(|p| p.name).collect();
+                return Err(Error::argument("parameter", format!("one of {}", names.join(", ")), name));
+            }
+            if !value.is_finite() {
+                return Err(Error::argument("parameter", format!("a finite {name}"), value));
+            }
+        }
+        Ok(Self { scene: kind.name, options, known })
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.options.width, self.options.height)
+    }
+
+    /// The value given for `name` (the last one counts), its default, or NaN where it has none.
+    fn value(&self, name: &str) -> f64 {
+        let given = self.options.values.iter().rev().find(|(n, _)| n == name).map(|(_, value)| *value);
+        let default = || self.known.iter().find(|p| p.name == name).and_then(|p| p.default);
+        given.or_else(default).unwrap_or(f64::NAN)
+    }
+
+    /// As [`Settings::value`], refusing zero and less.
+    fn positive(&self, name: &'static str) -> Result<f64> {
+        let value = self.value(name);
+        if value > 0.0 { Ok(value) } else { Err(Error::argument(name, "a positive number", value)) }
+    }
+
+    /// The point `(x, y)` of these names; the middle of the frame, `origin + (size - 1) / 2`, where it is not given.
+    fn point(&self, x: &str, y: &str) -> (f64, f64) {
+        let or_middle = |value: f64, origin: f64, size: usize| {
+            if value.is_nan() { origin + (size as f64 - 1.0) / 2.0 } else { value }
+        };
+        let (origin, (width, height)) = (self.options.origin, self.size());
+        (or_middle(self.value(x), origin.0, width), or_middle(self.value(y), origin.1, height))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::AffineTexture;
+
+    fn small(carrier: Option<&str>, values: &[(&str, f64)]) -> SceneOptions {
+        SceneOptions {
+            width: 40,
+            height: 32,
+            seed: 5,
+            carrier: carrier.map(String::from),
+            values: values.iter().map(|(n, v)| ((*n).to_string(), *v)).collect(),
+            ..SceneOptions::default()
+        }
+    }
+
+    #[test]
+    fn every_scene_with_every_carrier_makes_finite_moving_frames_with_truth() {
+        for kind in SCENES {
+            let carriers: Vec<Option<&str>> =
+                if kind.takes_carrier() { CARRIERS.iter().map(|c| Some(c.name)).collect() } else { vec![None] };
+            for carrier in carriers {
+                let scene = match build(kind.name, &small(carrier, &[])) {
+                    Ok(scene) => scene,
+                    Err(error) if kind.name == "disc" && carrier == Some("particles") => {
+                        assert!(error.to_string().contains("carrier"));
+                        continue;
+                    }
+                    Err(error) => panic!("{}: {error}", kind.name),
+                };
+                assert_eq!((scene.name(), scene.size()), (kind.name, (40, 32)));
+                let (first, second) = (scene.frame(0.0), scene.frame(1.0));
+                assert!(first.data().iter().all(|v| v.is_finite()), "{}", kind.name);
+                assert_ne!(first, second, "{} {carrier:?}", kind.name);
+                assert!(scene.motion(11.0, 13.0, 0.5).is_some(), "{}", kind.name);
+                assert!(scene.displacement(11.0, 13.0, 0.5, 1.0).is_some());
+            }
+        }
+    }
+
+    #[test]
+    fn defaults_of_the_affine_scene_are_the_reference_texture() {
+        let (by_name, by_hand) = (build("affine", &small(None, &[])).unwrap(), AffineTexture::reference(40, 32, 5));
+        assert_eq!(by_name.frame(2.0), by_hand.unwrap().frame(2.0));
+    }
+
+    #[test]
+    fn unknown_and_unusable_input_is_named() {
+        let message = |name: &str, options: &SceneOptions| build(name, options).err().unwrap().to_string();
+        assert!(message("spiral", &small(None, &[])).contains("vortex"));
+        assert!(message("affine", &small(Some("foam"), &[])).contains("speckle"));
+        assert!(message("ramp", &small(Some("noise"), &[])).contains("carrier"));
+        assert!(message("vortex", &small(None, &[("swirl", 1.0)])).contains("circulation"));
+        assert!(message("vortex", &small(None, &[("core", 0.0)])).contains("core"));
+        assert!(message("plane", &small(None, &[("time_to_contact", 0.0)])).contains("time_to_contact"));
+        assert!(message("affine", &small(None, &[("u", f64::INFINITY)])).contains('u'));
+        assert!(message("affine", &SceneOptions { width: 0, ..small(None, &[]) }).contains("size"));
+    }
+
+    #[test]
+    fn names_are_unique_and_documented() {
+        for kind in SCENES {
+            assert_eq!(SCENES.iter().filter(|k| k.name == kind.name).count(), 1);
+            for carrier in CARRIERS.iter().filter(|_| kind.takes_carrier()) {
+                let all: Vec<_> = kind.parameters.iter().chain(carrier.parameters).collect();
+                for parameter in &all {
+                    let same = all.iter().filter(|p| p.name == parameter.name).count();
+                    assert_eq!(same, 1, "{} of {} with {}", parameter.name, kind.name, carrier.name);
+                    assert!(!parameter.meaning.is_empty() && !kind.summary.is_empty());
+                }
+            }
+        }
+    }
+}
