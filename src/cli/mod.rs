@@ -1,1 +1,56 @@
-//! The command line.
+//! The command line: the binary `jacoflow` and the Python entry point call the same [`run`].
+//!
+//! Exit codes: 0 success; 1 a run-time failure (files, formats, numbers); 2 an unusable argument; 3 a missing program
+//! (`ffmpeg`); 130 stopped by Ctrl-C or a termination signal.
+//!
+//! Results go to files, or to standard output where the help says so; everything else (progress, summary, errors) goes to standard
+//! error. With `--json`, standard output holds exactly one JSON object, in failure too.
+
+mod arguments;
+mod command;
+mod interrupt;
+mod progress;
+mod report;
+mod synth;
+
+use clap::Parser;
+use command::Command;
+use std::ffi::OsString;
+
+/// Optical flow together with its Jacobian, and how far each number can be trusted.
+#[derive(Debug, Parser)]
+#[command(name = "jacoflow", version, propagate_version = true, max_term_width = 110)]
+#[command(
+    after_help = "Exit codes: 0 success, 1 run-time failure, 2 unusable argument, 3 missing program, 130 interrupted.\n\
+    Environment: JACOFLOW_THREADS (number of threads), JACOFLOW_SIMD (scalar, avx2, avx512).\n\n\
+    Examples:\n  \
+    jacoflow demo -o demo\n  \
+    jacoflow flow frames/ -o out/ --picture colour,divergence\n  \
+    jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100"
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Runs the command line `arguments` (the program's name first) and returns the exit code described at the [module](self).
+///
+/// Prints to standard output and standard error. The first call installs a handler for Ctrl-C in the process.
+pub fn run<I, S>(arguments: I) -> i32
+where
+    I: IntoIterator<Item = S>,
+    S: Into<OsString> + Clone,
+{
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(message) => {
+            // Help and version are "errors" with code 0; a closed pipe must not turn them into a panic.
+            let _ = message.print();
+            return message.exit_code();
+        }
+    };
+    let watch = interrupt::Watch::begin();
+    let json = cli.command.json();
+    let result = cli.command.execute(&watch);
+    report::finish(result, json)
+}

@@ -1,0 +1,35 @@
+//! Where frames come from and what is done to them first.
+
+use super::{parse_positive, parse_rate};
+use clap::Args;
+
+/// Frames and their preparation.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Input")]
+pub struct InputArguments {
+    /// Frames: a folder (natural order), a pattern ('frames/*.png'), several images, a .y4m or .npy file, `-` (Y4M on standard input),
+    /// or a video file (needs ffmpeg on the PATH)
+    #[arg(required = true, value_name = "INPUT")]
+    pub input: Vec<String>,
+    /// Convert colour to luminance (0.299 R + 0.587 G + 0.114 B); without it colour is refused
+    #[arg(long)]
+    pub luminance: bool,
+    /// Index of the first frame to use
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub first: usize,
+    /// Use at most this many frames
+    #[arg(long, value_name = "N")]
+    pub limit: Option<usize>,
+    /// Use every N-th frame
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub step: usize,
+    /// Frames per second of the input (a number or a fraction); replaces what the file says
+    #[arg(long, value_name = "RATE", value_parser = parse_rate)]
+    pub fps: Option<f64>,
+    /// Round samples down to multiples of STEP before anything else
+    #[arg(long, value_name = "STEP", num_args = 0..=1, require_equals = true, default_missing_value = "1", visible_alias = "quantize", value_parser = parse_positive)]
+    pub quantise: Option<f64>,
+    /// Smooth each frame by a Gaussian of SIGMA pixels
+    #[arg(long, value_name = "SIGMA", value_parser = parse_positive)]
+    pub smooth: Option<f64>,
+}

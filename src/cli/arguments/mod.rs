@@ -1,0 +1,72 @@
+//! Argument groups that several subcommands share, and the words they are parsed from.
+
+mod compute;
+mod input;
+mod method;
+mod output;
+mod sites;
+
+pub use compute::{ComputeArguments, Precision, TellArguments};
+pub use input::InputArguments;
+pub use method::MethodArguments;
+pub use output::OutputArguments;
+pub use sites::SiteArguments;
+
+/// `KxL` (or `K` for a square): width and height of a neighbourhood or a frame.
+pub fn parse_size(text: &str) -> Result<(usize, usize), String> {
+    let (width, height) = text.split_once(['x', 'X']).unwrap_or((text, text));
+    match (width.trim().parse(), height.trim().parse()) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => Err("expected WIDTHxHEIGHT in pixels, such as 9x9".into()),
+    }
+}
+
+/// Two positive numbers `A,B`, or one for both.
+pub fn parse_pair(text: &str) -> Result<(f64, f64), String> {
+    let (a, b) = text.split_once(',').unwrap_or((text, text));
+    match (parse_positive(a), parse_positive(b)) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        _ => Err("expected one or two positive numbers, such as 0.5 or 0.5,0.4".into()),
+    }
+}
+
+/// A positive finite number.
+pub fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a positive number".into()),
+    }
+}
+
+/// A finite number of at least zero.
+pub fn parse_not_negative(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("expected a number of at least 0".into()),
+    }
+}
+
+/// A number or a fraction (`25`, `30000/1001`) of frames per second.
+pub fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = match text.split_once('/') {
+        Some((above, below)) => parse_positive(above).and_then(|a| parse_positive(below).map(|b| a / b)),
+        None => parse_positive(text),
+    };
+    rate.map_err(|_| "expected a positive number or a fraction such as 30000/1001".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_pairs_and_rates_are_read() {
+        assert_eq!(parse_size("9x7"), Ok((9, 7)));
+        assert_eq!(parse_size("5"), Ok((5, 5)));
+        assert!(parse_size("0x3").is_err() && parse_size("a").is_err());
+        assert_eq!(parse_pair("0.5"), Ok((0.5, 0.5)));
+        assert!(parse_pair("0.5,-1").is_err());
+        assert_eq!(parse_rate("30000/1000"), Ok(30.0));
+        assert!(parse_rate("nan").is_err() && parse_rate("0").is_err());
+    }
+}

@@ -1,0 +1,129 @@
+//! Where in the frame estimates are wanted.
+
+use crate::error::{Error, Result};
+use crate::types::{Rect, Sites};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Region, grid, points and mask.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Where")]
+pub struct SiteArguments {
+    /// Only this rectangle of pixels
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse_rect)]
+    pub region: Option<Rect>,
+    /// One estimate every N pixels in both directions
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub stride: Option<usize>,
+    /// Only these pixels: `X,Y`, or a CSV file with columns x and y; may be repeated
+    #[arg(long, value_name = "X,Y|FILE", conflicts_with_all = ["region", "stride"])]
+    pub points: Vec<String>,
+    /// Use only pixels that are not black in this image of the frames' size
+    #[arg(long, value_name = "IMAGE")]
+    pub mask: Option<PathBuf>,
+}
+
+impl SiteArguments {
+    /// The sites these arguments ask for.
+    ///
+    /// # Errors
+    /// A points file that cannot be read or holds anything but pixels.
+    pub fn sites(&self) -> Result<Sites> {
+        if self.points.is_empty() {
+            return Ok(Sites::Grid { region: self.region, stride: self.stride.unwrap_or(1) });
+        }
+        let mut points = Vec::new();
+        for word in &self.points {
+            match parse_point(word) {
+                Some(point) => points.push(point),
+                None if looks_like_a_point(word) => {
+                    return Err(Error::argument("points", "whole pixels X,Y of at least 0, or a CSV file", word));
+                }
+                None => read_points(Path::new(word), &mut points)?,
+            }
+        }
+        Ok(Sites::Points(points))
+    }
+}
+
+fn parse_rect(text: &str) -> std::result::Result<Rect, String> {
+    let numbers: Vec<usize> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, width, height] if text.split(',').count() == 4 && width > 0 && height > 0 => {
+            Ok(Rect { x, y, width, height })
+        }
+        _ => Err("expected X,Y,WIDTH,HEIGHT in whole pixels with a positive width and height".into()),
+    }
+}
+
+fn parse_point(text: &str) -> Option<(usize, usize)> {
+    let (x, y) = text.split_once(',')?;
+    Some((x.trim().parse().ok()?, y.trim().parse().ok()?))
+}
+
+/// Numbers only: meant as a point even if it is not a good one.
+fn looks_like_a_point(text: &str) -> bool {
+    text.split(',').all(|word| word.trim().parse::<f64>().is_ok())
+}
+
+/// Reads rows `x,y` (further columns are ignored); a first row that is not numeric names the columns.
+fn read_points(path: &Path, into: &mut Vec<(usize, usize)>) -> Result<()> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    let mut columns = (0, 1);
+    let before = into.len();
+    for (number, line) in text.lines().enumerate() {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        if line.trim().is_empty() {
+            continue;
+        }
+        let point = || Some((cells.get(columns.0)?.parse().ok()?, cells.get(columns.1)?.parse().ok()?));
+        match point() {
+            Some(point) => into.push(point),
+            None if into.len() == before && !looks_like_a_point(line) => {
+                let place = |name: &str| cells.iter().position(|cell| cell.eq_ignore_ascii_case(name));
+                columns = place("x")
+                    .zip(place("y"))
+                    .ok_or_else(|| Error::format(path, "expected the columns x and y, or rows of two pixel numbers"))?;
+            }
+            None => {
+                let message = format!("line {}: expected whole pixels x,y of at least 0, got {line:?}", number + 1);
+                return Err(Error::format(path, message));
+            }
+        }
+    }
+    if into.len() == before {
+        return Err(Error::format(path, "expected at least one point x,y"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rectangles_need_four_whole_numbers() {
+        assert_eq!(parse_rect("1,2,3,4"), Ok(Rect { x: 1, y: 2, width: 3, height: 4 }));
+        for wrong in ["1,2,3", "1,2,3,0", "1,2,3,4,5", "a,b,c,d", "-1,0,3,3", ""] {
+            assert!(parse_rect(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn points_come_from_words_and_from_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("points.csv");
+        std::fs::write(&file, "name,y,x\na,2,1\n\nb,4,3\n").unwrap();
+        let arguments = SiteArguments {
+            region: None,
+            stride: None,
+            points: vec!["7,8".into(), file.to_string_lossy().into()],
+            mask: None,
+        };
+        assert_eq!(arguments.sites().unwrap(), Sites::Points(vec![(7, 8), (1, 2), (3, 4)]));
+        std::fs::write(&file, "1,2\n3,-4\n").unwrap();
+        assert!(arguments.sites().unwrap_err().to_string().contains("line 2"));
+        let negative = SiteArguments { points: vec!["-1,2".into()], ..arguments };
+        assert!(negative.sites().unwrap_err().to_string().contains("points"));
+    }
+}

@@ -1,0 +1,46 @@
+//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once.
+
+use crate::error::{Error, Result};
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Exit code of a process stopped by Ctrl-C (128 + SIGINT).
+pub const EXIT_INTERRUPTED: i32 = 130;
+
+static ASKED: AtomicBool = AtomicBool::new(false);
+static RUNNING: AtomicUsize = AtomicUsize::new(0);
+
+/// Held while a command runs: a signal then sets a flag instead of ending the process.
+#[derive(Debug)]
+pub struct Watch(());
+
+impl Watch {
+    /// Installs the handler (once a process) and starts watching.
+    pub fn begin() -> Self {
+        static HANDLER: Once = Once::new();
+        // Where a handler cannot be had (a host program has its own), Ctrl-C keeps its old meaning.
+        HANDLER.call_once(|| drop(ctrlc::set_handler(on_signal)));
+        if RUNNING.fetch_add(1, Ordering::SeqCst) == 0 {
+            ASKED.store(false, Ordering::SeqCst);
+        }
+        Self(())
+    }
+
+    /// Fails with [`Error::Interrupted`] once a signal has come.
+    pub fn check(&self) -> Result<()> {
+        if ASKED.load(Ordering::SeqCst) { Err(Error::Interrupted) } else { Ok(()) }
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        RUNNING.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+fn on_signal() {
+    let again = ASKED.swap(true, Ordering::SeqCst);
+    if again || RUNNING.load(Ordering::SeqCst) == 0 {
+        std::process::exit(EXIT_INTERRUPTED);
+    }
+}
