@@ -1,0 +1,129 @@
+//! Which pixels a jet is fitted to, and with which weights.
+
+use crate::error::{Error, Result};
+
+/// Longest side of a rectangle and largest offset of a point, px: beyond it a quadratic describes nothing, and sums of fourth powers lose digits.
+const LARGEST: usize = 257;
+
+/// The pixels around a site that its jet is fitted to.
+///
+/// With `sigma` each pixel weighs `exp(-(ex^2 + ey^2) / (2 sigma^2))` in the fit, `(ex, ey)` being its offset in px; without, all weigh the same.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Neighbourhood {
+    /// `width x height` pixels, each at least 3. An odd side is centred at the site. An even side `n` covers the offsets `-(n/2 - 1) ..= n/2`, one more to the
+    /// right (below) than to the left (above); the quadratic is still expanded at the site itself, so that its jet belongs to the same point as any other's.
+    Rectangle {
+        /// Columns, px.
+        width: usize,
+        /// Rows, px.
+        height: usize,
+        /// Standard deviation of the Gaussian weight, px; `None`: equal weights.
+        sigma: Option<f64>,
+    },
+    /// Any set of different offsets `(ex, ey)` that determines a quadratic: its design matrix has rank 6.
+    Points {
+        /// Offsets from the site, px, right and down.
+        offsets: Vec<(i32, i32)>,
+        /// Standard deviation of the Gaussian weight, px; `None`: equal weights.
+        sigma: Option<f64>,
+    },
+}
+
+impl Default for Neighbourhood {
+    fn default() -> Self {
+        Self::square(3)
+    }
+}
+
+impl Neighbourhood {
+    /// A square of `side x side` equally weighted pixels.
+    pub fn square(side: usize) -> Self {
+        Self::Rectangle { width: side, height: side, sigma: None }
+    }
+
+    /// The standard deviation of the weights, px.
+    pub fn sigma(&self) -> Option<f64> {
+        match self {
+            Self::Rectangle { sigma, .. } | Self::Points { sigma, .. } => *sigma,
+        }
+    }
+
+    /// Offsets of the pixels, row by row for a rectangle.
+    pub fn offsets(&self) -> Vec<(i32, i32)> {
+        match self {
+            Self::Rectangle { width, height, .. } => {
+                side_offsets(*height).flat_map(|y| side_offsets(*width).map(move |x| (x, y))).collect()
+            }
+            Self::Points { offsets, .. } => offsets.clone(),
+        }
+    }
+
+    /// Refuses sizes, offsets and weights that cannot be fitted to; the rank is checked where the design is factored.
+    pub(super) fn check(&self) -> Result<()> {
+        if let Some(sigma) = self.sigma()
+            && !(sigma.is_finite() && sigma > 0.0)
+        {
+            return Err(Error::argument("neighbourhood", "a positive, finite sigma in px", sigma));
+        }
+        match self {
+            Self::Rectangle { width, height, .. } => {
+                let sides = 3..=LARGEST;
+                if !(sides.contains(width) && sides.contains(height)) {
+                    let want = format!("a rectangle from 3 x 3 to {LARGEST} x {LARGEST} px");
+                    return Err(Error::argument("neighbourhood", want, format!("{width} x {height}")));
+                }
+            }
+            Self::Points { offsets, .. } => {
+                let far = |v: i32| v.unsigned_abs() as usize > LARGEST / 2;
+                if let Some(p) = offsets.iter().find(|p| far(p.0) || far(p.1)) {
+                    let want = format!("offsets of at most {} px", LARGEST / 2);
+                    return Err(Error::argument("neighbourhood", want, format!("{p:?}")));
+                }
+                let mut sorted = offsets.clone();
+                sorted.sort_unstable();
+                if let Some(pair) = sorted.windows(2).find(|p| p[0] == p[1]) {
+                    return Err(Error::argument("neighbourhood", "different offsets", format!("{:?} twice", pair[0])));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Offsets along one side of a rectangle.
+pub(super) fn side_offsets(side: usize) -> impl Iterator<Item = i32> + Clone {
+    let first = -((side as i32 - 1) / 2);
+    first..first + side as i32
+}
+
+/// Weight of a pixel at distance `e` px along one axis.
+pub(super) fn weight(sigma: Option<f64>, e: f64) -> f64 {
+    sigma.map_or(1.0, |s| (-0.5 * (e / s).powi(2)).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn odd_sides_are_centred_and_even_ones_reach_one_further_right() {
+        assert_eq!(side_offsets(5).collect::<Vec<_>>(), [-2, -1, 0, 1, 2]);
+        assert_eq!(side_offsets(4).collect::<Vec<_>>(), [-1, 0, 1, 2]);
+        assert_eq!(Neighbourhood::default().offsets().len(), 9);
+    }
+
+    #[test]
+    fn unusable_neighbourhoods_are_refused_by_name() {
+        let rectangle = |width, height, sigma| Neighbourhood::Rectangle { width, height, sigma };
+        for bad in [
+            rectangle(2, 3, None),
+            rectangle(3, 100_000, None),
+            rectangle(3, 3, Some(0.0)),
+            rectangle(3, 3, Some(f64::NAN)),
+            Neighbourhood::Points { offsets: vec![(0, 0), (1, 0), (0, 0)], sigma: None },
+            Neighbourhood::Points { offsets: vec![(i32::MIN, 0)], sigma: None },
+        ] {
+            assert!(bad.check().unwrap_err().to_string().starts_with("neighbourhood"), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Jets of every pixel.
+
+use super::rows::JetRows;
+use super::stencil::JetStencil;
+use crate::math::Real;
+use crate::parallel::{BAND_ROWS, Threads};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::Frame;
+use rayon::prelude::*;
+
+/// Six planes of the size of the frame: `I, Ix, Iy, Ixx, Ixy, Iyy`; NaN where the neighbourhood leaves the frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JetPlanes<T> {
+    /// The planes, in the jet's order.
+    pub planes: [Frame<T>; 6],
+}
+
+impl<T: Real> JetPlanes<T> {
+    /// The jet at pixel `(x, y)`.
+    #[inline]
+    pub fn get(&self, x: usize, y: usize) -> [T; 6] {
+        std::array::from_fn(|k| self.planes[k].get(x, y))
+    }
+}
+
+/// The rows of one band: six slices, one a component, each `rows * width` long.
+struct Band<'a, T> {
+    first: usize,
+    planes: [&'a mut [T]; 6],
+}
+
+struct BandKernel<'a, T> {
+    rows: &'a JetRows<T>,
+    frame: &'a Frame<T>,
+    inside: (std::ops::Range<usize>, std::ops::Range<usize>),
+    band: Band<'a, T>,
+}
+
+impl<T: SimdReal> Kernel<T> for BandKernel<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let width = self.frame.width();
+        let mut band = self.band;
+        let mut scratch = vec![T::default(); self.rows.scratch_len(width)];
+        let mut row = vec![T::nan(); 6 * width];
+        let (columns, rows) = self.inside;
+        for r in 0..band.planes[0].len() / width {
+            let y = band.first + r;
+            if rows.contains(&y) && !columns.is_empty() {
+                self.rows.row::<V>(self.frame.data(), width, y, &mut scratch, &mut row);
+                for (plane, jets) in band.planes.iter_mut().zip(row.chunks_exact(width)) {
+                    plane[r * width..(r + 1) * width].copy_from_slice(jets);
+                }
+            }
+        }
+    }
+}
+
+impl JetStencil {
+    /// Jets of every pixel, at the best instruction set of the processor.
+    ///
+    /// Results do not depend on the number of threads.
+    pub fn planes<T: SimdReal>(&self, frame: &Frame<T>, threads: Threads) -> JetPlanes<T> {
+        self.planes_with(frame, threads, Level::detect())
+    }
+
+    /// As [`JetStencil::planes`], at a given instruction set.
+    pub fn planes_with<T: SimdReal>(&self, frame: &Frame<T>, threads: Threads, level: Level) -> JetPlanes<T> {
+        let rows = JetRows::new(self);
+        planes_of(&rows, self, frame, threads, level)
+    }
+}
+
+fn planes_of<T: SimdReal>(
+    rows: &JetRows<T>,
+    stencil: &JetStencil,
+    frame: &Frame<T>,
+    threads: Threads,
+    level: Level,
+) -> JetPlanes<T> {
+    let (width, height) = frame.size();
+    let mut planes: [Frame<T>; 6] = std::array::from_fn(|_| Frame::filled(width, height, T::nan()));
+    if width > 0 {
+        let mut chunks = planes.each_mut().map(|p| p.data_mut().chunks_mut(BAND_ROWS * width));
+        let bands: Vec<Band<'_, T>> = (0..height.div_ceil(BAND_ROWS))
+            .map(|b| Band { first: b * BAND_ROWS, planes: chunks.each_mut().map(|c| c.next().unwrap_or_default()) })
+            .collect();
+        let inside = stencil.reach().inside(frame.size());
+        threads.install(|| {
+            bands.into_par_iter().for_each(|band| {
+                dispatch(level, BandKernel { rows, frame, inside: inside.clone(), band });
+            });
+        });
+    }
+    JetPlanes { planes }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jet::Neighbourhood;
+    use crate::math::random::CounterRng;
+
+    fn noise(width: usize, height: usize) -> Frame<f64> {
+        let rng = CounterRng::new(5);
+        Frame::from_fn(width, height, |x, y| 100.0 + 20.0 * rng.normal((y * width + x) as u64))
+    }
+
+    fn rectangle(width: usize, height: usize, sigma: Option<f64>) -> Neighbourhood {
+        Neighbourhood::Rectangle { width, height, sigma }
+    }
+
+    fn shapes() -> Vec<Neighbourhood> {
+        let cross = (-2..=2).flat_map(|k| [(k, 0), (0, k), (k, k)]).filter(|&p| p != (0, 0));
+        vec![
+            rectangle(3, 3, None),
+            rectangle(5, 3, None),
+            rectangle(4, 6, None),
+            rectangle(7, 9, Some(1.7)),
+            rectangle(6, 5, Some(2.0)),
+            Neighbourhood::Points { offsets: cross.collect(), sigma: Some(1.2) },
+        ]
+    }
+
+    fn close(a: f64, b: f64, tolerance: f64) -> bool {
+        (a.is_nan() && b.is_nan()) || (a - b).abs() <= tolerance
+    }
+
+    #[test]
+    fn planes_equal_the_jet_at_each_pixel_at_every_level() {
+        let frame = noise(41, 37);
+        let single = frame.map(|&v| v as f32);
+        for shape in shapes() {
+            let stencil = JetStencil::new(&shape, (2.0, 0.5)).unwrap();
+            assert_eq!(stencil.is_separable(), matches!(shape, Neighbourhood::Rectangle { .. }));
+            for level in Level::available() {
+                let f64s = stencil.planes_with(&frame, Threads::default(), level);
+                let f32s = stencil.planes_with(&single, Threads::default(), level);
+                for (x, y) in [(0, 0), (4, 4), (20, 11), (33, 31), (36, 32), (40, 36), (3, 15), (39, 1)] {
+                    let want = stencil.at(&frame, x, y);
+                    for k in 0..6 {
+                        assert!(close(f64s.get(x, y)[k], want[k], 1e-11), "{shape:?} {level:?} {x} {y} {k}");
+                        assert!(close(f32s.get(x, y)[k].into(), want[k], 2e-3), "{shape:?} {level:?} {x} {y} {k}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn separable_equals_direct() {
+        let frame = noise(30, 23);
+        for shape in shapes() {
+            let stencil = JetStencil::new(&shape, (1.0, 1.0)).unwrap();
+            let direct = JetRows::new_direct(&stencil);
+            let want = planes_of(&direct, &stencil, &frame, Threads::default(), Level::SCALAR);
+            let got = stencil.planes_with(&frame, Threads::default(), Level::SCALAR);
+            for (g, w) in got.planes.iter().zip(&want.planes) {
+                assert!(g.data().iter().zip(w.data()).all(|(g, w)| close(*g, *w, 1e-11)), "{shape:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let frame = noise(33, 70);
+        let stencil = JetStencil::new(&rectangle(5, 5, Some(1.0)), (1.0, 1.0)).unwrap();
+        let run = |n| stencil.planes(&frame, Threads::new(Some(n)).unwrap());
+        let bits = |p: &JetPlanes<f64>| p.planes.iter().flat_map(|f| f.data()).map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&run(1)), bits(&run(2)));
+    }
+
+    #[test]
+    fn small_and_empty_frames_have_no_jets() {
+        let stencil = JetStencil::new(&Neighbourhood::default(), (1.0, 1.0)).unwrap();
+        for (w, h) in [(0, 0), (2, 2), (2, 40), (40, 2)] {
+            let planes = stencil.planes(&Frame::filled(w, h, 1.0f32), Threads::default());
+            assert!(planes.planes[0].data().iter().all(|v| v.is_nan()));
+        }
+        let planes = stencil.planes(&Frame::filled(3, 3, 1.0f32), Threads::default());
+        assert_eq!(planes.planes[0].data().iter().filter(|v| v.is_finite()).count(), 1);
+    }
+
+    #[test]
+    fn a_bad_sample_damages_only_what_touches_it() {
+        for bad in [f32::NAN, f32::INFINITY] {
+            let mut frame = noise(20, 20).map(|&v| v as f32);
+            frame.row_mut(9)[10] = bad;
+            let stencil = JetStencil::new(&rectangle(5, 3, None), (1.0, 1.0)).unwrap();
+            let planes = stencil.planes(&frame, Threads::default());
+            for y in 1..19usize {
+                for x in 2..18usize {
+                    let touched = x.abs_diff(10) <= 2 && y.abs_diff(9) <= 1;
+                    assert_eq!(planes.get(x, y)[0].is_finite(), !touched, "{x} {y}");
+                    assert_eq!(stencil.at(&frame, x, y)[1].is_finite(), !touched);
+                }
+            }
+        }
+    }
+}

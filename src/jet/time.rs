@@ -1,0 +1,106 @@
+//! Time differences of jets: the two schemes.
+
+use crate::error::{Error, Result};
+use crate::math::Real;
+
+/// How the first and second time derivative are taken from three jets, and to which frame they belong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TimeScheme {
+    /// At the middle frame: `i' = (i(t0) - i(t0-2)) / 2`, `i'' = i(t0) - 2 i(t0-1) + i(t0-2)`, coefficients from `i(t0-1)`. Second-order accurate.
+    #[default]
+    Central,
+    /// At the newest frame (WO2010/098160, (33)): `i' = i(t0) - i(t0-1)`, the same `i''`, coefficients from `i(t0)`. First-order accurate.
+    Backward,
+}
+
+/// A jet and its two time derivatives, per frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JetRates<T> {
+    /// `i`, the coefficients.
+    pub jet: [T; 6],
+    /// `i'`.
+    pub first: [T; 6],
+    /// `i''`.
+    pub second: [T; 6],
+}
+
+impl TimeScheme {
+    /// The scheme called `name`: `central` or `backward`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `scheme` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        match name {
+            "central" => Ok(Self::Central),
+            "backward" => Ok(Self::Backward),
+            other => Err(Error::argument("scheme", "central or backward", other)),
+        }
+    }
+
+    /// The scheme's name, as [`TimeScheme::parse`] takes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Central => "central",
+            Self::Backward => "backward",
+        }
+    }
+
+    /// Which of three frames, oldest first, the estimate belongs to.
+    pub fn frame(self) -> usize {
+        match self {
+            Self::Central => 1,
+            Self::Backward => 2,
+        }
+    }
+
+    /// Weights of the three frames, oldest first, in `i'`.
+    pub fn first_weights(self) -> [f64; 3] {
+        match self {
+            Self::Central => [-0.5, 0.0, 0.5],
+            Self::Backward => [0.0, -1.0, 1.0],
+        }
+    }
+
+    /// `i`, `i'` and `i''` from the jets (or any linear samples) of three frames, oldest first.
+    #[inline(always)]
+    pub fn rates<T: Real>(self, old: [T; 6], middle: [T; 6], new: [T; 6]) -> JetRates<T> {
+        let half = T::from_f64(0.5);
+        let mut first = [T::default(); 6];
+        let mut second = [T::default(); 6];
+        for k in 0..6 {
+            // Differences of neighbours first: what does not change cancels exactly.
+            let (late, early) = (new[k] - middle[k], middle[k] - old[k]);
+            second[k] = late - early;
+            first[k] = match self {
+                Self::Central => half * (new[k] - old[k]),
+                Self::Backward => late,
+            };
+        }
+        let jet = match self {
+            Self::Central => middle,
+            Self::Backward => new,
+        };
+        JetRates { jet, first, second }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_schemes_differentiate_a_parabola_in_time() {
+        // 3 + 2 t + 5 t^2 at t = -1, 0, 1.
+        let (old, middle, new) = ([6.0; 6], [3.0; 6], [10.0; 6]);
+        let central = TimeScheme::Central.rates(old, middle, new);
+        assert_eq!((central.jet[0], central.first[1], central.second[2]), (3.0, 2.0, 10.0));
+        let backward = TimeScheme::Backward.rates(old, middle, new);
+        assert_eq!((backward.jet[0], backward.first[1], backward.second[2]), (10.0, 7.0, 10.0));
+        for scheme in [TimeScheme::Central, TimeScheme::Backward] {
+            let w = scheme.first_weights();
+            assert_eq!(w[0] * 6.0 + w[1] * 3.0 + w[2] * 10.0, scheme.rates(old, middle, new).first[0]);
+            assert_eq!(TimeScheme::parse(scheme.name()).unwrap(), scheme);
+        }
+        assert!(TimeScheme::parse("forward").unwrap_err().to_string().contains("scheme"));
+    }
+}
