@@ -40,6 +40,7 @@ pub struct Parameter {
 
 type AnyScene = Result<Box<dyn Scene>>;
 type AnyTexture = Result<Box<dyn Texture>>;
+type Carry = fn(&Settings, Box<dyn Motion>) -> AnyScene;
 
 /// How a scene is made.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +84,7 @@ pub struct CarrierKind {
     /// As a texture that deforms with the flow; `None` where it is not one.
     texture: Option<fn(&Settings, u64) -> AnyTexture>,
     /// As a scene of its own, where it is no texture.
-    carry: Option<fn(&Settings, Box<dyn Motion>) -> AnyScene>,
+    carry: Option<Carry>,
 }
 
 /// What a scene is made from.
