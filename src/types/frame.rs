@@ -101,10 +101,12 @@ pub trait Sample: Copy + Send + Sync + 'static {
     const FULL_SCALE: f64;
     /// The sample in working precision, unscaled.
     fn to_real<T: Real>(self) -> T;
+    /// The nearest sample to `value`: integers are rounded and kept in range (NaN becomes 0), floats are rounded to their precision.
+    fn from_f64_nearest(value: f64) -> Self;
 }
 
 macro_rules! samples {
-    ($($t:ty, $name:literal, $full:expr;)*) => {$(
+    ($($t:ty, $name:literal, $full:expr, |$value:ident| $nearest:expr;)*) => {$(
         impl Sample for $t {
             const DTYPE: &'static str = $name;
             const FULL_SCALE: f64 = $full;
@@ -112,14 +114,18 @@ macro_rules! samples {
             fn to_real<T: Real>(self) -> T {
                 T::from_f64(f64::from(self))
             }
+            #[inline(always)]
+            fn from_f64_nearest($value: f64) -> Self {
+                $nearest
+            }
         }
     )*};
 }
 samples! {
-    u8, "uint8", 255.0;
-    u16, "uint16", 65535.0;
-    f32, "float32", 1.0;
-    f64, "float64", 1.0;
+    u8, "uint8", 255.0, |value| value.round() as u8;
+    u16, "uint16", 65535.0, |value| value.round() as u16;
+    f32, "float32", 1.0, |value| value as f32;
+    f64, "float64", 1.0, |value| value;
 }
 
 /// A frame as it came from a file or an array, in its own sample type.
@@ -175,6 +181,17 @@ mod tests {
         assert!(Frame::new(3, 2, vec![0u8; 6]).is_ok());
         assert!(Frame::new(3, 2, vec![0u8; 5]).unwrap_err().to_string().contains("data"));
         assert!(Frame::new(usize::MAX, 2, vec![0u8; 5]).is_err());
+    }
+
+    #[test]
+    fn nearest_samples_round_and_saturate() {
+        assert_eq!(u8::from_f64_nearest(254.5), 255);
+        assert_eq!(
+            (u8::from_f64_nearest(-3.0), u8::from_f64_nearest(1e9), u8::from_f64_nearest(f64::NAN)),
+            (0, 255, 0)
+        );
+        assert_eq!(u16::from_f64_nearest(65534.4), 65534);
+        assert_eq!(f32::from_f64_nearest(0.1), 0.1);
     }
 
     #[test]

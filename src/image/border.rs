@@ -1,0 +1,68 @@
+//! What lies beyond the edge of an image.
+
+/// How an image continues beyond its edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Border {
+    /// Mirrored about the outer side of the last pixel: `d c b a | a b c d | d c b a` (scipy's `reflect`). The default.
+    #[default]
+    Reflect,
+    /// The last pixel repeated: `a a a a | a b c d | d d d d` (scipy's `nearest`).
+    Replicate,
+    /// Periodic: `a b c d | a b c d | a b c d` (scipy's `wrap`).
+    Wrap,
+}
+
+impl Border {
+    /// The sample inside `0..len` that stands for position `index`, however far outside it is.
+    ///
+    /// `len` must not be 0.
+    #[inline]
+    pub fn index(self, index: isize, len: usize) -> usize {
+        let n = len as isize;
+        if (0..n).contains(&index) {
+            return index as usize;
+        }
+        let inside = match self {
+            Self::Replicate => index.clamp(0, n - 1),
+            Self::Wrap => index.rem_euclid(n),
+            Self::Reflect => {
+                let folded = index.rem_euclid(2 * n);
+                if folded < n { folded } else { 2 * n - 1 - folded }
+            }
+        };
+        inside as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn spell(border: Border) -> String {
+        (-5..9).map(|i| ['a', 'b', 'c', 'd'][border.index(i, 4)]).collect()
+    }
+
+    #[test]
+    fn each_border_continues_as_documented() {
+        assert_eq!(spell(Border::Reflect), "ddcbaabcddcbaa");
+        assert_eq!(spell(Border::Replicate), "aaaaaabcdddddd");
+        assert_eq!(spell(Border::Wrap), "dabcdabcdabcda");
+    }
+
+    proptest! {
+        #[test]
+        fn every_index_falls_inside(index in -100_000isize..100_000, len in 1usize..50) {
+            for border in [Border::Reflect, Border::Replicate, Border::Wrap] {
+                prop_assert!(border.index(index, len) < len);
+            }
+        }
+
+        #[test]
+        fn reflection_is_symmetric_about_both_edges(k in 0isize..200, len in 1usize..50) {
+            let n = len as isize;
+            prop_assert_eq!(Border::Reflect.index(-1 - k, len), Border::Reflect.index(k, len));
+            prop_assert_eq!(Border::Reflect.index(n + k, len), Border::Reflect.index(n - 1 - k, len));
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Colour to grey.
+
+use crate::error::{Error, Result};
+use crate::types::{Frame, Sample};
+
+/// Weights of red, green and blue in luma (ITU-R BT.601).
+const WEIGHTS: [f64; 3] = [0.299, 0.587, 0.114];
+
+/// Luma `Y = 0.299 R + 0.587 G + 0.114 B` (ITU-R BT.601) of interleaved samples, `[row][col][channel]`, in the samples' own type.
+///
+/// `channels` is 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA); alpha is left out. Integer luma is rounded to the nearest level. A
+/// NaN in any colour channel makes its own pixel NaN and no other.
+///
+/// # Errors
+/// [`Error::Argument`] for another number of channels, or when `data` does not hold `width * height * channels` samples.
+pub fn luminance<S: Sample>(width: usize, height: usize, channels: usize, data: &[S]) -> Result<Frame<S>> {
+    if !(1..=4).contains(&channels) {
+        return Err(Error::argument("channels", "1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA)", channels));
+    }
+    if width.checked_mul(height).and_then(|n| n.checked_mul(channels)) != Some(data.len()) {
+        let expected = format!("{width} x {height} x {channels} samples");
+        return Err(Error::argument("data", expected, format!("{} samples", data.len())));
+    }
+    let pixels = data.chunks_exact(channels);
+    let grey =
+        if channels < 3 { pixels.map(|p| p[0]).collect() } else { pixels.map(|p| weigh([p[0], p[1], p[2]])).collect() };
+    Frame::new(width, height, grey)
+}
+
+#[inline]
+fn weigh<S: Sample>(rgb: [S; 3]) -> S {
+    let [r, g, b] = rgb.map(S::to_real::<f64>);
+    S::from_f64_nearest(WEIGHTS[0] * r + WEIGHTS[1] * g + WEIGHTS[2] * b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn known_colours_have_the_standard_luma() {
+        let rgb = [255u8, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255];
+        assert_eq!(luminance(4, 1, 3, &rgb).unwrap().data(), &[76, 150, 29, 255]);
+        assert_eq!(luminance(1, 1, 4, &[0u16, 65535, 0, 7]).unwrap().data(), &[38469]);
+        assert_eq!(luminance(2, 1, 2, &[0.25f32, 0.0, 0.5, 1.0]).unwrap().data(), &[0.25, 0.5]);
+    }
+
+    #[test]
+    fn wrong_shapes_are_refused_by_name() {
+        assert!(luminance(1, 1, 5, &[0u8; 5]).unwrap_err().to_string().starts_with("channels"));
+        assert!(luminance(2, 1, 3, &[0u8; 5]).unwrap_err().to_string().starts_with("data"));
+        assert!(luminance(usize::MAX, 2, 3, &[0u8; 6]).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn grey_colours_keep_their_level(level: u16) {
+            prop_assert_eq!(luminance(1, 1, 3, &[level; 3]).unwrap().data()[0], level);
+            prop_assert_eq!(luminance(1, 1, 4, &[level; 4]).unwrap().data()[0], level);
+        }
+    }
+}

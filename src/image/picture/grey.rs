@@ -1,0 +1,34 @@
+//! Frames as grey pictures.
+
+use super::{Picture, percentile};
+use crate::types::AnyFrame;
+
+/// A grey picture of a frame. Eight-bit samples are shown as they are; other types are stretched from their 0.5th to their 99.5th percentile,
+/// since sensors of 10 to 14 bit and float pictures say nothing of their full scale. NaN is black.
+pub fn grey_picture(frame: &AnyFrame) -> Picture {
+    let (width, height) = frame.size();
+    if let AnyFrame::U8(frame) = frame {
+        return Picture::from_fn(width, height, |x, y| [frame.get(x, y); 3]);
+    }
+    let frame = frame.to_real::<f64>();
+    let low = percentile(frame.data().iter().copied(), 0.5);
+    let high = percentile(frame.data().iter().copied(), 99.5);
+    let gain = if high > low { 255.0 / (high - low) } else { 0.0 };
+    Picture::from_fn(width, height, |x, y| [((frame.get(x, y) - low) * gain).round() as u8; 3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Frame;
+
+    #[test]
+    fn bytes_are_kept_and_other_types_are_stretched() {
+        let bytes = AnyFrame::U8(Frame::from_fn(3, 1, |x, _| 7 * x as u8));
+        assert_eq!(grey_picture(&bytes).pixel(2, 0), [14; 3]);
+        let words = AnyFrame::U16(Frame::from_fn(2, 1, |x, _| 100 + 900 * x as u16));
+        assert_eq!([0, 1].map(|x| grey_picture(&words).pixel(x, 0)[0]), [0, 255]);
+        let flat = AnyFrame::F32(Frame::new(2, 1, vec![f32::NAN, 5.0]).unwrap());
+        assert_eq!(grey_picture(&flat).pixel(0, 0), [0; 3]);
+    }
+}

@@ -1,0 +1,129 @@
+//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey.
+//!
+//! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes it as PNG.
+
+mod diverging;
+mod grey;
+mod line;
+mod quiver;
+mod wheel;
+
+pub use diverging::{SignedMap, symmetric_range};
+pub use grey::grey_picture;
+pub use quiver::{Arrow, Quiver, arrows_on_grid};
+pub use wheel::{FlowColours, wheel_legend};
+
+use crate::error::{Error, Result};
+
+/// An RGB colour.
+pub type Rgb = [u8; 3];
+
+/// An RGB picture, eight bits a channel, rows from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    width: usize,
+    height: usize,
+    data: Vec<u8>,
+}
+
+impl Picture {
+    /// A picture of one colour.
+    pub fn filled(width: usize, height: usize, colour: Rgb) -> Self {
+        Self { width, height, data: colour.repeat(width * height) }
+    }
+
+    /// A picture whose pixel at column `x`, row `y` is `colour(x, y)`.
+    pub fn from_fn(width: usize, height: usize, mut colour: impl FnMut(usize, usize) -> Rgb) -> Self {
+        let mut data = Vec::with_capacity(3 * width * height);
+        for y in 0..height {
+            for x in 0..width {
+                data.extend(colour(x, y));
+            }
+        }
+        Self { width, height, data }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+    /// Interleaved samples `[row][col][r, g, b]`.
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+    /// The colour at column `x`, row `y`.
+    pub fn pixel(&self, x: usize, y: usize) -> Rgb {
+        let at = 3 * (y * self.width + x);
+        [self.data[at], self.data[at + 1], self.data[at + 2]]
+    }
+
+    /// Mixes `colour` into the pixel at column `x`, row `y`: `coverage` 0 leaves it, 1 replaces it. Outside the picture nothing happens.
+    pub fn blend(&mut self, x: isize, y: isize, colour: Rgb, coverage: f64) {
+        if x < 0 || y < 0 || x as usize >= self.width || y as usize >= self.height {
+            return;
+        }
+        let at = 3 * (y as usize * self.width + x as usize);
+        for (old, new) in self.data[at..at + 3].iter_mut().zip(colour) {
+            *old = (f64::from(*old) + coverage * (f64::from(new) - f64::from(*old))).round() as u8;
+        }
+    }
+
+    /// Every pixel as a block of `factor x factor`: for results on a coarse grid.
+    pub fn enlarged(&self, factor: usize) -> Self {
+        let factor = factor.max(1);
+        Self::from_fn(self.width * factor, self.height * factor, |x, y| self.pixel(x / factor, y / factor))
+    }
+}
+
+/// Checks that a plane handed to this module holds `width * height` values.
+fn check_plane<T>(name: &'static str, plane: &[T], width: usize, height: usize) -> Result<()> {
+    if width.checked_mul(height) == Some(plane.len()) {
+        return Ok(());
+    }
+    Err(Error::argument(name, format!("{width} x {height} values"), format!("{} values", plane.len())))
+}
+
+/// The `percentile` (0 to 100) of the finite values that `values` yields; 0 when there are none.
+fn percentile(values: impl Iterator<Item = f64>, percentile: f64) -> f64 {
+    let mut finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    if finite.is_empty() {
+        return 0.0;
+    }
+    let rank = (percentile.clamp(0.0, 100.0) / 100.0 * (finite.len() - 1) as f64).round() as usize;
+    *finite.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blending_mixes_and_ignores_the_outside() {
+        let mut picture = Picture::filled(3, 2, [0, 100, 200]);
+        picture.blend(1, 1, [100, 100, 0], 0.5);
+        assert_eq!(picture.pixel(1, 1), [50, 100, 100]);
+        for (x, y) in [(-1, 0), (0, -1), (3, 0), (0, 2)] {
+            picture.blend(x, y, [255; 3], 1.0);
+        }
+        assert_eq!(picture.data().iter().filter(|&&b| b == 255).count(), 0);
+    }
+
+    #[test]
+    fn enlarging_repeats_pixels() {
+        let picture = Picture::from_fn(2, 1, |x, _| [x as u8; 3]).enlarged(3);
+        assert_eq!((picture.width(), picture.height()), (6, 3));
+        assert_eq!((picture.pixel(2, 2), picture.pixel(3, 0)), ([0; 3], [1; 3]));
+    }
+
+    #[test]
+    fn percentile_skips_what_is_not_finite() {
+        let values = [3.0, f64::NAN, 1.0, f64::INFINITY, 2.0];
+        assert_eq!(percentile(values.into_iter(), 50.0), 2.0);
+        assert_eq!(percentile(values.into_iter(), 100.0), 3.0);
+        assert_eq!(percentile([f64::NAN].into_iter(), 50.0), 0.0);
+    }
+}

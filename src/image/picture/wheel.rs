@@ -1,0 +1,146 @@
+//! Flow as colour: direction is hue, speed is saturation.
+
+use super::{Picture, Rgb, check_plane, percentile};
+use crate::error::Result;
+use crate::math::Real;
+
+/// How many hues lie between neighbouring corners of the wheel (red, yellow, green, cyan, blue, magenta, red), chosen so that
+/// perceived hue changes evenly (S. Baker et al., "A database and evaluation methodology for optical flow", 2011).
+const STEPS: [(usize, Rgb); 6] = [
+    (15, [255, 0, 0]),
+    (6, [255, 255, 0]),
+    (4, [0, 255, 0]),
+    (11, [0, 255, 255]),
+    (13, [0, 0, 255]),
+    (6, [255, 0, 255]),
+];
+
+/// The colour wheel of the Middlebury flow pages: no motion is white, full speed is the pure hue, right is red, down is yellow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct FlowColours {
+    /// Speed of full saturation, px/frame; `None` (the default): the given percentile of the speeds. Faster is darker.
+    pub max_speed: Option<f64>,
+    /// Percentile of the automatic range; default 99.
+    pub percentile: f64,
+    /// Colour of unknown (NaN or infinite) flow; default black.
+    pub unknown: Rgb,
+}
+
+impl Default for FlowColours {
+    fn default() -> Self {
+        Self { max_speed: None, percentile: 99.0, unknown: [0, 0, 0] }
+    }
+}
+
+impl FlowColours {
+    /// Colours with a fixed (`Some`) or automatic range.
+    pub fn new(max_speed: Option<f64>) -> Self {
+        Self { max_speed, ..Self::default() }
+    }
+
+    /// The speed of full saturation for this flow: `max_speed`, else the percentile; 1 where all of it is at rest.
+    pub fn range<T: Real>(&self, u: &[T], v: &[T]) -> f64 {
+        let speeds = u.iter().zip(v).map(|(u, v)| u.to_f64().hypot(v.to_f64()));
+        let range = self.max_speed.unwrap_or_else(|| percentile(speeds, self.percentile));
+        if range > 0.0 && range.is_finite() { range } else { 1.0 }
+    }
+
+    /// A picture of the flow planes `u`, `v` (row-major, `width x height`).
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) when a plane has another size.
+    pub fn picture<T: Real>(&self, u: &[T], v: &[T], width: usize, height: usize) -> Result<Picture> {
+        check_plane("u", u, width, height)?;
+        check_plane("v", v, width, height)?;
+        let (wheel, range) = (wheel(), self.range(u, v));
+        Ok(Picture::from_fn(width, height, |x, y| {
+            let at = y * width + x;
+            colour(&wheel, u[at].to_f64() / range, v[at].to_f64() / range).unwrap_or(self.unknown)
+        }))
+    }
+}
+
+/// A square picture of the wheel itself, `size` px wide: the colour at an offset from the middle is that of flow in that direction.
+pub fn wheel_legend(size: usize) -> Picture {
+    let (wheel, middle) = (wheel(), (size as f64 - 1.0) / 2.0);
+    let radius = (size as f64 / 2.0).max(1.0);
+    Picture::from_fn(size, size, |x, y| {
+        let (u, v) = ((x as f64 - middle) / radius, (y as f64 - middle) / radius);
+        if u.hypot(v) > 1.0 { [255; 3] } else { colour(&wheel, u, v).unwrap_or([255; 3]) }
+    })
+}
+
+/// The 55 hues, from red through yellow, green, cyan, blue and magenta.
+fn wheel() -> Vec<[f64; 3]> {
+    let mut hues = Vec::with_capacity(55);
+    for (corner, &(steps, from)) in STEPS.iter().enumerate() {
+        let to = STEPS[(corner + 1) % STEPS.len()].1;
+        for step in 0..steps {
+            let part = step as f64 / steps as f64;
+            hues.push(std::array::from_fn(|c| (f64::from(from[c]) * (1.0 - part) + f64::from(to[c]) * part) / 255.0));
+        }
+    }
+    hues
+}
+
+/// Colour of a flow in units of the full speed; `None` for unknown flow.
+fn colour(wheel: &[[f64; 3]], u: f64, v: f64) -> Option<Rgb> {
+    let speed = u.hypot(v);
+    if !speed.is_finite() {
+        return None;
+    }
+    // A turn of the flow runs once through the hues; red stands for motion to the right, where the angle below jumps by a turn.
+    let turn = (-v).atan2(-u) / std::f64::consts::TAU + 0.5;
+    let place = turn * (wheel.len() - 1) as f64;
+    let first = (place as usize).min(wheel.len() - 1);
+    let (a, b, part) = (wheel[first], wheel[(first + 1) % wheel.len()], place - first as f64);
+    Some(std::array::from_fn(|c| {
+        let hue = a[c] * (1.0 - part) + b[c] * part;
+        let value = if speed <= 1.0 { 1.0 - speed * (1.0 - hue) } else { 0.75 * hue };
+        (255.0 * value).floor() as u8
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wheel_has_55_hues_between_pure_corners() {
+        let wheel = wheel();
+        assert_eq!(wheel.len(), 55);
+        assert_eq!((wheel[0], wheel[15], wheel[21]), ([1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn directions_have_their_colours() {
+        let wheel = wheel();
+        assert_eq!(colour(&wheel, 0.0, 0.0), Some([255; 3]));
+        assert_eq!(colour(&wheel, 1.0, 0.0), Some([255, 0, 0]), "right is red");
+        let [r, g, b] = colour(&wheel, 0.0, 1.0).unwrap();
+        assert!(r > 200 && g > 200 && b < 30, "down is yellow, not {r} {g} {b}");
+        let [r, g, b] = colour(&wheel, -1.0, 0.0).unwrap();
+        assert!(r < 30 && g > 180 && b > 200, "left is cyan, not {r} {g} {b}");
+        let [r, _, b] = colour(&wheel, 0.0, -1.0).unwrap();
+        assert!(b > 200 && r > 60, "up is violet");
+    }
+
+    #[test]
+    fn unknown_flow_is_marked_and_does_not_set_the_range() {
+        let u = [1.0f32, f32::NAN, f32::INFINITY, 0.0];
+        let colours = FlowColours::default();
+        assert_eq!(colours.range(&u, &[0.0; 4]), 1.0);
+        let picture = colours.picture(&u, &[0.0; 4], 4, 1).unwrap();
+        assert_eq!([0, 1, 2, 3].map(|x| picture.pixel(x, 0)), [[255, 0, 0], [0; 3], [0; 3], [255; 3]]);
+    }
+
+    #[test]
+    fn too_fast_is_darker_and_rest_everywhere_is_white() {
+        let picture = FlowColours::new(Some(1.0)).picture(&[2.0f64], &[0.0], 1, 1).unwrap();
+        assert_eq!(picture.pixel(0, 0), [191, 0, 0]);
+        let still = FlowColours::default().picture(&[0.0f64; 4], &[0.0; 4], 2, 2).unwrap();
+        assert!(still.data().iter().all(|&b| b == 255));
+        assert!(FlowColours::default().picture(&[0.0f64; 3], &[0.0; 4], 2, 2).is_err());
+    }
+}

@@ -1,0 +1,66 @@
+//! The quantiser in front of the smoother (WO2010/098160, figure 1).
+
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::Frame;
+
+/// Rounds samples down to a multiple of a step: `floor(x / step) * step`.
+///
+/// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in embodiment 2 of
+/// WO2010/098160. NaN and infinities stay as they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Quantiser {
+    /// Distance between neighbouring levels, grey levels; default 1.
+    pub step: f64,
+}
+
+impl Default for Quantiser {
+    fn default() -> Self {
+        Self { step: 1.0 }
+    }
+}
+
+impl Quantiser {
+    /// A quantiser with levels `step` grey levels apart.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `quantise` unless `step` is positive and finite.
+    pub fn new(step: f64) -> Result<Self> {
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(Error::argument("quantise", "a positive, finite step in grey levels", step));
+        }
+        Ok(Self { step })
+    }
+
+    /// The quantised frame. The quotient is taken in double precision, so `f32` levels are exact multiples.
+    pub fn apply<T: Real>(&self, frame: &Frame<T>) -> Frame<T> {
+        let step = self.step;
+        if step == 1.0 {
+            return frame.map(|x| T::from_f64(x.to_f64().floor()));
+        }
+        frame.map(|x| T::from_f64((x.to_f64() / step).floor() * step))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_go_down_to_the_level_below() {
+        let frame = Frame::new(4, 1, vec![1.9f32, -0.1, 3.0, f32::NAN]).unwrap();
+        let out = Quantiser::default().apply(&frame);
+        assert_eq!(&out.data()[..3], &[1.0, -1.0, 3.0]);
+        assert!(out.data()[3].is_nan());
+        let coarse = Quantiser::new(0.5).unwrap().apply(&frame);
+        assert_eq!(&coarse.data()[..3], &[1.5, -0.5, 3.0]);
+    }
+
+    #[test]
+    fn a_useless_step_is_refused_by_name() {
+        for step in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Quantiser::new(step).unwrap_err().to_string().starts_with("quantise"));
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Brightness between the pixels.
+
+use crate::math::Real;
+use crate::types::Frame;
+
+/// How brightness is read between pixel centres, which lie at integer coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interpolation {
+    /// From the four nearest pixels: continuous, exact for brightness that is linear in x and in y.
+    Bilinear,
+    /// From the sixteen nearest pixels by cubic convolution with a = -1/2 (R. Keys, "Cubic convolution interpolation for digital
+    /// image processing", 1981): continuous slope, exact for quadratics. The default.
+    #[default]
+    Bicubic,
+}
+
+impl Interpolation {
+    /// Brightness of `frame` at `(x, y)` px; NaN where the pixels it needs reach outside the frame or hold NaN.
+    ///
+    /// Pixels that would get weight zero are not needed: at integer coordinates the pixel itself is returned, whatever is around it.
+    pub fn at<T: Real>(self, frame: &Frame<T>, x: f64, y: f64) -> T {
+        let (Some((x0, fx)), Some((y0, fy))) = (split(x, frame.width()), split(y, frame.height())) else {
+            return T::nan();
+        };
+        let (wx, wy) = (self.weights(fx), self.weights(fy));
+        let mut sum = 0.0;
+        for (j, &b) in wy.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            for (i, &a) in wx.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                let (px, py) = ((x0 + i).wrapping_sub(1), (y0 + j).wrapping_sub(1));
+                if px >= frame.width() || py >= frame.height() {
+                    return T::nan();
+                }
+                sum += a * b * frame.get(px, py).to_f64();
+            }
+        }
+        T::from_f64(sum)
+    }
+
+    /// Weights of the pixels at -1, 0, 1, 2 for a position `f` in [0, 1) past pixel 0.
+    fn weights(self, f: f64) -> [f64; 4] {
+        match self {
+            Self::Bilinear => [0.0, 1.0 - f, f, 0.0],
+            Self::Bicubic => [
+                ((-0.5 * f + 1.0) * f - 0.5) * f,
+                (1.5 * f - 2.5) * f * f + 1.0,
+                ((-1.5 * f + 2.0) * f + 0.5) * f,
+                (0.5 * f - 0.5) * f * f,
+            ],
+        }
+    }
+}
+
+/// The pixel at or before `position` and the rest; `None` outside `0..=len - 1` and for NaN.
+fn split(position: f64, len: usize) -> Option<(usize, f64)> {
+    if !(position >= 0.0 && position <= len as f64 - 1.0) {
+        return None;
+    }
+    let whole = position.floor();
+    Some((whole as usize, position - whole))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn quadratic(x: f64, y: f64) -> f64 {
+        3.0 + 0.5 * x - 0.25 * y + 0.125 * x * x - 0.0625 * x * y + 0.2 * y * y
+    }
+
+    #[test]
+    fn outside_and_nan_are_nan_and_pixels_are_exact() {
+        let mut frame = Frame::from_fn(6, 5, |x, y| (10 * y + x) as f32);
+        frame.row_mut(0)[0] = f32::NAN;
+        for how in [Interpolation::Bilinear, Interpolation::Bicubic] {
+            assert_eq!(how.at(&frame, 5.0, 4.0), 45.0);
+            assert_eq!(how.at(&frame, 1.0, 0.0), 1.0);
+            for (x, y) in [(-0.01, 1.0), (5.01, 1.0), (1.0, 4.5), (f64::NAN, 1.0), (0.5, 0.0)] {
+                assert!(how.at(&frame, x, y).is_nan(), "{how:?} at {x}, {y}");
+            }
+        }
+        assert!(Interpolation::Bilinear.at(&frame, 1.5, 0.0) == 1.5);
+        assert!(Interpolation::Bilinear.at(&Frame::<f32>::new(0, 0, vec![]).unwrap(), 0.0, 0.0).is_nan());
+    }
+
+    proptest! {
+        #[test]
+        fn bicubic_is_exact_for_quadratics(x in 1.0..6.0f64, y in 1.0..5.0f64) {
+            let frame = Frame::from_fn(8, 7, |x, y| quadratic(x as f64, y as f64));
+            prop_assert!((Interpolation::Bicubic.at(&frame, x, y) - quadratic(x, y)).abs() < 1e-12);
+        }
+
+        #[test]
+        fn bilinear_is_exact_for_planes(x in 0.0..7.0f64, y in 0.0..6.0f64) {
+            let frame = Frame::from_fn(8, 7, |x, y| 2.0 * x as f64 - y as f64);
+            prop_assert!((Interpolation::Bilinear.at(&frame, x, y) - (2.0 * x - y)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! Gaussian smoothing: a symmetric separable convolution, vectorised along rows and parallel over row bands.
+
+use super::Border;
+use crate::error::{Error, Result};
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::Frame;
+
+/// Taps on one side beyond which smoothing is refused: far wider than any picture.
+const MAX_RADIUS: f64 = 16_384.0;
+
+/// Convolution with a sampled Gaussian, cut off and normalised: the conventions of `scipy.ndimage.gaussian_filter`.
+///
+/// `out(x, y) = sum_j sum_i w_i w_j in(x + i, y + j)`, `w_i = exp(-i^2 / (2 sigma^2)) / sum`, `|i| <= radius`, with `radius` the whole part of
+/// `truncate sigma + 1/2`. Each output is a direct sum over its own neighbourhood, so a NaN damages only the pixels whose kernel
+/// reaches it. Results are bit-identical for any number of threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct GaussianSmoother {
+    /// Standard deviation of the Gaussian, px; 0 changes nothing.
+    pub sigma: f64,
+    /// Where the kernel is cut off, in units of sigma; default 4.
+    pub truncate: f64,
+    /// What lies beyond the edge; default [`Border::Reflect`].
+    pub border: Border,
+}
+
+impl GaussianSmoother {
+    /// A smoother with standard deviation `sigma` px, cut off at 4 sigma, reflecting borders.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `smooth` unless `sigma` is finite, not negative and at most 4096 px.
+    pub fn new(sigma: f64) -> Result<Self> {
+        Self::with(sigma, 4.0, Border::Reflect)
+    }
+
+    /// A smoother with standard deviation `sigma` px, cut off at `truncate` sigma.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `smooth` or `truncate` for a negative or non-finite number or a kernel of more than 16384 px radius.
+    pub fn with(sigma: f64, truncate: f64, border: Border) -> Result<Self> {
+        if !(sigma >= 0.0 && sigma.is_finite()) {
+            return Err(Error::argument("smooth", "a standard deviation in px, not negative and finite", sigma));
+        }
+        if !(truncate >= 0.0 && truncate.is_finite()) {
+            return Err(Error::argument("truncate", "a number of standard deviations, not negative", truncate));
+        }
+        if truncate * sigma > MAX_RADIUS {
+            let expected = format!("a kernel radius (truncate x sigma) of at most {MAX_RADIUS} px");
+            return Err(Error::argument("smooth", expected, truncate * sigma));
+        }
+        Ok(Self { sigma, truncate, border })
+    }
+
+    /// Taps on each side of the centre: the whole part of `truncate sigma + 1/2`.
+    pub fn radius(&self) -> usize {
+        (self.truncate * self.sigma + 0.5).clamp(0.0, MAX_RADIUS + 1.0) as usize
+    }
+
+    /// The `2 radius + 1` weights of the one-dimensional kernel; they sum to 1.
+    pub fn kernel(&self) -> Vec<f64> {
+        let half = self.half_kernel();
+        half.iter().skip(1).rev().chain(&half).copied().collect()
+    }
+
+    /// Weights of the taps at 0, 1, ..., radius.
+    fn half_kernel(&self) -> Vec<f64> {
+        let radius = self.radius();
+        if radius == 0 || self.sigma == 0.0 {
+            return vec![1.0];
+        }
+        let raw: Vec<f64> = (0..=radius).map(|i| (-0.5 * (i as f64 / self.sigma).powi(2)).exp()).collect();
+        let sum = raw[0] + 2.0 * raw[1..].iter().rev().sum::<f64>();
+        raw.iter().map(|w| w / sum).collect()
+    }
+
+    /// The smoothed frame.
+    ///
+    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of threads.
+    pub fn apply<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
+        self.apply_at(Level::detect(), frame)
+    }
+
+    /// As [`GaussianSmoother::apply`], with a chosen instruction set.
+    pub fn apply_at<T: SimdReal>(&self, level: Level, frame: &Frame<T>) -> Frame<T> {
+        let (width, height) = frame.size();
+        let mut out = Frame::filled(width, height, T::from_f64(0.0));
+        let kernel = SeparableKernel::symmetric(&self.half_kernel(), self.border);
+        convolve_separable(level, &kernel, frame.data(), width, out.data_mut());
+        out
+    }
+}
+
+/// A symmetric kernel, the same along both axes.
+#[derive(Debug, Clone)]
+pub(crate) struct SeparableKernel<T> {
+    /// Weights of the taps at distance 0, 1, ..., radius.
+    half: Vec<T>,
+    border: Border,
+}
+
+impl<T: SimdReal> SeparableKernel<T> {
+    /// From the weights at distance 0, 1, ..., radius (at least one).
+    pub(crate) fn symmetric(half: &[f64], border: Border) -> Self {
+        Self { half: half.iter().map(|&w| T::from_f64(w)).collect(), border }
+    }
+
+    fn radius(&self) -> usize {
+        self.half.len().saturating_sub(1)
+    }
+}
+
+/// Convolves a row-major plane of rows of `width` samples along both axes into `output`, of the same size.
+pub(crate) fn convolve_separable<T: SimdReal>(
+    level: Level,
+    kernel: &SeparableKernel<T>,
+    input: &[T],
+    width: usize,
+    output: &mut [T],
+) {
+    if width == 0 || input.is_empty() {
+        return;
+    }
+    let rows_in = input.len() / width;
+    for_each_band(output, width, |_, rows, slice| {
+        dispatch(
+            level,
+            BandConvolution { kernel, input, width, height: rows_in, first_row: rows.start, output: slice },
+        );
+    });
+}
+
+/// One band of output rows: each row is summed down its columns into a scratch row, extended at both ends, then summed along.
+struct BandConvolution<'a, T> {
+    kernel: &'a SeparableKernel<T>,
+    input: &'a [T],
+    width: usize,
+    height: usize,
+    first_row: usize,
+    output: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for BandConvolution<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        // A row narrower than one vector is left to single lanes.
+        if self.width < V::LANES { self.rows::<T>() } else { self.rows::<V>() }
+    }
+}
+
+impl<T: SimdReal> BandConvolution<'_, T> {
+    #[inline(always)]
+    fn rows<V: Lanes<Scalar = T>>(self) {
+        let Self { kernel, input, width, height, first_row, output } = self;
+        let (radius, half) = (kernel.radius(), kernel.half.as_slice());
+        let row = |y: usize| &input[y * width..(y + 1) * width];
+        let mut scratch = vec![T::from_f64(0.0); width + 2 * radius];
+        let mut pairs: Vec<(&[T], &[T])> = Vec::with_capacity(radius);
+        for (offset, out) in output.chunks_exact_mut(width).enumerate() {
+            let y = first_row + offset;
+            pairs.clear();
+            pairs.extend((1..=radius as isize).map(|k| {
+                let y = y as isize;
+                (row(kernel.border.index(y - k, height)), row(kernel.border.index(y + k, height)))
+            }));
+            sum_down::<V>(row(y), &pairs, half, &mut scratch[radius..radius + width]);
+            extend(&mut scratch, radius, width, kernel.border);
+            sum_along::<V>(&scratch, half, out);
+        }
+    }
+}
+
+/// Fills the `radius` samples before and after the `width` samples in the middle of `row`.
+#[inline(always)]
+fn extend<T: Copy>(row: &mut [T], radius: usize, width: usize, border: Border) {
+    for i in 0..radius {
+        row[i] = row[radius + border.index(i as isize - radius as isize, width)];
+        row[radius + width + i] = row[radius + border.index((width + i) as isize, width)];
+    }
+}
+
+/// Vectors summed side by side, so that one addition need not wait for the last.
+const BLOCK: usize = 4;
+
+/// Calls `$block::<V, N>(x)` so that every column of `0..width` is covered, `width >= LANES`: blocks, single vectors, and one last vector that overlaps.
+macro_rules! cover {
+    ($width:expr, $V:ty, |$x:ident, $N:ident| $body:expr) => {{
+        let mut $x = 0;
+        while $x + BLOCK * <$V>::LANES <= $width {
+            const $N: usize = BLOCK;
+            $body;
+            $x += BLOCK * <$V>::LANES;
+        }
+        while $x < $width {
+            const $N: usize = 1;
+            $x = $x.min($width - <$V>::LANES);
+            $body;
+            $x += <$V>::LANES;
+        }
+    }};
+}
+
+/// `out = half[0] centre + sum_k half[k] (above_k + below_k)`.
+#[inline(always)]
+fn sum_down<V: Lanes>(
+    centre: &[V::Scalar],
+    pairs: &[(&[V::Scalar], &[V::Scalar])],
+    half: &[V::Scalar],
+    out: &mut [V::Scalar],
+) {
+    cover!(out.len(), V, |x, N| {
+        let mut sums = load::<V, N>(&centre[x..]).map(|c| c * V::splat(half[0]));
+        for (&(above, below), &weight) in pairs.iter().zip(&half[1..]) {
+            add_pair::<V, N>(&mut sums, &above[x..], &below[x..], weight);
+        }
+        store::<V, N>(&sums, &mut out[x..]);
+    });
+}
+
+/// `out[x] = half[0] row[x + r] + sum_k half[k] (row[x + r - k] + row[x + r + k])`.
+#[inline(always)]
+fn sum_along<V: Lanes>(row: &[V::Scalar], half: &[V::Scalar], out: &mut [V::Scalar]) {
+    let radius = half.len() - 1;
+    cover!(out.len(), V, |x, N| {
+        let mut sums = load::<V, N>(&row[x + radius..]).map(|c| c * V::splat(half[0]));
+        for (k, &weight) in half.iter().enumerate().skip(1) {
+            add_pair::<V, N>(&mut sums, &row[x + radius - k..], &row[x + radius + k..], weight);
+        }
+        store::<V, N>(&sums, &mut out[x..]);
+    });
+}
+
+#[inline(always)]
+fn load<V: Lanes, const N: usize>(source: &[V::Scalar]) -> [V; N] {
+    let source = &source[..N * V::LANES];
+    std::array::from_fn(|i| V::load(&source[i * V::LANES..]))
+}
+
+#[inline(always)]
+fn store<V: Lanes, const N: usize>(values: &[V; N], target: &mut [V::Scalar]) {
+    let target = &mut target[..N * V::LANES];
+    for i in 0..N {
+        values[i].store(&mut target[i * V::LANES..]);
+    }
+}
+
+#[inline(always)]
+fn add_pair<V: Lanes, const N: usize>(sums: &mut [V; N], a: &[V::Scalar], b: &[V::Scalar], weight: V::Scalar) {
+    let (a, b) = (&a[..N * V::LANES], &b[..N * V::LANES]);
+    let weight = V::splat(weight);
+    for i in 0..N {
+        sums[i] = (V::load(&a[i * V::LANES..]) + V::load(&b[i * V::LANES..])).mul_add(weight, sums[i]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::parallel::Threads;
+    use proptest::prelude::*;
+
+    fn noise(width: usize, height: usize, seed: u64) -> Frame<f64> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(width, height, |x, y| 100.0 * rng.uniform((y * width + x) as u64))
+    }
+
+    /// The double sum of the definition.
+    fn naive(smoother: &GaussianSmoother, frame: &Frame<f64>) -> Frame<f64> {
+        let (kernel, radius) = (smoother.kernel(), smoother.radius() as isize);
+        let (w, h) = frame.size();
+        Frame::from_fn(w, h, |x, y| {
+            let mut sum = 0.0;
+            for j in -radius..=radius {
+                for i in -radius..=radius {
+                    let weight = kernel[(i + radius) as usize] * kernel[(j + radius) as usize];
+                    let (px, py) = (x as isize + i, y as isize + j);
+                    sum += weight * frame.get(smoother.border.index(px, w), smoother.border.index(py, h));
+                }
+            }
+            sum
+        })
+    }
+
+    fn worst(a: &Frame<f64>, b: &Frame<f64>) -> f64 {
+        assert_eq!(a.size(), b.size());
+        a.data().iter().zip(b.data()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn kernel_has_the_usual_radius_and_sums_to_one() {
+        for (sigma, radius) in [(0.0, 0), (0.1, 0), (1.0, 4), (1.5, 6), (3.0, 12), (0.375, 2)] {
+            let smoother = GaussianSmoother::new(sigma).unwrap();
+            assert_eq!(smoother.radius(), radius, "sigma {sigma}");
+            assert_eq!(smoother.kernel().len(), 2 * radius + 1);
+            assert!((smoother.kernel().iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    /// `scipy.ndimage.gaussian_filter` (1.17) of a unit impulse at column 1, row 0 of a 3 x 4 frame, sigma 1: its first and last row.
+    #[test]
+    fn impulse_matches_the_reference() {
+        let mut frame = Frame::filled(4, 3, 0.0);
+        frame.row_mut(0)[1] = 1.0;
+        let out = GaussianSmoother::new(1.0).unwrap().apply(&frame);
+        for (got, want) in out.row(0).iter().zip(IMPULSE_FIRST).chain(out.row(2).iter().zip(IMPULSE_LAST)) {
+            assert!((got - want).abs() < 1e-15, "{got} {want}");
+        }
+    }
+    const IMPULSE_FIRST: [f64; 4] =
+        [0.18968682737078058, 0.25852926597078485, 0.15525465661530216, 0.037444165055830925];
+    const IMPULSE_LAST: [f64; 4] =
+        [0.018642292187967858, 0.02540808016124074, 0.01525832189974684, 0.003679987036426246];
+
+    #[test]
+    fn useless_sigmas_are_refused_by_name() {
+        for sigma in [-1.0, f64::NAN, f64::INFINITY, 1e9] {
+            assert!(GaussianSmoother::new(sigma).unwrap_err().to_string().starts_with("smooth"));
+        }
+        assert!(GaussianSmoother::with(1.0, f64::NAN, Border::Wrap).is_err());
+    }
+
+    #[test]
+    fn every_level_agrees_with_the_scalar_twin() {
+        let frame = noise(77, 40, 5);
+        let single = frame.map(|&x| x as f32);
+        let smoother = GaussianSmoother::new(1.5).unwrap();
+        let (want, want32) = (smoother.apply_at(Level::SCALAR, &frame), smoother.apply_at(Level::SCALAR, &single));
+        for level in Level::available() {
+            assert!(worst(&smoother.apply_at(level, &frame), &want) < 1e-12, "{level:?}");
+            let got = smoother.apply_at(level, &single);
+            assert!(got.data().iter().zip(want32.data()).all(|(a, b)| (a - b).abs() < 1e-4), "{level:?}");
+        }
+    }
+
+    #[test]
+    fn bits_do_not_depend_on_the_number_of_threads() {
+        let frame = noise(65, 50, 9).map(|&x| x as f32);
+        let smoother = GaussianSmoother::new(2.0).unwrap();
+        let run = |n| Threads::new(Some(n)).unwrap().install(|| smoother.apply(&frame));
+        let one: Vec<u32> = run(1).data().iter().map(|x| x.to_bits()).collect();
+        for n in [2, 3] {
+            assert_eq!(one, run(n).data().iter().map(|x| x.to_bits()).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn nan_damages_exactly_the_kernel_reach() {
+        let clean = noise(40, 30, 2);
+        let mut hurt = clean.clone();
+        hurt.row_mut(12)[17] = f64::NAN;
+        hurt.row_mut(13)[17] = f64::INFINITY;
+        let smoother = GaussianSmoother::new(1.0).unwrap();
+        let (clean, hurt) = (smoother.apply(&clean), smoother.apply(&hurt));
+        let radius = smoother.radius();
+        for y in 0..30usize {
+            for x in 0..40usize {
+                let near = x.abs_diff(17) <= radius && (y.abs_diff(12) <= radius || y.abs_diff(13) <= radius);
+                assert_eq!(!hurt.get(x, y).is_finite(), near, "{x}, {y}");
+                assert!(near || hurt.get(x, y) == clean.get(x, y));
+            }
+        }
+    }
+
+    #[test]
+    fn empty_and_constant_frames_survive() {
+        let smoother = GaussianSmoother::new(5.0).unwrap();
+        assert_eq!(smoother.apply(&Frame::<f32>::new(0, 4, vec![]).unwrap()).size(), (0, 4));
+        assert_eq!(smoother.apply(&Frame::<f32>::new(4, 0, vec![]).unwrap()).size(), (4, 0));
+        let flat = smoother.apply(&Frame::filled(3, 2, 7.0f64));
+        assert!(flat.data().iter().all(|x| (x - 7.0).abs() < 1e-13));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn agrees_with_the_double_sum(
+            width in 1usize..40, height in 1usize..24, sigma in 0.0..2.5f64, seed: u64,
+            border in prop_oneof![Just(Border::Reflect), Just(Border::Replicate), Just(Border::Wrap)],
+        ) {
+            let smoother = GaussianSmoother::with(sigma, 3.0, border).unwrap();
+            let frame = noise(width, height, seed);
+            prop_assert!(worst(&smoother.apply(&frame), &naive(&smoother, &frame)) < 1e-11);
+        }
+    }
+}
