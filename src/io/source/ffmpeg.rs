@@ -1,0 +1,227 @@
+//! Compressed video, decoded by an `ffmpeg` program on the `PATH`.
+
+use super::{FrameSource, Kind, Y4mSource};
+use crate::error::{Error, Result};
+use crate::types::AnyFrame;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+pub(super) const KIND: Kind = Kind {
+    name: "ffmpeg",
+    accepts: |spec| Path::new(spec).is_file(),
+    open: |spec, _| Ok(Box::new(FfmpegSource::open(spec)?)),
+};
+
+/// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier ones.
+const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0"]];
+
+/// Frames of a video file: the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]).
+///
+/// The program runs beside this process and is stopped when the source is dropped.
+#[derive(Debug)]
+pub struct FfmpegSource {
+    path: PathBuf,
+    stream: Y4mSource<BufReader<ChildStdout>>,
+    running: Running,
+}
+
+/// The program, stopped on drop, and the file that takes its messages.
+#[derive(Debug)]
+struct Running {
+    child: Child,
+    messages: File,
+}
+
+impl FfmpegSource {
+    /// Opens a video with the `ffmpeg` on the `PATH`.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] when there is no `ffmpeg`; [`Error::Format`] with its own words when it cannot decode the file.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with("ffmpeg", path)
+    }
+
+    /// As [`FfmpegSource::open`], with another program that understands the same options.
+    ///
+    /// # Errors
+    /// As [`FfmpegSource::open`].
+    pub fn open_with(program: impl AsRef<Path>, path: impl AsRef<Path>) -> Result<Self> {
+        let (program, path) = (program.as_ref(), path.as_ref());
+        File::open(path).map_err(|e| Error::io(path, e))?;
+        let mut failure = None;
+        for every_frame in EVERY_FRAME {
+            let mut running = Running::start(program, path, every_frame)?;
+            let Some(output) = running.child.stdout.take() else { break };
+            match Y4mSource::new(path, BufReader::with_capacity(1 << 18, output)) {
+                Ok(stream) => return Ok(Self { path: path.to_path_buf(), stream, running }),
+                Err(error) => failure = Some(running.explain(path, error)),
+            }
+            // Only a program that does not know the option deserves the older spelling.
+            if !failure.as_ref().is_some_and(|e| e.to_string().contains("fps_mode")) {
+                break;
+            }
+        }
+        Err(failure.unwrap_or_else(|| Error::format(path, "ffmpeg gave no output")))
+    }
+}
+
+impl Running {
+    fn start(program: &Path, path: &Path, every_frame: [&str; 2]) -> Result<Self> {
+        let messages = tempfile::tempfile().map_err(|e| Error::io(std::env::temp_dir(), e))?;
+        let for_child = messages.try_clone().map_err(|e| Error::io(std::env::temp_dir(), e))?;
+        // A name that begins with a dash or holds a colon must not be taken for an option or a protocol.
+        let mut input = std::ffi::OsString::from("file:");
+        input.push(path);
+        let child = Command::new(program)
+            .args(["-nostdin", "-v", "error", "-i"])
+            .arg(input)
+            .args(["-map", "0:v:0"])
+            .args(every_frame)
+            .args(["-strict", "-1", "-f", "yuv4mpegpipe", "-"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(for_child)
+            .spawn()
+            .map_err(|e| match e.kind() {
+                ErrorKind::NotFound => Error::Missing(format!(
+                    "{}: reading compressed video needs the program '{}', which is not on the PATH. Install ffmpeg, or give the frames as a folder of images or as Y4M (ffmpeg -i VIDEO -f yuv4mpegpipe - | jacoflow ... -)",
+                    path.display(),
+                    program.display()
+                )),
+                _ => Error::io(program, e),
+            })?;
+        Ok(Self { child, messages })
+    }
+
+    /// The end of what the program said.
+    fn last_words(&mut self) -> String {
+        let mut text = Vec::new();
+        let length = self.messages.seek(SeekFrom::End(0)).unwrap_or(0);
+        let _ = self.messages.seek(SeekFrom::Start(length.saturating_sub(2000)));
+        let _ = (&mut self.messages).take(2000).read_to_end(&mut text);
+        String::from_utf8_lossy(&text).trim().to_string()
+    }
+
+    /// Puts the program's own words in front of an error that its output caused.
+    fn explain(&mut self, path: &Path, error: Error) -> Error {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        match self.last_words() {
+            words if words.is_empty() => error,
+            words => Error::format(path, format!("ffmpeg cannot decode it: {words}")),
+        }
+    }
+
+    /// Waits for the program after its last frame; an error when it failed.
+    fn finish(&mut self, path: &Path) -> Result<()> {
+        let status = self.child.wait().map_err(|e| Error::io(path, e))?;
+        if status.success() {
+            return Ok(());
+        }
+        let words = self.last_words();
+        Err(Error::format(path, format!("ffmpeg stopped with {status}: {words}")))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl FrameSource for FfmpegSource {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        match self.stream.next_frame() {
+            Ok(None) => self.running.finish(&self.path).map(|()| None),
+            Err(error) => Err(self.running.explain(&self.path, error)),
+            frame => frame,
+        }
+    }
+    fn skip(&mut self, count: usize) -> Result<usize> {
+        self.stream.skip(count).map_err(|error| self.running.explain(&self.path, error))
+    }
+    fn frame_rate(&self) -> Option<f64> {
+        self.stream.frame_rate()
+    }
+    fn describe(&self) -> String {
+        format!("{} (video, through ffmpeg)", self.path.display())
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    /// A stand-in program: a shell script.
+    fn program(folder: &Path, script: &str) -> PathBuf {
+        let path = folder.join("decoder");
+        std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        path
+    }
+
+    fn open(script: &str) -> (tempfile::TempDir, Result<FfmpegSource>) {
+        let folder = tempfile::tempdir().unwrap();
+        let film = folder.path().join("-film.mp4");
+        std::fs::write(&film, b"x").unwrap();
+        let source = FfmpegSource::open_with(program(folder.path(), script), &film);
+        (folder, source)
+    }
+
+    #[test]
+    fn frames_of_the_program_arrive_and_its_success_ends_them() {
+        let (_folder, source) = open(r"printf 'YUV4MPEG2 W2 H1 F50:1 Cmono\nFRAME\nab'; printf 'FRAME\ncd'");
+        let mut source = source.unwrap();
+        assert_eq!(source.frame_rate(), Some(50.0));
+        assert_eq!(source.next_frame().unwrap().unwrap().to_real::<f64>().data(), &[97.0, 98.0]);
+        assert_eq!(source.skip(1).unwrap(), 1);
+        assert!(source.next_frame().unwrap().is_none());
+    }
+
+    #[test]
+    fn failures_carry_the_program_s_words() {
+        let (_folder, source) = open("echo 'moov atom not found' >&2; exit 1");
+        let message = source.unwrap_err().to_string();
+        assert!(message.contains("moov atom not found") && message.contains("film.mp4"), "{message}");
+        let (_folder, source) = open(r"printf 'YUV4MPEG2 W2 H1 Cmono\nFRAME\nab'; echo 'late trouble' >&2; exit 3");
+        let mut source = source.unwrap();
+        source.next_frame().unwrap();
+        assert!(source.next_frame().unwrap_err().to_string().contains("late trouble"));
+    }
+
+    #[test]
+    fn an_older_program_is_asked_in_its_own_words() {
+        let (_folder, source) = open(
+            r#"case "$*" in *fps_mode*) echo "Unrecognized option 'fps_mode'" >&2; exit 1;; esac; printf 'YUV4MPEG2 W1 H1 Cmono\nFRAME\na'"#,
+        );
+        assert!(source.unwrap().next_frame().unwrap().is_some());
+    }
+
+    #[test]
+    fn a_missing_program_says_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let film = folder.path().join("film.mp4");
+        std::fs::write(&film, b"x").unwrap();
+        let error = FfmpegSource::open_with("/no/such/ffmpeg", &film).unwrap_err();
+        assert!(
+            matches!(&error, Error::Missing(m) if m.contains("Install ffmpeg") && m.contains("film.mp4")),
+            "{error}"
+        );
+        assert!(matches!(FfmpegSource::open("/no/such/film.mp4"), Err(Error::Io { .. })));
+    }
+
+    #[test]
+    fn dropping_the_source_stops_the_program() {
+        let (folder, source) =
+            open(r#"echo $$ > "$(dirname "$0")/pid"; printf 'YUV4MPEG2 W1 H1 Cmono\nFRAME\na'; exec sleep 1000"#);
+        let mut source = source.unwrap();
+        source.next_frame().unwrap();
+        let pid = std::fs::read_to_string(folder.path().join("pid")).unwrap();
+        drop(source);
+        assert!(!Path::new("/proc").join(pid.trim()).exists());
+    }
+}

@@ -1,0 +1,170 @@
+//! Image files: a folder of them, or one (whose pages are frames when it is a TIFF).
+
+use super::{Colour, FrameSource, Kind, has_extension};
+use crate::error::{Error, Result};
+use crate::io::decode::{EXTENSIONS, TiffPages, is_tiff, read_image};
+use crate::types::AnyFrame;
+use std::path::{Path, PathBuf};
+
+pub(super) const KIND: Kind = Kind {
+    name: "files",
+    accepts: |spec| {
+        Path::new(spec).is_dir()
+            || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !super::glob::is_pattern(spec)))
+    },
+    open: |spec, colour| {
+        let path = Path::new(spec);
+        if path.is_dir() {
+            return Ok(Box::new(FilesSource::new(images_in(path)?, colour)?));
+        }
+        if is_tiff(path)? {
+            return Ok(Box::new(PagesSource::open(path, colour)?));
+        }
+        Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], colour)?))
+    },
+};
+
+/// The image files of a folder in natural order (`frame9` before `frame10`); hidden files and other extensions are left out.
+fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, e))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::io(folder, e))?.path();
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if !hidden && has_extension(&path, EXTENSIONS) && path.is_file() {
+            paths.push(path);
+        }
+    }
+    if paths.is_empty() {
+        return Err(Error::format(folder, format!("holds no images ({})", EXTENSIONS.join(", "))));
+    }
+    sort_naturally(&mut paths);
+    Ok(paths)
+}
+
+/// Natural order of the names; equal ones (`1`, `01`) by their bytes, so that the order never depends on the file system.
+pub(super) fn sort_naturally(paths: &mut [PathBuf]) {
+    paths.sort_by(|a, b| natord::compare(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
+}
+
+/// What every later frame must be like.
+#[derive(Debug, Default)]
+struct Uniform(Option<(PathBuf, (usize, usize), &'static str)>);
+
+impl Uniform {
+    fn check(&mut self, path: &Path, frame: &AnyFrame) -> Result<()> {
+        let (size, dtype) = (frame.size(), frame.dtype());
+        match &self.0 {
+            None => self.0 = Some((path.to_path_buf(), size, dtype)),
+            Some((first, wanted, kind)) if size != *wanted || dtype != *kind => {
+                let message = format!(
+                    "{} x {} px {dtype}; expected {} x {} px {kind}, as the first frame ({})",
+                    size.0,
+                    size.1,
+                    wanted.0,
+                    wanted.1,
+                    first.display()
+                );
+                return Err(Error::format(path, message));
+            }
+            Some(_) => {}
+        }
+        Ok(())
+    }
+}
+
+/// One frame a file, in the order given.
+#[derive(Debug)]
+pub struct FilesSource {
+    paths: Vec<PathBuf>,
+    next: usize,
+    colour: Colour,
+    uniform: Uniform,
+}
+
+impl FilesSource {
+    /// A source of these image files. They are opened when their frame is asked for; each must have the size and sample type of the first.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `frames` for an empty list.
+    pub fn new(paths: Vec<PathBuf>, colour: Colour) -> Result<Self> {
+        if paths.is_empty() {
+            return Err(Error::argument("frames", "at least one image file", "none"));
+        }
+        Ok(Self { paths, next: 0, colour, uniform: Uniform::default() })
+    }
+}
+
+impl FrameSource for FilesSource {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        let Some(path) = self.paths.get(self.next) else { return Ok(None) };
+        let frame = read_image(path, self.colour)?;
+        self.uniform.check(path, &frame)?;
+        self.next += 1;
+        Ok(Some(frame))
+    }
+    fn skip(&mut self, count: usize) -> Result<usize> {
+        let passed = count.min(self.paths.len() - self.next);
+        self.next += passed;
+        Ok(passed)
+    }
+    fn len_hint(&self) -> Option<usize> {
+        Some(self.paths.len() - self.next)
+    }
+    fn describe(&self) -> String {
+        match &self.paths[..] {
+            [one] => one.display().to_string(),
+            [first, .., last] => format!("{} images, {} to {}", self.paths.len(), first.display(), last.display()),
+            [] => "no images".into(),
+        }
+    }
+}
+
+/// The pages of one TIFF file.
+#[derive(Debug)]
+struct PagesSource {
+    path: PathBuf,
+    pages: TiffPages,
+    left: usize,
+    uniform: Uniform,
+}
+
+impl PagesSource {
+    fn open(path: &Path, colour: Colour) -> Result<Self> {
+        let mut counted = TiffPages::open(path, colour)?;
+        let mut left = 0;
+        while counted.skip_page()? {
+            left += 1;
+        }
+        Ok(Self { path: path.to_path_buf(), pages: TiffPages::open(path, colour)?, left, uniform: Uniform::default() })
+    }
+}
+
+impl FrameSource for PagesSource {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        let frame = self.pages.next_page()?;
+        if let Some(frame) = &frame {
+            self.uniform.check(&self.path, frame)?;
+            self.left = self.left.saturating_sub(1);
+        }
+        Ok(frame)
+    }
+    fn skip(&mut self, count: usize) -> Result<usize> {
+        for done in 0..count {
+            if !self.pages.skip_page()? {
+                return Ok(done);
+            }
+            self.left = self.left.saturating_sub(1);
+        }
+        Ok(count)
+    }
+    fn len_hint(&self) -> Option<usize> {
+        Some(self.left)
+    }
+    fn describe(&self) -> String {
+        format!("{} (TIFF)", self.path.display())
+    }
+}
+
+#[cfg(test)]
+mod tests;

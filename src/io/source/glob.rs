@@ -1,0 +1,36 @@
+//! Image files that match a pattern.
+
+use super::files::sort_naturally;
+use super::{FilesSource, Kind, has_extension};
+use crate::error::{Error, Result};
+use crate::io::decode::EXTENSIONS;
+use std::path::PathBuf;
+
+pub(super) const KIND: Kind = Kind {
+    name: "glob",
+    accepts: is_pattern,
+    open: |spec, colour| Ok(Box::new(FilesSource::new(matches(spec)?, colour)?)),
+};
+
+/// Whether the text has a pattern's special characters.
+pub(super) fn is_pattern(spec: &str) -> bool {
+    spec.contains(['*', '?', '['])
+}
+
+/// The image files that match, in natural order.
+fn matches(pattern: &str) -> Result<Vec<PathBuf>> {
+    let paths = glob::glob(pattern)
+        .map_err(|e| Error::argument("frames", "a pattern of * ? [..] **", format!("{pattern} ({e})")))?;
+    let mut found = Vec::new();
+    for path in paths {
+        let path = path.map_err(|e| Error::io(e.path().to_path_buf(), std::io::Error::from(e.error().kind())))?;
+        if has_extension(&path, EXTENSIONS) && path.is_file() {
+            found.push(path);
+        }
+    }
+    if found.is_empty() {
+        return Err(Error::format(pattern, format!("matches no images ({})", EXTENSIONS.join(", "))));
+    }
+    sort_naturally(&mut found);
+    Ok(found)
+}

@@ -1,0 +1,192 @@
+//! Where frames come from: one file for each kind of source and one line in [`KINDS`].
+
+mod ffmpeg;
+mod files;
+mod glob;
+mod list;
+mod memory;
+mod npy;
+mod select;
+mod y4m;
+
+pub use ffmpeg::FfmpegSource;
+pub use files::FilesSource;
+pub use memory::MemorySource;
+pub use npy::NpySource;
+pub use select::Selected;
+pub use y4m::Y4mSource;
+
+use crate::error::{Error, Result};
+use crate::types::AnyFrame;
+use std::path::Path;
+
+/// What to do with colour pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Colour {
+    /// Refuse them with a message that says how to convert. The default: which grey is right depends on the scene. Grey stored as RGB (red, green and
+    /// blue equal in every pixel of an image file) is not colour and is taken as grey.
+    #[default]
+    Error,
+    /// Convert by [`luminance`](crate::image::luminance).
+    Luminance,
+}
+
+/// How a source is opened: colour policy and the frames wanted, `first`, `first + step`, ... at most `limit` of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct OpenOptions {
+    /// What to do with colour pictures; default: refuse.
+    pub colour: Colour,
+    /// Index of the first frame wanted; default 0.
+    pub first: usize,
+    /// How many frames are wanted at most; default `None`: all.
+    pub limit: Option<usize>,
+    /// Distance between wanted frames; default 1.
+    pub step: usize,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { colour: Colour::Error, first: 0, limit: None, step: 1 }
+    }
+}
+
+/// A sequence of grey frames, one at a time, all of one size and sample type.
+pub trait FrameSource: Send {
+    /// The next frame; `None` after the last.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Format`] with the path of the file that cannot be read.
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>>;
+
+    /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many there were.
+    ///
+    /// # Errors
+    /// As [`FrameSource::next_frame`].
+    fn skip(&mut self, count: usize) -> Result<usize> {
+        for done in 0..count {
+            if self.next_frame()?.is_none() {
+                return Ok(done);
+            }
+        }
+        Ok(count)
+    }
+
+    /// How many frames are left, where that is known without reading them.
+    fn len_hint(&self) -> Option<usize> {
+        None
+    }
+
+    /// Frames per second, where the source says so.
+    fn frame_rate(&self) -> Option<f64> {
+        None
+    }
+
+    /// What this is, for messages.
+    fn describe(&self) -> String;
+}
+
+impl<S: FrameSource + ?Sized> FrameSource for Box<S> {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        (**self).next_frame()
+    }
+    fn skip(&mut self, count: usize) -> Result<usize> {
+        (**self).skip(count)
+    }
+    fn len_hint(&self) -> Option<usize> {
+        (**self).len_hint()
+    }
+    fn frame_rate(&self) -> Option<f64> {
+        (**self).frame_rate()
+    }
+    fn describe(&self) -> String {
+        (**self).describe()
+    }
+}
+
+/// A kind of source: what it is called, which specifications it takes, how it is opened.
+struct Kind {
+    name: &'static str,
+    accepts: fn(&str) -> bool,
+    open: fn(&str, Colour) -> Result<Box<dyn FrameSource>>,
+}
+
+/// Every kind of source; the first that accepts a specification opens it.
+const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, ffmpeg::KIND];
+
+/// Opens a frame source by its specification.
+///
+/// | specification | source |
+/// |---|---|
+/// | `-` | Y4M on standard input |
+/// | `*.y4m` | Y4M file; its luma plane |
+/// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of uint8, uint16, float32 or float64; colour `(T, H, W, 3)` |
+/// | `*.txt`, `*.lst` | list of image files, one a line |
+/// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
+/// | an image file | its picture, or the pages of a TIFF |
+/// | `*`, `?`, `[` in it | the image files it matches, in natural order |
+/// | another file | compressed video, through an `ffmpeg` on the `PATH`; its luma plane |
+///
+/// # Errors
+/// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems, [`Error::Argument`] for a `step` of 0,
+/// [`Error::Missing`] for video without `ffmpeg`.
+pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if options.step == 0 {
+        return Err(Error::argument("step", "a positive integer", 0));
+    }
+    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))?;
+    let source = (kind.open)(spec, options.colour)?;
+    Ok(Box::new(Selected::new(source, options)?))
+}
+
+/// The name of the kind of source that `spec` would be opened as.
+pub fn kind_of(spec: &str) -> Option<&'static str> {
+    KINDS.iter().find(|kind| (kind.accepts)(spec)).map(|kind| kind.name)
+}
+
+fn nothing_there(spec: &str) -> Error {
+    Error::io(spec, std::io::Error::new(std::io::ErrorKind::NotFound, "no such file or folder"))
+}
+
+/// Whether the name ends in one of these extensions, in any case.
+pub(super) fn has_extension(path: impl AsRef<Path>, extensions: &[&str]) -> bool {
+    let extension = path.as_ref().extension().and_then(|e| e.to_str());
+    extension.is_some_and(|e| extensions.iter().any(|known| known.eq_ignore_ascii_case(e)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specifications_find_their_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+        std::fs::write(inside("film.mp4"), b"x").unwrap();
+        std::fs::write(inside("odd[1].png"), b"x").unwrap();
+        for (spec, kind) in [
+            ("-".to_string(), Some("y4m")),
+            (inside("a.Y4M"), Some("y4m")),
+            (inside("a.npy"), Some("npy")),
+            (inside("a.txt"), Some("list")),
+            (folder.path().to_string_lossy().into_owned(), Some("files")),
+            (inside("a.TIF"), Some("files")),
+            (inside("odd[1].png"), Some("files")),
+            (inside("*.png"), Some("glob")),
+            (inside("film.mp4"), Some("ffmpeg")),
+            (inside("nothing.mp4"), None),
+        ] {
+            assert_eq!(kind_of(&spec), kind, "{spec}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_an_io_error_with_its_name() {
+        for spec in ["/no/such/folder", "/no/such/film.mp4", "/no/such/a.npy", "/no/such/a.y4m", "/no/such/a.png"] {
+            let error = open(spec, &OpenOptions::default()).err().unwrap();
+            assert!(matches!(error, Error::Io { .. }) && error.to_string().contains(spec), "{error}");
+        }
+        let zero = OpenOptions { step: 0, ..OpenOptions::default() };
+        assert!(open("-", &zero).err().unwrap().to_string().contains("step"));
+    }
+}

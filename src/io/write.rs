@@ -1,0 +1,199 @@
+//! Files that appear whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it without that removes it.
+///
+/// A target that exists and is no regular file (a device, a named pipe) is written directly; a symbolic link keeps pointing
+/// where it points.
+#[derive(Debug)]
+pub struct AtomicFile {
+    target: PathBuf,
+    inner: BufWriter<Inner>,
+}
+
+#[derive(Debug)]
+enum Inner {
+    Temporary(NamedTempFile),
+    Direct(File),
+}
+
+impl AtomicFile {
+    /// Opens a temporary file beside `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with `path` when its folder does not exist or may not be written, or `path` is a folder.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let inner = match target.metadata() {
+            Ok(meta) if meta.is_dir() => {
+                return Err(Error::io(path, io::Error::from(io::ErrorKind::IsADirectory)));
+            }
+            Ok(meta) if !meta.is_file() => {
+                Inner::Direct(File::options().write(true).open(&target).map_err(|e| Error::io(path, e))?)
+            }
+            _ => Inner::Temporary(temporary_beside(&target).map_err(|e| Error::io(path, e))?),
+        };
+        Ok(Self { target, inner: BufWriter::with_capacity(1 << 16, inner) })
+    }
+
+    /// The final name.
+    pub fn path(&self) -> &Path {
+        &self.target
+    }
+
+    /// Gives the file its final name, replacing what was there.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the rest cannot be written or the name cannot be given; the temporary file is then gone.
+    pub fn commit(self) -> Result<()> {
+        let Self { target, inner } = self;
+        let inner = inner.into_inner().map_err(|e| Error::io(&target, e.into_error()))?;
+        match inner {
+            Inner::Direct(_) => Ok(()),
+            Inner::Temporary(file) => file.persist(&target).map(|_| ()).map_err(|e| Error::io(&target, e.error)),
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.inner.write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.inner.seek(to)
+    }
+}
+
+impl Write for Inner {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Temporary(file) => file.write(bytes),
+            Self::Direct(file) => file.write(bytes),
+        }
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Inner {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match self {
+            Self::Temporary(file) => file.seek(to),
+            Self::Direct(file) => file.seek(to),
+        }
+    }
+}
+
+/// Writes a whole file: `write` fills it, then it gets its name. On an error nothing is left behind and what was there before is kept.
+///
+/// # Errors
+/// Whatever `write` returns, or [`Error::Io`] with `path`.
+pub fn atomic<R>(path: impl AsRef<Path>, write: impl FnOnce(&mut AtomicFile) -> Result<R>) -> Result<R> {
+    let mut file = AtomicFile::create(path)?;
+    let result = write(&mut file)?;
+    file.commit()?;
+    Ok(result)
+}
+
+/// As [`atomic`], for a `write` that fails only as the operating system does.
+pub(crate) fn atomic_io(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> Result<()> {
+    atomic(path, |file| write(file).map_err(|e| Error::io(path, e)))
+}
+
+fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
+    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".jacoflow-").suffix(".part");
+    #[cfg(unix)]
+    {
+        // As any other new file: the process's mask decides, not the private mode of temporary files.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+        builder.tempfile_in(folder)
+    }
+    #[cfg(not(unix))]
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_file_appears_only_when_committed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.bin");
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"abc").unwrap();
+        assert!(!path.exists());
+        file.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"abc");
+        assert_eq!(names(folder.path()), ["out.bin"]);
+    }
+
+    #[test]
+    fn an_error_keeps_the_old_file_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.bin");
+        fs::write(&path, b"old").unwrap();
+        let result: Result<()> = atomic(&path, |file| {
+            file.write_all(&[0; 100_000]).unwrap();
+            Err(Error::Interrupted)
+        });
+        assert!(matches!(result, Err(Error::Interrupted)));
+        drop(AtomicFile::create(&path).unwrap());
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["out.bin"]);
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_folder_as_target_name_the_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = AtomicFile::create(folder.path().join("no/such/x.npz")).unwrap_err();
+        assert!(matches!(error, Error::Io { .. }) && error.to_string().contains("no/such/x.npz"));
+        assert!(matches!(AtomicFile::create(folder.path()), Err(Error::Io { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_modes_are_those_of_ordinary_files() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link, plain) = (folder.path().join("real"), folder.path().join("link"), folder.path().join("plain"));
+        fs::write(&real, b"old").unwrap();
+        symlink(&real, &link).unwrap();
+        atomic_io(&link, |f| f.write_all(b"new")).unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        fs::write(&plain, b"").unwrap();
+        let mode = |p: &Path| p.metadata().unwrap().permissions().mode();
+        assert_eq!(mode(&real), mode(&plain));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_written_not_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let null = Path::new("/dev/null");
+        atomic_io(null, |f| f.write_all(b"gone")).unwrap();
+        assert!(null.metadata().unwrap().file_type().is_char_device());
+    }
+}
