@@ -4,6 +4,7 @@ Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow 
 is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 """
 
+from . import filters, scenes
 from ._jacoflow import (
     FlowField,
     FormatError,
@@ -24,4 +25,6 @@ __all__ = [
     "NumericalError",
     "Status",
     "__version__",
+    "filters",
+    "scenes",
 ]

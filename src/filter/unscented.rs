@@ -19,10 +19,10 @@ pub struct UnscentedFilter {
     /// Constants of the sigma points.
     pub points: SigmaPoints,
     /// Draw new sigma points for the measurement, from `x` and `P` after the prediction (default). Otherwise the propagated ones are measured, as
-    /// `filterpy` does, which leaves `Q` out of the innovation covariance of additive-noise filters.
+    /// `filterpy` 1 did, which leaves `Q` out of the innovation covariance of additive-noise filters.
     pub redraw: bool,
     /// The propagated points `(B, rows, n)` of the last prediction; empty before the first.
-    sigmas: Vec<f64>,
+    pub sigmas: Vec<f64>,
 }
 
 impl UnscentedFilter {

@@ -4,6 +4,8 @@ mod arrays;
 mod command;
 mod errors;
 mod field;
+mod filters;
+mod scenes;
 
 use pyo3::prelude::*;
 
@@ -16,6 +18,14 @@ mod _jacoflow {
     use super::errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError};
     #[pymodule_export]
     use super::field::{FlowField, restore_field};
+    #[pymodule_export]
+    use super::filters::{
+        ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter,
+        restore_extended, restore_kalman, restore_unscented,
+    };
+
+    #[pymodule_export]
+    use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name of the attribute")]

@@ -1,0 +1,90 @@
+//! `MerweScaledSigmaPoints`.
+
+use crate::error::Error;
+use crate::filter::SigmaPoints;
+use crate::python::arrays;
+use pyo3::prelude::*;
+
+/// Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.
+///
+/// `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared spread of the points is
+/// alpha^2 (n + kappa).
+#[pyclass(module = "jacoflow.filters", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct MerweScaledSigmaPoints {
+    pub n: usize,
+    pub points: SigmaPoints,
+}
+
+#[pymethods]
+impl MerweScaledSigmaPoints {
+    #[new]
+    #[pyo3(signature = (n, alpha=None, beta=None, kappa=None))]
+    fn new(n: usize, alpha: Option<f64>, beta: Option<f64>, kappa: Option<f64>) -> PyResult<Self> {
+        let default = SigmaPoints::default();
+        let (alpha, beta, kappa) =
+            (alpha.unwrap_or(default.alpha), beta.unwrap_or(default.beta), kappa.unwrap_or(default.kappa));
+        if n == 0 {
+            return Err(Error::argument("n", "a positive integer", 0).into());
+        }
+        Ok(Self { n, points: SigmaPoints::new(alpha, beta, kappa)? })
+    }
+    /// Dimensions of the state (a count, no unit).
+    #[getter]
+    fn n(&self) -> usize {
+        self.n
+    }
+    /// Spread of the points (no unit).
+    #[getter]
+    fn alpha(&self) -> f64 {
+        self.points.alpha
+    }
+    /// Weight of prior knowledge in the centre's covariance weight (no unit).
+    #[getter]
+    fn beta(&self) -> f64 {
+        self.points.beta
+    }
+    /// Secondary spread (no unit).
+    #[getter]
+    fn kappa(&self) -> f64 {
+        self.points.kappa
+    }
+    /// Weights of the mean, array (2 n + 1,), centre first (no unit).
+    #[getter(Wm)]
+    fn mean_weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(arrays::owned(py, &[SigmaPoints::count(self.n)], self.points.mean_weights(self.n))?.into_any())
+    }
+    /// Weights of the covariance, array (2 n + 1,), centre first (no unit).
+    #[getter(Wc)]
+    fn covariance_weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(arrays::owned(py, &[SigmaPoints::count(self.n)], self.points.covariance_weights(self.n))?.into_any())
+    }
+    /// Number of points, 2 n + 1 (a count, no unit).
+    fn num_sigmas(&self) -> usize {
+        SigmaPoints::count(self.n)
+    }
+    /// The points, array (2 n + 1, n), of mean `x` (n,) and covariance `P` (n, n), in the state's units.
+    ///
+    /// NumericalError where `P` is not positive definite.
+    #[pyo3(signature = (x, P))]
+    fn sigma_points<'py>(&self, x: &Bound<'py, PyAny>, P: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (shape, mean) = arrays::doubles("x", x)?;
+        let (shape_p, covariance) = arrays::doubles("P", P)?;
+        let n = self.n;
+        if shape != [n] {
+            return Err(Error::argument("x", format!("shape [{n}]"), format!("shape {shape:?}")).into());
+        }
+        if shape_p != [n, n] {
+            return Err(Error::argument("P", format!("shape [{n}, {n}]"), format!("shape {shape_p:?}")).into());
+        }
+        let points = self.points.sigma_points(&mean, &covariance)?;
+        Ok(arrays::owned(x.py(), &[SigmaPoints::count(n), n], points)?.into_any())
+    }
+    fn __repr__(&self) -> String {
+        let SigmaPoints { alpha, beta, kappa } = self.points;
+        format!("MerweScaledSigmaPoints(n={}, alpha={alpha}, beta={beta}, kappa={kappa})", self.n)
+    }
+    fn __getnewargs__(&self) -> (usize, f64, f64, f64) {
+        (self.n, self.points.alpha, self.points.beta, self.points.kappa)
+    }
+}

@@ -1,0 +1,240 @@
+//! `jacoflow.scenes`: moving pictures with exact truth.
+
+use super::arrays::{self, ColourRule};
+use super::field::FlowField;
+use crate::error::Error;
+use crate::parallel::Threads;
+use crate::synth::registry::{CARRIERS, Parameter, SCENES};
+use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, truth};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+/// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
+///
+/// `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `seed`
+/// makes everything random; `carrier` (one of `scenes.carriers()`) is what the motion moves; `parameters` are those of
+/// `scenes.parameters(name)`, each in the unit told there. Time t is in frames, brightness in grey levels of an 8-bit scale.
+#[pyclass(module = "jacoflow.scenes", frozen)]
+pub struct Scene {
+    kind: String,
+    options: SceneOptions,
+    scene: Box<dyn CoreScene>,
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (name, *, width=None, height=None, origin=None, seed=None, carrier=None, **parameters))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        name: String,
+        width: Option<usize>,
+        height: Option<usize>,
+        origin: Option<(f64, f64)>,
+        seed: Option<u64>,
+        carrier: Option<String>,
+        parameters: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let default = SceneOptions::default();
+        let values = parameters.map_or(Ok(Vec::new()), |parameters| {
+            parameters.iter().map(|(name, value)| Ok((name.extract()?, value.extract()?))).collect::<PyResult<_>>()
+        })?;
+        let options = SceneOptions {
+            width: width.unwrap_or(default.width),
+            height: height.unwrap_or(default.height),
+            origin: origin.unwrap_or(default.origin),
+            seed: seed.unwrap_or(default.seed),
+            carrier,
+            values,
+        };
+        let scene = build(&name, &options)?;
+        Ok(Self { kind: name, options, scene })
+    }
+
+    /// Name of the scene (no unit).
+    #[getter]
+    fn name(&self) -> &str {
+        &self.kind
+    }
+
+    /// Size (width, height) of the frames, px.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        self.scene.size()
+    }
+
+    /// Scene point (x, y) of pixel (0, 0), px.
+    #[getter]
+    fn origin(&self) -> (f64, f64) {
+        self.scene.origin()
+    }
+
+    /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped.
+    fn frame<'py>(&self, py: Python<'py>, t: f64) -> PyResult<Bound<'py, PyAny>> {
+        let frame = py.detach(|| Threads::default().install(|| self.scene.frame(t)));
+        arrays::from_frame(py, frame)
+    }
+
+    /// Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
+    #[pyo3(signature = (count, start=0.0))]
+    fn frames<'py>(&self, py: Python<'py>, count: usize, start: f64) -> PyResult<Bound<'py, PyAny>> {
+        let (width, height) = self.scene.size();
+        let mut data = Vec::new();
+        for index in 0..count {
+            py.check_signals()?;
+            let frame = py.detach(|| Threads::default().install(|| self.scene.frame(start + index as f64)));
+            data.extend(frame.into_data());
+        }
+        Ok(arrays::owned(py, &[count, height, width], data)?.into_any())
+    }
+
+    /// Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
+    ///
+    /// Status MASKED and NaN where the scene has no single truth.
+    fn truth(&self, py: Python<'_>, t: f64) -> PyResult<FlowField> {
+        Ok(FlowField::single(py.detach(|| truth(self.scene.as_ref(), t))?))
+    }
+
+    /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth.
+    fn motion<'py>(&self, py: Python<'py>, x: f64, y: f64, t: f64) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let motion = self.scene.motion(x, y, t);
+        motion.map(|m| Ok(arrays::owned(py, &[6], m.to_array().to_vec())?.into_any())).transpose()
+    }
+
+    fn __repr__(&self) -> String {
+        let (width, height) = self.scene.size();
+        format!("Scene({:?}, width={width}, height={height}, seed={})", self.kind, self.options.seed)
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let options = PyDict::new(py);
+        for (name, value) in &self.options.values {
+            options.set_item(name, value)?;
+        }
+        options.set_item("width", self.options.width)?;
+        options.set_item("height", self.options.height)?;
+        options.set_item("origin", self.options.origin)?;
+        options.set_item("seed", self.options.seed)?;
+        options.set_item("carrier", &self.options.carrier)?;
+        Ok((PyTuple::new(py, [&self.kind])?, options))
+    }
+}
+
+/// What a camera does to a frame: white noise, rounding, clipping.
+///
+/// `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or "nearest"; `saturate` clips to 0 ... 255;
+/// `seed` of the noise. Without arguments it changes nothing.
+#[pyclass(module = "jacoflow.scenes", frozen)]
+pub struct Sensor {
+    sensor: CoreSensor,
+}
+
+#[pymethods]
+impl Sensor {
+    #[new]
+    #[pyo3(signature = (*, noise=None, rounding=None, saturate=None, seed=None))]
+    fn new(noise: Option<f64>, rounding: Option<&str>, saturate: Option<bool>, seed: Option<u64>) -> PyResult<Self> {
+        let default = CoreSensor::default();
+        let sensor = CoreSensor {
+            noise: noise.unwrap_or(default.noise),
+            rounding: match rounding {
+                None => default.rounding,
+                Some("none") => Rounding::None,
+                Some("floor") => Rounding::Floor,
+                Some("nearest") => Rounding::Nearest,
+                Some(other) => {
+                    let expected = "\"none\", \"floor\" or \"nearest\"";
+                    return Err(Error::argument("rounding", expected, format!("{other:?}")).into());
+                }
+            },
+            saturate: saturate.unwrap_or(default.saturate),
+            seed: seed.unwrap_or(default.seed),
+        };
+        sensor.check()?;
+        Ok(Self { sensor })
+    }
+
+    /// `frame` (H, W) as the camera delivers it, a new float64 array (H, W) in grey levels.
+    ///
+    /// The noise depends on the seed, `index` (which frame it is) and the pixel, on nothing else.
+    #[pyo3(signature = (frame, index=0))]
+    fn apply<'py>(&self, frame: &Bound<'py, PyAny>, index: u64) -> PyResult<Bound<'py, PyAny>> {
+        let py = frame.py();
+        let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+        let seen = py.detach(|| self.sensor.apply(&frame.to_real(), index));
+        arrays::from_frame(py, seen)
+    }
+
+    /// As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255 clipped.
+    #[pyo3(signature = (frame, index=0))]
+    fn apply_u8<'py>(&self, frame: &Bound<'py, PyAny>, index: u64) -> PyResult<Bound<'py, PyAny>> {
+        let py = frame.py();
+        let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+        let seen = py.detach(|| self.sensor.apply_u8(&frame.to_real(), index));
+        arrays::from_frame(py, seen)
+    }
+
+    fn __repr__(&self) -> String {
+        let CoreSensor { noise, saturate, seed, .. } = self.sensor;
+        let saturate = if saturate { "True" } else { "False" };
+        format!("Sensor(noise={noise}, rounding={:?}, saturate={saturate}, seed={seed})", self.rounding())
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let options = PyDict::new(py);
+        options.set_item("noise", self.sensor.noise)?;
+        options.set_item("rounding", self.rounding())?;
+        options.set_item("saturate", self.sensor.saturate)?;
+        options.set_item("seed", self.sensor.seed)?;
+        Ok((PyTuple::empty(py), options))
+    }
+}
+
+impl Sensor {
+    fn rounding(&self) -> &'static str {
+        match self.sensor.rounding {
+            Rounding::None => "none",
+            Rounding::Floor => "floor",
+            Rounding::Nearest => "nearest",
+        }
+    }
+}
+
+/// Names of the scenes, with one line about each: a dictionary.
+#[pyfunction(name = "_scene_names")]
+pub fn scene_names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let all = PyDict::new(py);
+    for kind in SCENES {
+        all.set_item(kind.name, kind.summary)?;
+    }
+    Ok(all)
+}
+
+/// Names of what a motion can carry, with one line about each: a dictionary. The first is the default.
+#[pyfunction(name = "_scene_carriers")]
+pub fn scene_carriers(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let all = PyDict::new(py);
+    for kind in CARRIERS {
+        all.set_item(kind.name, kind.summary)?;
+    }
+    Ok(all)
+}
+
+/// Parameters of the scene or carrier `name`: a dictionary from the parameter's name to (default or None, meaning with its unit).
+///
+/// ValueError for an unknown name.
+#[pyfunction(name = "_scene_parameters")]
+pub fn scene_parameters<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+    let scenes = SCENES.iter().map(|kind| (kind.name, kind.parameters));
+    let known: Vec<(&str, &[Parameter])> =
+        scenes.chain(CARRIERS.iter().map(|kind| (kind.name, kind.parameters))).collect();
+    let Some((_, parameters)) = known.iter().find(|(known, _)| *known == name) else {
+        let names: Vec<_> = known.iter().map(|(name, _)| *name).collect();
+        return Err(Error::argument("name", format!("one of {}", names.join(", ")), format!("{name:?}")).into());
+    };
+    let all = PyDict::new(py);
+    for parameter in *parameters {
+        all.set_item(parameter.name, (parameter.default, parameter.meaning))?;
+    }
+    Ok(all)
+}
