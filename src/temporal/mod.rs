@@ -1,1 +1,14 @@
-//! To be written.
+//! Flow filtered in time: the dense filter of WO2010/098160, (44)-(55), one small Kalman filter a pixel.
+//!
+//! [`dynamics`] is the dynamical system itself, for one pixel; [`FlowFilter`] runs it for every site of a frame, many pixels at once.
+
+pub mod dynamics;
+mod flow_filter;
+mod kernel;
+mod measurement;
+mod options;
+mod persist;
+mod store;
+
+pub use flow_filter::FlowFilter;
+pub use options::{FilterForm, FlowFilterOptions, Transition};

@@ -1,0 +1,251 @@
+//! The dense flow filter.
+
+use super::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
+use super::kernel::transition::{Exact, Rk4, Step};
+use super::kernel::update::{Decorrelation, MEASURED, Update};
+use super::kernel::{BLOCK, Constants, N, PLANES, packed};
+use super::measurement::{Fit, Measure};
+use super::options::{FilterForm, FlowFilterOptions, Transition};
+use super::store::Store;
+use crate::error::{Error, Result};
+use crate::jet::JetStencil;
+use crate::simd::{Level, SimdReal, dispatch};
+use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
+use rayon::prelude::*;
+use std::marker::PhantomData;
+
+/// Blocks of one task: fixed, so that results do not depend on the number of threads. Small enough for a task's states to stay in the
+/// second-level cache between its three passes.
+const TASK_BLOCKS: usize = 8;
+
+/// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
+///
+/// Each frame, the first included, is a prediction and an update. `T` is the working precision: `f32` is stable for a measurement noise of 0.25
+/// grey levels squared and more; with smaller noise, or a process noise far below it, use `f64` (in `f32` such filters keep running, but may need
+/// repairs, which are counted).
+///
+/// ```
+/// use jacoflow::temporal::{FlowFilter, FlowFilterOptions};
+/// use jacoflow::types::Frame;
+/// # fn main() -> jacoflow::Result<()> {
+/// let mut filter = FlowFilter::<f64>::new((16, 16), FlowFilterOptions::measured())?;
+/// for t in 0..200 {
+///     // Waves along both axes, moving by (0.5, -0.25) px/frame.
+///     let (dx, dy) = (0.5 * f64::from(t), -0.25 * f64::from(t));
+///     let frame = Frame::from_fn(16, 16, |x, y| 128.0 + 30.0 * ((x as f64 - dx) * 0.4).sin() + 30.0 * ((y as f64 - dy) * 0.4).sin());
+///     let field = filter.push(&frame)?;
+///     assert_eq!(field.layout.frame_index, t as usize);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone)]
+pub struct FlowFilter<T> {
+    pub(super) options: FlowFilterOptions,
+    pub(super) frame_size: (usize, usize),
+    pub(super) frames: usize,
+    pub(super) repairs: u64,
+    pub(super) store: Store<T>,
+    constants: Constants<T>,
+    decorrelation: Decorrelation<T>,
+    fit: Fit<T>,
+}
+
+impl<T: SimdReal> FlowFilter<T> {
+    /// Filters that start, for frames of `frame_size = (width, height)`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option that no filter can run with, or `frame_size` when the sites and their neighbourhoods have no room at all
+    /// (frames under 3x3).
+    pub fn new(frame_size: (usize, usize), options: FlowFilterOptions) -> Result<Self> {
+        options.check(frame_size)?;
+        if frame_size.0 < 3 || frame_size.1 < 3 {
+            return Err(Error::argument(
+                "frame_size",
+                "at least 3 x 3 pixels",
+                format!("{} x {}", frame_size.0, frame_size.1),
+            ));
+        }
+        let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
+        let constants = Constants::new(&options);
+        let store = Store::new(frame_size, &options, stencil.offsets(), stencil.reach(), &constants)?;
+        let covariance = stencil.covariance().map(|row| row.map(|c| c * options.measurement_noise));
+        let decorrelation = Decorrelation::new(&covariance);
+        let fit = Fit::new(&stencil, frame_size.0);
+        Ok(Self { options, frame_size, frames: 0, repairs: 0, store, constants, decorrelation, fit })
+    }
+
+    /// The options.
+    pub fn options(&self) -> &FlowFilterOptions {
+        &self.options
+    }
+    /// Size `(width, height)` of the frames.
+    pub fn frame_size(&self) -> (usize, usize) {
+        self.frame_size
+    }
+    /// How many frames have been taken in.
+    pub fn frames(&self) -> usize {
+        self.frames
+    }
+    /// How often a site's covariance had lost its positive definiteness and was mended.
+    pub fn repairs(&self) -> u64 {
+        self.repairs
+    }
+    /// Number of result sites.
+    pub fn len(&self) -> usize {
+        self.store.fixed.len()
+    }
+    /// No site at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Mean `q` (12) and covariance (12 x 12) at result site `site` (row by row), in grey levels, px and frames; `None` where there is no filter (border, mask).
+    pub fn state(&self, site: usize) -> Option<([f64; 12], [[f64; 12]; 12])> {
+        let index = self.store.sites.binary_search(&site).ok()?;
+        Some(self.store.state(index))
+    }
+
+    /// Takes in the next frame: predicts, updates, and returns flow and Jacobian with the `Status` of each site.
+    ///
+    /// Where a neighbourhood holds a NaN the filter only predicts; that frame's result is NaN there, with status `NonFinite`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a frame of another size; the filter is then unchanged.
+    pub fn push(&mut self, frame: &Frame<T>) -> Result<FlowField<T>> {
+        if frame.size() != self.frame_size {
+            let text = |(w, h): (usize, usize)| format!("{w} x {h}");
+            return Err(Error::argument(
+                "frame",
+                format!("{} pixels, as before", text(self.frame_size)),
+                text(frame.size()),
+            ));
+        }
+        let filters = self.store.pixels.len();
+        let mut marks = vec![Mark::default(); filters / BLOCK];
+        let mut residual = vec![T::nan(); if self.options.residual { filters } else { 0 }];
+        let threads = self.options.threads;
+        threads.install(|| self.run(frame, &mut marks, &mut residual));
+        self.frames += 1;
+        let live = self.store.sites.len();
+        self.repairs += marks.iter().flat_map(|m| m.repaired).take(live).map(u64::from).sum::<u64>();
+        threads.install(|| self.field(&marks, &residual))
+    }
+
+    /// The three passes over every task.
+    fn run(&mut self, frame: &Frame<T>, marks: &mut [Mark], residual: &mut [T]) {
+        let Self { options, store, constants, decorrelation, fit, .. } = self;
+        let level = options.simd.unwrap_or_else(Level::detect);
+        let scale = T::from_f64(255.0 / options.full_scale);
+        let (form, transition) = (options.form, options.transition);
+        let want_residual = !residual.is_empty();
+        let size = TASK_BLOCKS * BLOCK;
+        let task = |blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], residual: Option<&mut [T]>| {
+            let mut measured = [T::from_f64(0.0); TASK_BLOCKS * MEASURED * BLOCK];
+            let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
+            let mut repaired = [0u8; TASK_BLOCKS * BLOCK];
+            let repaired = &mut repaired[..pixels.len()];
+            dispatch(level, Measure { frame, pixels, fit, scale, measured, residual });
+            match transition {
+                Transition::Rk4 => predict::<T, Rk4>(level, form, blocks, repaired, constants),
+                Transition::Exact => predict::<T, Exact>(level, form, blocks, repaired, constants),
+            }
+            dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
+            for (b, mark) in marks.iter_mut().enumerate() {
+                mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
+                for k in 0..BLOCK {
+                    mark.missing[k] = u8::from(measured[(b * MEASURED + 6) * BLOCK + k].to_f64() == 0.0);
+                }
+            }
+        };
+        let tasks = store
+            .blocks
+            .par_chunks_mut(PLANES * size)
+            .zip(store.pixels.par_chunks(size))
+            .zip(marks.par_chunks_mut(TASK_BLOCKS));
+        if want_residual {
+            tasks.zip(residual.par_chunks_mut(size)).for_each(|(((b, p), m), r)| task(b, p, m, Some(r)));
+        } else {
+            tasks.for_each(|((b, p), m)| task(b, p, m, None));
+        }
+    }
+
+    /// The result after a frame.
+    fn field(&self, marks: &[Mark], residual: &[T]) -> Result<FlowField<T>> {
+        let options = &self.options;
+        let layout = FieldLayout {
+            frame_size: self.frame_size,
+            sites: options.sites.clone(),
+            model: "affine".into(),
+            parameters: MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: options.frame_period,
+            pixel_pitch: options.pixel_pitch,
+            frame_index: self.frames - 1,
+        };
+        let mut field = FlowField::<T>::empty(layout, options.covariance)?;
+        let n = field.len();
+        field.status.copy_from_slice(&self.store.fixed);
+        let flags = marks.iter().flat_map(|m| m.missing.iter().zip(&m.repaired));
+        for (&site, (&missing, &repaired)) in self.store.sites.iter().zip(flags) {
+            field.status[site] = match (missing, repaired) {
+                (0, 0) => Status::Ok,
+                (0, _) => Status::Repaired,
+                _ => Status::NonFinite,
+            };
+        }
+        if n == 0 {
+            return Ok(field);
+        }
+        // Flow in units of the pixel pitch: u dx, v dy, u_x, v_x dy/dx, u_y dx/dy, v_y.
+        let (dx, dy) = options.pixel_pitch;
+        let units = [dx, dy, 1.0, dy / dx, dx / dy, 1.0];
+        let fill = |plane: &mut [T], source: usize, unit: f64| {
+            let unit = T::from_f64(unit);
+            for (&site, value) in self.store.sites.iter().zip(self.store.plane(source)) {
+                if field.status[site] != Status::NonFinite {
+                    plane[site] = value * unit;
+                }
+            }
+        };
+        field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, 6 + k, units[k]));
+        if let Some(covariance) = &mut field.covariance {
+            let pairs: Vec<_> = (0..6).flat_map(|a| (a..6).map(move |b| (a, b))).collect();
+            covariance.par_chunks_exact_mut(n).zip(&pairs).for_each(|(plane, &(a, b))| {
+                fill(plane, N + packed(6 + a, 6 + b), units[a] * units[b]);
+            });
+        }
+        if !residual.is_empty() {
+            let mut plane = vec![T::nan(); n];
+            for (&site, &value) in self.store.sites.iter().zip(residual) {
+                plane[site] = value;
+            }
+            field.residual = Some(plane);
+        }
+        Ok(field)
+    }
+}
+
+/// What happened to the pixels of a block.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mark {
+    repaired: [u8; BLOCK],
+    missing: [u8; BLOCK],
+}
+
+fn predict<T: SimdReal, S: Step>(
+    level: Level,
+    form: FilterForm,
+    blocks: &mut [T],
+    repaired: &mut [u8],
+    constants: &Constants<T>,
+) {
+    let step = PhantomData::<S>;
+    match form {
+        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, repaired, constants, step }),
+        FilterForm::NonAugmented => {
+            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, repaired, constants, step })
+        }
+        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, repaired, constants, step }),
+        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, repaired, constants, step }),
+    }
+}

@@ -1,0 +1,87 @@
+//! The filter's arithmetic, for lanes of pixels; the same source with one lane is the scalar twin.
+//!
+//! Per chunk of blocks three passes run one after the other: measurement, prediction, update. Each is a kernel of its own, so that the number of
+//! compiled variants is a sum, not a product.
+
+pub(super) mod factor;
+mod moments;
+mod noise;
+pub(super) mod predict;
+pub(super) mod transition;
+pub(super) mod update;
+
+use super::options::FlowFilterOptions;
+use crate::math::Real;
+use crate::simd::{Lanes, SimdReal};
+
+/// Dimensions of the state.
+pub(super) const N: usize = 12;
+/// Entries of a packed lower triangle of the covariance.
+pub(super) const PACKED: usize = N * (N + 1) / 2;
+/// Numbers of one pixel's state: mean, then covariance.
+pub(super) const PLANES: usize = N + PACKED;
+/// Pixels of one block: the widest lanes. A block is `PLANES` rows of `BLOCK` values.
+pub(super) const BLOCK: usize = 16;
+
+/// Place of entry `(a, b)` in the packed lower triangle, row by row.
+#[inline(always)]
+pub(super) const fn packed(a: usize, b: usize) -> usize {
+    if a >= b { a * (a + 1) / 2 + b } else { b * (b + 1) / 2 + a }
+}
+
+/// The filter's constants in working precision.
+#[derive(Debug, Clone)]
+pub(super) struct Constants<T> {
+    /// Diagonal of Q.
+    pub q: [T; N],
+    /// Square root of `n + lambda`: how far the sigma points lie, in columns of the factor.
+    pub spread: T,
+    /// `beta - alpha^2`: weight of the squared shift of the mean, beyond the points' own moments.
+    pub shift: T,
+    /// Mean and covariance diagonal of a filter that starts.
+    pub start: ([T; N], [T; N]),
+}
+
+impl<T: SimdReal> Constants<T> {
+    pub(super) fn new(options: &FlowFilterOptions) -> Self {
+        let points = options.sigma_points;
+        let n = if options.form == super::FilterForm::Augmented { 2 * N } else { N };
+        Self {
+            q: options.process_noise.map(T::from_f64),
+            spread: T::from_f64(points.spread(n).sqrt()),
+            shift: T::from_f64(points.beta - points.alpha * points.alpha),
+            start: (options.initial_mean.map(T::from_f64), options.initial_covariance.map(T::from_f64)),
+        }
+    }
+}
+
+/// Mean and packed covariance of `V::LANES` pixels.
+pub(super) struct Lane<V> {
+    pub mean: [V; N],
+    pub cov: [V; PACKED],
+}
+
+impl<V: Lanes> Lane<V> {
+    /// Reads the pixels `at ..` of a block.
+    #[inline(always)]
+    pub(super) fn load(block: &[V::Scalar], at: usize) -> Self {
+        let row = |plane: usize| V::load(&block[plane * BLOCK + at..]);
+        Self { mean: std::array::from_fn(row), cov: std::array::from_fn(|k| row(N + k)) }
+    }
+
+    /// Writes them back.
+    #[inline(always)]
+    pub(super) fn store(&self, block: &mut [V::Scalar], at: usize) {
+        for (plane, value) in self.mean.iter().chain(&self.cov).enumerate() {
+            value.store(&mut block[plane * BLOCK + at..]);
+        }
+    }
+}
+
+/// The lanes that are not one, as bits.
+#[inline(always)]
+pub(super) fn failed<V: Lanes>(ok: V) -> u32 {
+    let mut lanes = [V::Scalar::from_f64(1.0); BLOCK];
+    ok.store(&mut lanes);
+    lanes.iter().enumerate().map(|(k, v)| u32::from(v.to_f64() != 1.0) << k).sum()
+}

@@ -1,0 +1,197 @@
+//! Prediction over one frame: mean and covariance through the non-linear step, by one of the four forms.
+
+use super::factor::{Columns, factor, repair};
+use super::moments::{cross, outer};
+use super::noise::noise_pairs;
+use super::transition::{Generator, Step};
+use super::{BLOCK, Constants, Lane, N, PLANES, failed, packed};
+use crate::simd::{Kernel, Lanes, SimdReal};
+use crate::temporal::FilterForm;
+use std::marker::PhantomData;
+
+/// The square root takes the state as it stands: what the patent's form and `filterpy` do.
+const BRIGHTNESS_FIRST: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+/// Motion first, then the Hessian, the gradient and `I`: the last columns touch ever less.
+const MOTION_FIRST: [usize; N] = [6, 7, 8, 9, 10, 11, 5, 4, 3, 2, 1, 0];
+
+/// Which form a kernel is compiled for; a value of [`FilterForm`] as a constant.
+pub(in crate::temporal) const AUGMENTED: u8 = FilterForm::Augmented as u8;
+pub(in crate::temporal) const NON_AUGMENTED: u8 = FilterForm::NonAugmented as u8;
+pub(in crate::temporal) const FAST: u8 = FilterForm::Fast as u8;
+pub(in crate::temporal) const EXTENDED: u8 = FilterForm::Extended as u8;
+
+/// Predicts every pixel of some blocks in place.
+pub(in crate::temporal) struct Predict<'a, T, S, const FORM: u8> {
+    /// States.
+    pub blocks: &'a mut [T],
+    /// Set to one for each pixel that was repaired.
+    pub repaired: &'a mut [u8],
+    pub constants: &'a Constants<T>,
+    pub step: PhantomData<S>,
+}
+
+impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let order = if FORM == FAST { &MOTION_FIRST } else { &BRIGHTNESS_FIRST };
+        for (block, repaired) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.repaired.chunks_exact_mut(BLOCK))
+        {
+            for at in (0..BLOCK).step_by(V::LANES) {
+                let mut lane = Lane::<V>::load(block, at);
+                let (mut columns, ok) = factor(&lane.cov, order);
+                let mut bad = failed(ok);
+                while bad != 0 {
+                    for k in 0..V::LANES {
+                        if bad >> k & 1 == 1 {
+                            repair(block, at + k, self.constants);
+                            repaired[at + k] = 1;
+                        }
+                    }
+                    lane = Lane::load(block, at);
+                    let again = factor(&lane.cov, order);
+                    columns = again.0;
+                    bad = failed(again.1);
+                }
+                predict::<V, S, FORM>(&mut lane, &columns, self.constants);
+                lane.store(block, at);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn predict<V: Lanes, S: Step, const FORM: u8>(
+    lane: &mut Lane<V>,
+    columns: &Columns<V>,
+    constants: &Constants<V::Scalar>,
+) {
+    // Nothing depends on I: moving it without its value keeps the digits of what is added to it.
+    let brightness = lane.mean[0];
+    let i: [V; 6] = std::array::from_fn(|k| if k == 0 { V::zero() } else { lane.mean[k] });
+    let m: [V; 6] = std::array::from_fn(|k| lane.mean[6 + k]);
+    let map = S::map(&m);
+    let centre = S::apply(&map, &i);
+
+    let shift = match FORM {
+        EXTENDED => {
+            linearised::<V, S>(lane, columns, &i, &m, &map);
+            [V::zero(); 6]
+        }
+        FAST => sigma_points::<V, S, FORM, 6, 12, 18>(lane, columns, &i, &m, &centre, constants),
+        AUGMENTED if S::NOISE_INSIDE => {
+            sigma_points::<V, S, FORM, 12, 24, 35>(lane, columns, &i, &m, &centre, constants)
+        }
+        _ => sigma_points::<V, S, FORM, 12, 24, 24>(lane, columns, &i, &m, &centre, constants),
+    };
+    if !(FORM == AUGMENTED && S::NOISE_INSIDE) {
+        for k in 0..N {
+            let at = packed(k, k);
+            lane.cov[at] = lane.cov[at] + V::splat(constants.q[k]);
+        }
+    }
+    for k in 0..6 {
+        lane.mean[k] = centre[k] + shift[k];
+    }
+    lane.mean[0] = lane.mean[0] + brightness;
+}
+
+/// The unscented transform over the first `PAIRS` columns of the factor, `POINTS = 2 PAIRS`, together with the vectors that a form adds up to `TOTAL`:
+/// they enter the covariance with weight one. Returns the shift of the mean from the centre's image.
+///
+/// With `a, b` the images of a pair less the centre's and `c = n + lambda`: shift `d = sum (a + b) / 2c`, covariance
+/// `sum (a a^T + b b^T) / 2c + (beta - alpha^2) d d^T`, covariance with the motion `sum (a - b) l^T / 2 sqrt(c)`. The usual weights, with the centre's
+/// large cancelling terms gone; the motion's own block does not change but for its noise.
+#[inline(always)]
+fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POINTS: usize, const TOTAL: usize>(
+    lane: &mut Lane<V>,
+    columns: &Columns<V>,
+    i: &[V; 6],
+    m: &[V; 6],
+    centre: &[V; 6],
+    constants: &Constants<V::Scalar>,
+) -> [V; 6] {
+    let spread = V::splat(constants.spread);
+    let one = V::constant(1.0);
+    let half = V::constant(0.5);
+    let mut images = [[V::zero(); 6]; TOTAL];
+    let mut differences = [[V::zero(); 6]; PAIRS];
+    let mut sums = [V::zero(); 6];
+    for k in 0..PAIRS {
+        let step: [V; N] = columns[k].map(|v| v * spread);
+        let plus = S::advance(&std::array::from_fn(|j| i[j] + step[j]), &std::array::from_fn(|j| m[j] + step[6 + j]));
+        let minus = S::advance(&std::array::from_fn(|j| i[j] - step[j]), &std::array::from_fn(|j| m[j] - step[6 + j]));
+        for j in 0..6 {
+            let (a, b) = (plus[j] - centre[j], minus[j] - centre[j]);
+            images[2 * k][j] = a;
+            images[2 * k + 1][j] = b;
+            differences[k][j] = a - b;
+            sums[j] = sums[j] + (a + b);
+        }
+    }
+    let inverse = one / spread;
+    let scale = half * inverse * inverse;
+    let mut shift = sums.map(|v| v * scale);
+    // Vectors of weight one undo the scale that all share.
+    let whole = spread * V::constant(std::f64::consts::SQRT_2);
+    if FORM == AUGMENTED && S::NOISE_INSIDE {
+        let noise = noise_pairs(i, &Generator::new(m), constants);
+        for k in 0..noise.full.len() {
+            images[POINTS + k] = noise.full[k].map(|v| v * whole);
+        }
+        outer(&images, scale, &mut lane.cov);
+        cross(&differences, columns, half * inverse, &mut lane.cov);
+        noise.add_to(&mut lane.cov, constants);
+        for k in 0..6 {
+            shift[k] = shift[k] + noise.shift[k];
+        }
+    } else {
+        if FORM == FAST {
+            conditional::<V, S>(columns, m, whole, &mut images[POINTS..]);
+        }
+        outer(&images, scale, &mut lane.cov);
+        cross(&differences, columns, half * inverse, &mut lane.cov);
+    }
+    let weight = V::splat(constants.shift);
+    for a in 0..6 {
+        let weighted = weight * shift[a];
+        for b in 0..=a {
+            lane.cov[packed(a, b)] = weighted.mul_add(shift[b], lane.cov[packed(a, b)]);
+        }
+    }
+    shift
+}
+
+/// The factor of the brightness's covariance given the motion, moved by the mean motion: exact, because that step is linear.
+#[inline(always)]
+fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, out: &mut [[V; 6]]) {
+    let map = S::map(m);
+    for k in 6..9 {
+        let c = &columns[k];
+        out[k - 6] = S::apply(&map, &[c[0], c[1], c[2], c[3], c[4], c[5]]).map(|v| v * whole);
+    }
+    for k in 9..12 {
+        let [value, gx, gy] = S::apply_slope(&map, &[columns[k][0], columns[k][1], columns[k][2]]);
+        out[k - 6] = [value * whole, gx * whole, gy * whole, V::zero(), V::zero(), V::zero()];
+    }
+}
+
+/// The covariance through the linearised step, as a square root: `F L` squared.
+#[inline(always)]
+fn linearised<V: Lanes, S: Step>(lane: &mut Lane<V>, columns: &Columns<V>, i: &[V; 6], m: &[V; 6], map: &S::Map<V>) {
+    let mut moved = [[V::zero(); 6]; N];
+    for k in 0..N {
+        moved[k] = S::apply(map, &std::array::from_fn(|j| columns[k][j]));
+    }
+    for direction in 0..6 {
+        let tangent = S::tangent(i, m, direction);
+        for k in 0..N {
+            for j in 0..6 {
+                moved[k][j] = tangent[j].mul_add(columns[k][6 + direction], moved[k][j]);
+            }
+        }
+    }
+    outer(&moved, V::constant(1.0), &mut lane.cov);
+    cross(&moved, columns, V::constant(1.0), &mut lane.cov);
+}

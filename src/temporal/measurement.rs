@@ -1,0 +1,122 @@
+//! From brightness to the filter's measurement: the fitted jet of each site, and what the fit leaves.
+
+use super::kernel::BLOCK;
+use super::kernel::update::MEASURED;
+use crate::jet::JetStencil;
+use crate::simd::{Kernel, Lanes, SimdReal};
+use crate::types::Frame;
+
+/// A neighbourhood's fit in working precision.
+#[derive(Debug, Clone)]
+pub(super) struct Fit<T> {
+    /// Distance of each pixel from the site, in samples of a frame.
+    offsets: Vec<isize>,
+    /// Weight of each pixel in each component of the jet.
+    weights: Vec<[T; 6]>,
+    /// Row of the design matrix for each pixel.
+    design: Vec<[T; 6]>,
+    /// Expected sum of squared residuals for unit noise; zero when nothing is left over.
+    freedom: f64,
+}
+
+impl<T: SimdReal> Fit<T> {
+    pub(super) fn new(stencil: &JetStencil, frame_width: usize) -> Self {
+        let (weights, design) = (stencil.weights(), stencil.design());
+        let mut freedom = 0.0;
+        for (o, row) in design.iter().enumerate() {
+            for (p, w) in weights.iter().enumerate() {
+                let hat: f64 = row.iter().zip(w).map(|(b, w)| b * w).sum();
+                freedom += (f64::from(u8::from(o == p)) - hat).powi(2);
+            }
+        }
+        Self {
+            offsets: stencil.offsets().iter().map(|&(x, y)| y as isize * frame_width as isize + x as isize).collect(),
+            weights: weights.iter().map(|w| w.map(T::from_f64)).collect(),
+            design: design.iter().map(|b| b.map(T::from_f64)).collect(),
+            freedom: if freedom < 1e-9 { 0.0 } else { freedom },
+        }
+    }
+}
+
+/// Measures the sites of some blocks.
+pub(super) struct Measure<'a, T> {
+    pub frame: &'a Frame<T>,
+    /// Index of each site's pixel in the frame, `BLOCK` for each block; neighbourhoods lie inside the frame.
+    pub pixels: &'a [usize],
+    pub fit: &'a Fit<T>,
+    /// What a sample is multiplied by to be in grey levels.
+    pub scale: T,
+    /// Receives `MEASURED` rows of `BLOCK` for each block.
+    pub measured: &'a mut [T],
+    /// Receives the root mean square residual of each site, where it is wanted.
+    pub residual: Option<&'a mut [T]>,
+}
+
+impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(mut self) {
+        let samples = self.frame.data();
+        let inverse = if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN };
+        for (b, pixels) in self.pixels.chunks_exact(BLOCK).enumerate() {
+            let measured = &mut self.measured[b * MEASURED * BLOCK..(b + 1) * MEASURED * BLOCK];
+            let neighbours = pixels[BLOCK - 1] == pixels[0] + BLOCK - 1;
+            for at in (0..BLOCK).step_by(V::LANES) {
+                let pixels = &pixels[at..at + V::LANES];
+                // Derivatives do not see a constant: differences from one sample keep every digit of theirs.
+                let base = fetch::<V>(samples, pixels, self.fit.offsets[0], neighbours);
+                let mut jet = [V::zero(); 6];
+                for (&offset, weights) in self.fit.offsets.iter().zip(&self.fit.weights) {
+                    let z = fetch::<V>(samples, pixels, offset, neighbours) - base;
+                    for k in 0..6 {
+                        jet[k] = z.mul_add(V::splat(weights[k]), jet[k]);
+                    }
+                }
+                // Zero for finite numbers, NaN for others, whatever their weights.
+                let mut spoilt = V::zero();
+                let mut left = V::zero();
+                if self.residual.is_some() {
+                    for (&offset, row) in self.fit.offsets.iter().zip(&self.fit.design) {
+                        let mut z = fetch::<V>(samples, pixels, offset, neighbours) - base;
+                        for k in 0..6 {
+                            z = jet[k].neg_mul_add(V::splat(row[k]), z);
+                        }
+                        left = z.mul_add(z, left);
+                    }
+                    spoilt = left - left;
+                } else {
+                    for &offset in &self.fit.offsets {
+                        spoilt = V::zero().mul_add(fetch::<V>(samples, pixels, offset, neighbours), spoilt);
+                    }
+                }
+                jet[0] = jet[0] + base;
+                let scale = V::splat(self.scale);
+                for k in 0..6 {
+                    spoilt = V::zero().mul_add(jet[k], spoilt);
+                }
+                let good = V::zero().lt(V::constant(1.0) + spoilt);
+                for k in 0..6 {
+                    V::select(good, jet[k] * scale, V::zero()).store(&mut measured[k * BLOCK + at..]);
+                }
+                V::select(good, V::constant(1.0), V::zero()).store(&mut measured[6 * BLOCK + at..]);
+                if let Some(residual) = &mut self.residual {
+                    ((left * V::constant(inverse)).sqrt() * scale).store(&mut residual[b * BLOCK + at..]);
+                }
+            }
+        }
+    }
+}
+
+/// The samples at `offset` from each of the pixels.
+#[inline(always)]
+fn fetch<V: Lanes>(samples: &[V::Scalar], pixels: &[usize], offset: isize, neighbours: bool) -> V {
+    if neighbours {
+        return V::load(&samples[pixels[0].wrapping_add_signed(offset)..]);
+    }
+    let mut lanes = [V::Scalar::default(); BLOCK];
+    for k in 0..V::LANES {
+        lanes[k] = samples[pixels[k].wrapping_add_signed(offset)];
+    }
+    V::load(&lanes)
+}

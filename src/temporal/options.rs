@@ -1,0 +1,200 @@
+//! Options of the flow filter, and the profiles that have been measured.
+
+use crate::error::{Error, Result};
+use crate::filter::SigmaPoints;
+use crate::jet::Neighbourhood;
+use crate::parallel::Threads;
+use crate::simd::Level;
+use crate::types::{Mask, Sites};
+use serde::{Deserialize, Serialize};
+
+/// How the non-linear prediction is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterForm {
+    /// Sigma points of the state together with its process noise: 24 dimensions, 49 points, the noise held constant inside the step. The patent's form.
+    #[default]
+    Augmented,
+    /// Sigma points of the state alone (25), the process noise added to their covariance.
+    NonAugmented,
+    /// Sigma points of the motion alone (13); given the motion the brightness part is linear, so its conditional covariance is carried exactly. The same
+    /// numbers as 25 points with a square root that takes the motion first.
+    Fast,
+    /// Extended Kalman filter: linearised at the mean.
+    Extended,
+}
+
+impl FilterForm {
+    /// Every form.
+    pub const ALL: [Self; 4] = [Self::Augmented, Self::NonAugmented, Self::Fast, Self::Extended];
+
+    /// The word used in files, on the command line and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Augmented => "augmented",
+            Self::NonAugmented => "non_augmented",
+            Self::Fast => "fast",
+            Self::Extended => "extended",
+        }
+    }
+
+    /// The form called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] listing the known names.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|f| f.name() == name)
+            .ok_or_else(|| Error::argument("form", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
+    }
+}
+
+/// How a state moves over one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Transition {
+    /// One step of the classical Runge-Kutta method; the patent's.
+    #[default]
+    Rk4,
+    /// The closed form: an affine velocity field maps quadratics to quadratics. Process noise is added at the end of the frame.
+    Exact,
+}
+
+impl Transition {
+    /// Every transition.
+    pub const ALL: [Self; 2] = [Self::Rk4, Self::Exact];
+
+    /// The word used in files, on the command line and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rk4 => "rk4",
+            Self::Exact => "exact",
+        }
+    }
+
+    /// The transition called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] listing the known names.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(|| {
+            Error::argument("transition", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name)
+        })
+    }
+}
+
+/// Options of [`FlowFilter`](super::FlowFilter). The default is [`FlowFilterOptions::patent`].
+///
+/// States are ordered `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, in 8-bit grey levels, px and frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowFilterOptions {
+    /// Pixels that a measurement takes in; 3x3. Weights, where it has any, make the measurement's noise the weighted fit's.
+    pub neighbourhood: Neighbourhood,
+    /// How the prediction is carried out.
+    pub form: FilterForm,
+    /// How a state moves over one frame.
+    pub transition: Transition,
+    /// Diagonal of the process noise Q, variances a frame; each >= 0.
+    pub process_noise: [f64; 12],
+    /// Variance of the noise of one pixel, grey levels squared; > 0.
+    pub measurement_noise: f64,
+    /// Mean before the first frame.
+    pub initial_mean: [f64; 12],
+    /// Diagonal of the covariance before the first frame; each > 0.
+    pub initial_covariance: [f64; 12],
+    /// Constants of the sigma points.
+    pub sigma_points: SigmaPoints,
+    /// The sample value that stands for 255 grey levels: 255 for `u8` and for floats in grey levels, 65535 for `u16`, 1 for floats in [0, 1].
+    pub full_scale: f64,
+    /// Where the filters are; every pixel by default.
+    pub sites: Sites,
+    /// Which pixels may be used; `None`: all.
+    pub mask: Option<Mask>,
+    /// Deliver the 6x6 covariance of the motion with each field (21 planes).
+    pub covariance: bool,
+    /// Deliver the root mean square residual of the quadratic fit, grey levels: an estimate of the pixel noise, for free.
+    pub residual: bool,
+    /// Physical size `(dx, dy)` of a pixel: fields come in these units. States stay in px.
+    pub pixel_pitch: (f64, f64),
+    /// Seconds between frames, noted in the fields.
+    pub frame_period: Option<f64>,
+    /// Threads; results do not depend on their number.
+    pub threads: Threads,
+    /// Instruction set; `None`: the best one.
+    pub simd: Option<Level>,
+}
+
+impl Default for FlowFilterOptions {
+    fn default() -> Self {
+        Self::patent()
+    }
+}
+
+impl FlowFilterOptions {
+    /// The patent's constants (embodiment 2): `Q = diag(1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3, 1e-3, 1e-3, 1e-3)`, `R = 1e-3`, start at 0, with what the
+    /// patent leaves open: `P0 = I`, `alpha = 1, beta = 2, kappa = 0`. Augmented, Runge-Kutta, 3x3.
+    ///
+    /// Its process noise biases the divergence: on the patent's own scene `u_x` and `v_y` come out near +0.09 where the truth is 0.
+    pub fn patent() -> Self {
+        Self {
+            neighbourhood: Neighbourhood::default(),
+            form: FilterForm::Augmented,
+            transition: Transition::Rk4,
+            process_noise: [1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3, 1e-3, 1e-3, 1e-3],
+            measurement_noise: 1e-3,
+            initial_mean: [0.0; 12],
+            initial_covariance: [1.0; 12],
+            sigma_points: SigmaPoints::default(),
+            full_scale: 255.0,
+            sites: Sites::default(),
+            mask: None,
+            covariance: false,
+            residual: true,
+            pixel_pitch: (1.0, 1.0),
+            frame_period: None,
+            threads: Threads::default(),
+            simd: None,
+        }
+    }
+
+    /// Constants for raw 8-bit frames, not smoothed: 9x9 pixels, `R = 1/12` (the variance of rounding), and process noise small enough not to bias the
+    /// divergence. On the patent's scene its error is about a third of the patent's in `u` and a fiftieth in the Jacobian.
+    pub fn measured() -> Self {
+        Self {
+            neighbourhood: Neighbourhood::square(9),
+            process_noise: [1e-4, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6, 1e-6],
+            measurement_noise: 1.0 / 12.0,
+            initial_covariance: [1e4, 10.0, 10.0, 1.0, 1.0, 1.0, 10.0, 10.0, 0.01, 0.01, 0.01, 0.01],
+            ..Self::patent()
+        }
+    }
+
+    /// Refuses values that no filter can run with.
+    pub(super) fn check(&self, frame_size: (usize, usize)) -> Result<()> {
+        let all = |name, values: &[f64], what: &str, good: &dyn Fn(f64) -> bool| match values
+            .iter()
+            .find(|&&v| !(v.is_finite() && good(v)))
+        {
+            Some(value) => Err(Error::argument(name, what, value)),
+            None => Ok(()),
+        };
+        all("process_noise", &self.process_noise, "twelve finite variances, each >= 0", &|v| v >= 0.0)?;
+        all("measurement_noise", &[self.measurement_noise], "a finite variance > 0", &|v| v > 0.0)?;
+        all("initial_mean", &self.initial_mean, "twelve finite numbers", &|_| true)?;
+        all("initial_covariance", &self.initial_covariance, "twelve finite variances, each > 0", &|v| v > 0.0)?;
+        all("full_scale", &[self.full_scale], "a finite number > 0", &|v| v > 0.0)?;
+        all("pixel_pitch", &[self.pixel_pitch.0, self.pixel_pitch.1], "two finite lengths > 0", &|v| v > 0.0)?;
+        if let Some(period) = self.frame_period {
+            all("frame_period", &[period], "a finite time > 0", &|v| v > 0.0)?;
+        }
+        self.sigma_points.check(12)?;
+        if let Some(mask) = &self.mask
+            && mask.size() != frame_size
+        {
+            let text = |(w, h)| format!("{w} x {h}");
+            return Err(Error::argument("mask", format!("the frames' size {}", text(frame_size)), text(mask.size())));
+        }
+        Ok(())
+    }
+}
