@@ -149,6 +149,14 @@ fn io_error(path: &Path, error: std::io::Error) -> Error {
     }
 }
 
+/// As for other images.
+pub(crate) fn png_error(path: &Path, error: png::DecodingError) -> Error {
+    match error {
+        png::DecodingError::IoError(error) => io_error(path, error),
+        other => Error::format(path, other.to_string()),
+    }
+}
+
 fn tiff_error(path: &Path, error: tiff::TiffError) -> Error {
     match error {
         tiff::TiffError::IoError(error) => io_error(path, error),

@@ -4,13 +4,22 @@
 //! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
 
 mod decode;
+mod flo;
+mod flow_image;
 mod jpeg;
+mod kitti;
 mod npy;
+pub mod npz;
+mod pfm;
 mod source;
 pub mod write;
 
 pub use decode::read_image;
+pub use flo::{read_flo, write_flo};
+pub use flow_image::FlowImage;
+pub use kitti::{read_kitti, write_kitti};
 pub use npy::{Element, ElementType, NpyHeader};
+pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use source::{
     Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, Y4mSource, kind_of,
     open,

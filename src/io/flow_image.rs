@@ -1,0 +1,110 @@
+//! Flow as a dense pair of planes in px/frame: what the exchange formats hold.
+
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FlowField, Sites};
+
+/// Flow `(u, v)` of every pixel of a grid, px/frame; NaN where it is unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowImage {
+    width: usize,
+    height: usize,
+    u: Vec<f32>,
+    v: Vec<f32>,
+}
+
+impl FlowImage {
+    /// From row-major planes.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `u` or `v` when a plane does not hold `width * height` values.
+    pub fn new(width: usize, height: usize, u: Vec<f32>, v: Vec<f32>) -> Result<Self> {
+        for (name, plane) in [("u", &u), ("v", &v)] {
+            if width.checked_mul(height) != Some(plane.len()) {
+                return Err(Error::argument(
+                    name,
+                    format!("{width} x {height} values"),
+                    format!("{} values", plane.len()),
+                ));
+            }
+        }
+        Ok(Self { width, height, u, v })
+    }
+
+    /// The flow of a field on a grid, one pixel a site, back in px/frame whatever the field's pixel pitch is.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `sites` for a field of points, which is no picture.
+    pub fn from_field<T: Real>(field: &FlowField<T>) -> Result<Self> {
+        if matches!(field.layout.sites, Sites::Points(_)) {
+            return Err(Error::argument(
+                "sites",
+                "a grid, for a picture of the flow (points go to CSV or .npz)",
+                "a list of points",
+            ));
+        }
+        let (dx, dy) = field.layout.pixel_pitch;
+        let n = field.len();
+        let plane = |p: usize, pitch: f64| {
+            field.motion[p * n..(p + 1) * n].iter().map(|m| (m.to_f64() / pitch) as f32).collect()
+        };
+        Self::new(field.width, field.height, plane(0, dx), plane(1, dy))
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+    /// Flow along x, px/frame, row-major.
+    pub fn u(&self) -> &[f32] {
+        &self.u
+    }
+    /// Flow along y, px/frame, row-major.
+    pub fn v(&self) -> &[f32] {
+        &self.v
+    }
+    /// Share of the pixels whose flow is known, 0 to 1.
+    pub fn valid_share(&self) -> f64 {
+        let known = self.u.iter().zip(&self.v).filter(|(u, v)| u.is_finite() && v.is_finite()).count();
+        known as f64 / self.u.len().max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::FieldLayout;
+
+    fn field(sites: Sites) -> FlowField<f64> {
+        let layout = FieldLayout {
+            frame_size: (2, 1),
+            sites,
+            model: "affine".into(),
+            parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: None,
+            pixel_pitch: (0.5, 0.25),
+            frame_index: 0,
+        };
+        FlowField::empty(layout, false).unwrap()
+    }
+
+    #[test]
+    fn physical_units_become_pixels_again() {
+        let mut field = field(Sites::default());
+        (field.motion[0], field.motion[2]) = (1.0, 1.0);
+        let image = FlowImage::from_field(&field).unwrap();
+        assert_eq!((image.u()[0], image.v()[0]), (2.0, 4.0));
+        assert!(image.u()[1].is_nan() && image.valid_share() == 0.5);
+    }
+
+    #[test]
+    fn points_and_wrong_sizes_are_refused() {
+        let error = FlowImage::from_field(&field(Sites::Points(vec![(0, 0)]))).unwrap_err();
+        assert!(error.to_string().starts_with("sites"));
+        assert!(FlowImage::new(2, 2, vec![0.0; 4], vec![0.0; 3]).unwrap_err().to_string().starts_with("v:"));
+    }
+}

@@ -1,0 +1,347 @@
+//! Named arrays in one file: numpy's `.npz`, a zip archive of `.npy` files.
+//!
+//! `numpy.load` reads the result without pickle: texts are stored as zero-dimensional `str_` arrays. Arrays are stored uncompressed, as `numpy.savez` does,
+//! since planes of floats hardly shrink; compressed archives are read too. The bytes depend on the content only, not on the time of writing.
+
+use super::npy::{Element, ElementType, NpyHeader, from_fortran_order, write_values};
+use super::write::AtomicFile;
+use crate::error::{Error, Result};
+use crate::math::Real;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+/// Writes named arrays, one after another.
+#[derive(Debug)]
+pub struct NpzWriter<W: Write + Seek> {
+    zip: ZipWriter<W>,
+    path: PathBuf,
+}
+
+impl NpzWriter<AtomicFile> {
+    /// A file that appears under its name when [`NpzWriter::finish`] is called.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`].
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        Ok(Self::new(AtomicFile::create(path)?, path))
+    }
+
+    /// Ends the archive and gives the file its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the rest cannot be written.
+    pub fn finish(self) -> Result<()> {
+        self.into_inner()?.commit()
+    }
+}
+
+impl<W: Write + Seek> NpzWriter<W> {
+    /// An archive in any seekable place; `name` stands for it in messages.
+    pub fn new(place: W, name: impl AsRef<Path>) -> Self {
+        Self { zip: ZipWriter::new(place), path: name.as_ref().to_path_buf() }
+    }
+
+    /// Adds an array in C order.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when `values` does not fill `shape`; [`Error::Io`] when it cannot be written.
+    pub fn array<T: Element>(&mut self, name: &str, shape: &[usize], values: &[T]) -> Result<()> {
+        let header = NpyHeader::new(T::TYPE, shape);
+        if header.count() != Some(values.len()) {
+            return Err(Error::argument("values", format!("as many as the shape {shape:?} holds"), values.len()));
+        }
+        self.array_from(name, &header, |out| write_values(values, out))
+    }
+
+    /// Adds an array whose data `write` puts out, exactly as many bytes as `header` says, little-endian.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be written.
+    pub fn array_from(
+        &mut self,
+        name: &str,
+        header: &NpyHeader,
+        write: impl FnOnce(&mut ZipWriter<W>) -> std::io::Result<()>,
+    ) -> Result<()> {
+        // Beyond 4 GiB an entry needs the 64-bit form, which must be announced.
+        let large = header.byte_count().is_none_or(|n| n >= (u32::MAX - 4096) as usize);
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(large);
+        let zip = &mut self.zip;
+        let written = zip.start_file(format!("{name}.npy"), options).map_err(std::io::Error::from).and_then(|()| {
+            header.write(zip, 0)?;
+            write(zip)
+        });
+        written.map_err(|e| Error::io(&self.path, e))
+    }
+
+    /// Adds a text.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be written.
+    pub fn text(&mut self, name: &str, text: &str) -> Result<()> {
+        let characters: Vec<u32> = text.chars().map(u32::from).collect();
+        let header = NpyHeader::new(ElementType::Text(characters.len()), &[]);
+        self.array_from(name, &header, |out| write_values(&characters, out))
+    }
+
+    /// Ends the archive and returns the place it was written to.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the rest cannot be written.
+    pub fn into_inner(self) -> Result<W> {
+        self.zip.finish().map_err(|e| Error::io(&self.path, e.into()))
+    }
+}
+
+/// An array with its shape, in C order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NpyArray<T> {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// The values, last axis fastest.
+    pub values: Vec<T>,
+}
+
+/// Reads named arrays in any order.
+#[derive(Debug)]
+pub struct NpzReader<R: Read + Seek> {
+    zip: ZipArchive<R>,
+    path: PathBuf,
+}
+
+impl NpzReader<BufReader<File>> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read, [`Error::Format`] when it is no zip archive.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        if file.metadata().is_ok_and(|m| m.is_dir()) {
+            return Err(Error::io(path, std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+        }
+        Self::new(BufReader::with_capacity(1 << 18, file), path)
+    }
+}
+
+impl<R: Read + Seek> NpzReader<R> {
+    /// Opens an archive in any seekable place; `name` stands for it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Format`] when it is no zip archive.
+    pub fn new(place: R, name: impl AsRef<Path>) -> Result<Self> {
+        let path = name.as_ref().to_path_buf();
+        let zip = ZipArchive::new(place).map_err(|e| zip_error(&path, e))?;
+        Ok(Self { zip, path })
+    }
+
+    /// What stands for the archive in messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of the arrays, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let names = self.zip.file_names().filter_map(std::result::Result::ok);
+        let mut names: Vec<_> = names.filter_map(|n| n.strip_suffix(".npy").map(str::to_string)).collect();
+        names.sort();
+        names
+    }
+
+    /// Whether there is an array of this name.
+    pub fn contains(&self, name: &str) -> bool {
+        self.names().iter().any(|n| n == name)
+    }
+
+    /// The array `name`, which must have elements of type `T`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] when it is missing, damaged or of another type.
+    pub fn array<T: Element>(&mut self, name: &str) -> Result<NpyArray<T>> {
+        let (header, bytes) = self.read(name)?;
+        if header.element != T::TYPE {
+            return Err(self.wrong(
+                name,
+                &format!("has elements '{}', expected '{}'", header.element.descriptor(), T::TYPE.descriptor()),
+            ));
+        }
+        Ok(decode(&header, &bytes))
+    }
+
+    /// The array `name` of float32 or float64, in working precision.
+    ///
+    /// # Errors
+    /// As [`NpzReader::array`].
+    pub fn real_array<T: Real>(&mut self, name: &str) -> Result<NpyArray<T>> {
+        let (header, bytes) = self.read(name)?;
+        match header.element {
+            ElementType::F32 => Ok(convert(decode::<f32>(&header, &bytes))),
+            ElementType::F64 => Ok(convert(decode::<f64>(&header, &bytes))),
+            other => Err(self.wrong(name, &format!("has elements '{}', expected '<f4' or '<f8'", other.descriptor()))),
+        }
+    }
+
+    /// The text `name`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] when it is missing or no single text.
+    pub fn text(&mut self, name: &str) -> Result<String> {
+        let (header, bytes) = self.read(name)?;
+        if !matches!(header.element, ElementType::Text(_)) || header.count() != Some(1) {
+            return Err(self.wrong(name, "is not a single text"));
+        }
+        let text: Option<String> = u32::decode(&bytes, header.big_endian).into_iter().map(char::from_u32).collect();
+        // numpy pads texts with NUL.
+        text.map(|t| t.trim_end_matches('\0').to_string()).ok_or_else(|| self.wrong(name, "is not valid text"))
+    }
+
+    fn read(&mut self, name: &str) -> Result<(NpyHeader, Vec<u8>)> {
+        let path = self.path.clone();
+        let wrong = |what: String| Error::format(&path, format!("array '{name}' {what}"));
+        let mut entry = match self.zip.by_name(&format!("{name}.npy")) {
+            Ok(entry) => entry,
+            Err(ZipError::FileNotFound) => return Err(wrong("is missing".into())),
+            Err(error) => return Err(zip_error(&path, error)),
+        };
+        let (header, _) = NpyHeader::read(&mut entry).map_err(|e| wrong(format!("is damaged: {e}")))?;
+        let expected =
+            header.byte_count().ok_or_else(|| wrong(format!("has an impossible shape {:?}", header.shape)))?;
+        // Grown as the bytes come: what the header claims is not taken on trust.
+        let mut bytes = Vec::new();
+        entry.take(expected as u64).read_to_end(&mut bytes).map_err(|e| wrong(format!("is damaged: {e}")))?;
+        if bytes.len() < expected {
+            return Err(wrong(format!("is cut off: {} of {expected} bytes", bytes.len())));
+        }
+        Ok((header, bytes))
+    }
+
+    /// An error about the array `name`.
+    pub(crate) fn wrong(&self, name: &str, what: &str) -> Error {
+        Error::format(&self.path, format!("array '{name}' {what}"))
+    }
+}
+
+fn decode<T: Element>(header: &NpyHeader, bytes: &[u8]) -> NpyArray<T> {
+    let values = T::decode(bytes, header.big_endian);
+    let values = if header.fortran_order { from_fortran_order(&values, &header.shape) } else { values };
+    NpyArray { shape: header.shape.clone(), values }
+}
+
+fn convert<S: Real, T: Real>(array: NpyArray<S>) -> NpyArray<T> {
+    NpyArray { shape: array.shape, values: array.values.into_iter().map(|v| T::from_f64(v.to_f64())).collect() }
+}
+
+fn zip_error(path: &Path, error: ZipError) -> Error {
+    match error {
+        ZipError::Io(e)
+            if !matches!(
+                e.kind(),
+                std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput
+            ) =>
+        {
+            Error::io(path, e)
+        }
+        other => Error::format(path, format!("not a usable .npz archive: {other}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::io::Cursor;
+
+    fn sample() -> Vec<u8> {
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "memory.npz");
+        npz.array("planes", &[2, 3], &[1.0f32, 2.0, 3.0, 4.0, 5.0, f32::NAN]).unwrap();
+        npz.array("exact", &[2], &[0.1f64, -0.0]).unwrap();
+        npz.array("codes", &[3], &[1u8, 2, 3]).unwrap();
+        npz.array("counts", &[1, 1], &[7u32]).unwrap();
+        npz.array("index", &[], &[-5i64]).unwrap();
+        npz.text("metadata", r#"{"unit": "µm", "n": 1}"#).unwrap();
+        npz.into_inner().unwrap().into_inner()
+    }
+
+    fn reader(bytes: Vec<u8>) -> Result<NpzReader<Cursor<Vec<u8>>>> {
+        NpzReader::new(Cursor::new(bytes), "memory.npz")
+    }
+
+    #[test]
+    fn arrays_and_texts_come_back() {
+        let mut npz = reader(sample()).unwrap();
+        assert_eq!(npz.names(), ["codes", "counts", "exact", "index", "metadata", "planes"]);
+        let planes = npz.array::<f32>("planes").unwrap();
+        assert!(planes.shape == [2, 3] && planes.values[4] == 5.0 && planes.values[5].is_nan());
+        assert_eq!(npz.array::<f64>("exact").unwrap().values, [0.1, -0.0]);
+        assert_eq!(npz.array::<u32>("counts").unwrap(), NpyArray { shape: vec![1, 1], values: vec![7] });
+        assert_eq!(npz.array::<i64>("index").unwrap(), NpyArray { shape: vec![], values: vec![-5] });
+        assert_eq!(npz.text("metadata").unwrap(), r#"{"unit": "µm", "n": 1}"#);
+        assert_eq!(npz.real_array::<f32>("exact").unwrap().values, [0.1f32, -0.0]);
+        assert_eq!(npz.real_array::<f64>("planes").unwrap().values[1], 2.0);
+        assert!(npz.contains("codes") && !npz.contains("code"));
+        assert_eq!(sample(), sample(), "the bytes do not depend on the clock");
+    }
+
+    #[test]
+    fn wrong_names_types_and_counts_are_explained() {
+        let mut npz = reader(sample()).unwrap();
+        assert!(npz.array::<f32>("nothing").unwrap_err().to_string().contains("'nothing' is missing"));
+        assert!(npz.array::<u8>("planes").unwrap_err().to_string().contains("'<f4'"));
+        assert!(npz.text("codes").unwrap_err().to_string().contains("single text"));
+        assert!(npz.real_array::<f32>("codes").is_err());
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+        assert!(npz.array("a", &[2, 2], &[1u8; 3]).is_err());
+        assert!(npz.array("a", &[usize::MAX, 2], &[1u8; 3]).is_err());
+    }
+
+    #[test]
+    fn a_file_appears_only_when_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let mut npz = NpzWriter::create(&path).unwrap();
+        npz.array("a", &[1], &[1u8]).unwrap();
+        assert!(!path.exists());
+        drop(npz);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let mut npz = NpzWriter::create(&path).unwrap();
+        npz.array("a", &[1], &[9u8]).unwrap();
+        npz.finish().unwrap();
+        assert_eq!(NpzReader::open(&path).unwrap().array::<u8>("a").unwrap().values, [9]);
+        assert!(matches!(NpzReader::open(folder.path()), Err(Error::Io { .. })));
+        std::fs::write(&path, b"no zip").unwrap();
+        assert!(matches!(NpzReader::open(&path), Err(Error::Format { .. })));
+    }
+
+    #[test]
+    fn a_header_that_promises_too_much_is_cut_off_not_allocated() {
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+        npz.array_from("a", &NpyHeader::new(ElementType::F64, &[1 << 40]), |out| out.write_all(&[0; 16])).unwrap();
+        let mut npz = reader(npz.into_inner().unwrap().into_inner()).unwrap();
+        assert!(npz.array::<f64>("a").unwrap_err().to_string().contains("cut off"));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+        #[test]
+        fn damage_never_makes_it_panic(at in 0usize..4000, value: u8, cut in 0usize..4000, random in proptest::collection::vec(any::<u8>(), 0..100)) {
+            let mut bytes = sample();
+            let at = at % bytes.len();
+            bytes[at] = value;
+            bytes.truncate(cut.max(1));
+            for bytes in [bytes, random] {
+                if let Ok(mut npz) = reader(bytes) {
+                    for name in npz.names() {
+                        let _ = npz.array::<f32>(&name);
+                        let _ = npz.real_array::<f64>(&name);
+                        let _ = npz.text(&name);
+                    }
+                }
+            }
+        }
+    }
+}
