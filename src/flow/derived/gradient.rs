@@ -1,0 +1,101 @@
+//! Each quantity per frame with its derivative with respect to `m = (u, v, u_x, v_x, u_y, v_y)`.
+
+use super::Quantity;
+
+pub(super) fn value_and_gradient(quantity: Quantity, m: &[f64; 6], at: (f64, f64)) -> (f64, [f64; 6]) {
+    let [u, v, ux, vx, uy, vy] = *m;
+    match quantity {
+        Quantity::Divergence => (ux + vy, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]),
+        Quantity::Curl => (vx - uy, [0.0, 0.0, 0.0, 1.0, -1.0, 0.0]),
+        Quantity::AngularVelocity | Quantity::Rpm => (0.5 * (vx - uy), [0.0, 0.0, 0.0, 0.5, -0.5, 0.0]),
+        Quantity::StrainXx => (ux, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        Quantity::StrainXy => (0.5 * (uy + vx), [0.0, 0.0, 0.0, 0.5, 0.5, 0.0]),
+        Quantity::StrainYy => (vy, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        Quantity::ShearMagnitude => {
+            let (normal, shear) = (ux - vy, uy + vx);
+            let size = normal.hypot(shear);
+            let (c, s) = (normal / size, shear / size);
+            (size, [0.0, 0.0, c, s, s, -c])
+        }
+        Quantity::ShearAxis => {
+            let (normal, shear) = (ux - vy, uy + vx);
+            let square = normal * normal + shear * shear;
+            let (c, s) = (0.5 * normal / square, 0.5 * shear / square);
+            let angle = if square > 0.0 { 0.5 * shear.atan2(normal) } else { f64::NAN };
+            (angle, [0.0, 0.0, -s, c, c, s])
+        }
+        Quantity::RotationCentreX => {
+            let (offset, rows) = centre_offset(m);
+            (at.0 - offset[0], rows[0].map(|d| -d))
+        }
+        Quantity::RotationCentreY => {
+            let (offset, rows) = centre_offset(m);
+            (at.1 - offset[1], rows[1].map(|d| -d))
+        }
+        Quantity::CentreDistance => {
+            let (offset, rows) = centre_offset(m);
+            let distance = offset[0].hypot(offset[1]);
+            let (c, s) = (offset[0] / distance, offset[1] / distance);
+            (distance, std::array::from_fn(|k| c * rows[0][k] + s * rows[1][k]))
+        }
+        Quantity::TimeToContact => {
+            let divergence = ux + vy;
+            let slope = -2.0 / (divergence * divergence);
+            (2.0 / divergence, [0.0, 0.0, slope, 0.0, 0.0, slope])
+        }
+        Quantity::Speed => {
+            let speed = u.hypot(v);
+            (speed, [u / speed, v / speed, 0.0, 0.0, 0.0, 0.0])
+        }
+    }
+}
+
+/// `d = M^-1 (u, v)` and the rows of its derivative: from `M d = (u, v)`, `M dd = d(u, v) - dM d`.
+fn centre_offset(m: &[f64; 6]) -> ([f64; 2], [[f64; 6]; 2]) {
+    let [u, v, ux, vx, uy, vy] = *m;
+    let det = ux * vy - uy * vx;
+    let inverse = [[vy / det, -uy / det], [-vx / det, ux / det]];
+    let apply = |r: usize, a: f64, b: f64| inverse[r][0] * a + inverse[r][1] * b;
+    let d = [apply(0, u, v), apply(1, u, v)];
+    let row = |r: usize| {
+        [
+            inverse[r][0],
+            inverse[r][1],
+            -inverse[r][0] * d[0],
+            -inverse[r][1] * d[0],
+            -inverse[r][0] * d[1],
+            -inverse[r][1] * d[1],
+        ]
+    };
+    (d, [row(0), row(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gradients_agree_with_central_differences() {
+        let motions = [
+            [1.0, -0.7, 0.05, 0.04, -0.06, 0.03],
+            [-0.2, 0.9, -0.01, 0.2, -0.15, 0.07],
+            [3.0, 0.1, 0.3, -0.2, -0.1, -0.4],
+        ];
+        for m in motions {
+            for q in Quantity::ALL {
+                let (_, gradient) = value_and_gradient(q, &m, (3.0, 4.0));
+                for k in 0..6 {
+                    let h = 1e-6;
+                    let at = |s: f64| {
+                        let mut moved = m;
+                        moved[k] += s;
+                        value_and_gradient(q, &moved, (3.0, 4.0)).0
+                    };
+                    let got = (at(h) - at(-h)) / (2.0 * h);
+                    let scale = gradient.iter().fold(1.0, |a: f64, g| a.max(g.abs()));
+                    assert!((got - gradient[k]).abs() < 1e-6 * scale, "{q:?} {k}: {got} {}", gradient[k]);
+                }
+            }
+        }
+    }
+}

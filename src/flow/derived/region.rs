@@ -1,0 +1,208 @@
+//! Derived quantities over a field, and their mean over a region.
+
+use super::{Quantity, value_and_std};
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FlowField, Rect};
+
+/// How the sites of a region are combined into one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Aggregate {
+    /// Weighted by the inverse of each site's variance, which needs the field's covariance.
+    #[default]
+    InverseVariance,
+    /// The median, with 1.2533 times the standard error of the mean (its spread for normal errors) as standard deviation, the spread taken from
+    /// the median absolute deviation.
+    Median,
+}
+
+/// One number for a region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The value; NaN when no site has one.
+    pub value: f64,
+    /// Its standard deviation, as if the sites were independent; at least what their scatter shows.
+    pub std: f64,
+    /// Sites that took part.
+    pub count: usize,
+}
+
+/// The point that site `index` stands for, in units of the pixel pitch.
+fn position<T: Real>(field: &FlowField<T>, index: usize) -> (f64, f64) {
+    let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
+    let (dx, dy) = field.layout.pixel_pitch;
+    (x as f64 * dx, y as f64 * dy)
+}
+
+/// Values of a quantity at every site, row-major; NaN where the field has no estimate or its model no Jacobian.
+///
+/// # Errors
+/// [`Error::Argument`] naming `quantity` for one that needs the frame period of a field without.
+pub fn plane<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<Vec<f64>> {
+    Ok(planes(field, quantity)?.0)
+}
+
+/// As [`plane()`], with the plane of standard deviations where the field has a covariance.
+///
+/// # Errors
+/// As [`plane()`].
+pub fn planes<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
+    check(field, quantity)?;
+    let pairs: Vec<(f64, Option<f64>)> = (0..field.len()).map(|i| at_site(field, quantity, i)).collect();
+    let std = field.covariance.is_some().then(|| pairs.iter().map(|p| p.1.unwrap_or(f64::NAN)).collect());
+    Ok((pairs.into_iter().map(|p| p.0).collect(), std))
+}
+
+fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
+    if quantity.needs_fps() && field.layout.frame_period.is_none() {
+        return Err(Error::argument(
+            "quantity",
+            "a frame period (frames per second) to be given with rpm",
+            "a field without one",
+        ));
+    }
+    if quantity.needs_jacobian() && !field.layout.parameters.iter().any(|p| p == "u_x") {
+        return Err(Error::argument(
+            "quantity",
+            format!("speed, the only one that the {} model's flow without Jacobian has", field.layout.model),
+            quantity.name(),
+        ));
+    }
+    Ok(())
+}
+
+fn at_site<T: Real>(field: &FlowField<T>, quantity: Quantity, index: usize) -> (f64, Option<f64>) {
+    let m = field.affine(index).to_array().map(Real::to_f64);
+    value_and_std(quantity, m, field.covariance_at(index), position(field, index), field.layout.frame_period)
+}
+
+/// One value of a quantity for the sites inside `region` (pixels of the frame; `None`: all sites).
+///
+/// # Errors
+/// As [`plane()`]; [`Error::Argument`] naming `aggregate` for [`Aggregate::InverseVariance`] on a field without covariance.
+pub fn region_mean<T: Real>(
+    field: &FlowField<T>,
+    quantity: Quantity,
+    region: Option<Rect>,
+    aggregate: Aggregate,
+) -> Result<Mean> {
+    check(field, quantity)?;
+    if aggregate == Aggregate::InverseVariance && field.covariance.is_none() {
+        return Err(Error::argument(
+            "aggregate",
+            "a field with covariance, or the median",
+            "a field without covariance",
+        ));
+    }
+    let inside = |index: usize| {
+        let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
+        region.is_none_or(|r| x >= r.x && y >= r.y && x - r.x < r.width && y - r.y < r.height)
+    };
+    let sites: Vec<(f64, Option<f64>)> = (0..field.len())
+        .filter(|&i| field.status[i].is_valid() && inside(i))
+        .map(|i| at_site(field, quantity, i))
+        .filter(|(value, _)| value.is_finite())
+        .collect();
+    Ok(match aggregate {
+        Aggregate::InverseVariance => weighted(&sites),
+        Aggregate::Median => median_of(sites.into_iter().map(|s| s.0).collect()),
+    })
+}
+
+fn weighted(sites: &[(f64, Option<f64>)]) -> Mean {
+    let known: Vec<(f64, f64)> =
+        sites.iter().filter_map(|&(v, s)| s.filter(|s| s.is_finite()).map(|s| (v, s * s))).collect();
+    // Estimates that claim no error at all (exact data) outweigh the rest and share the weight equally.
+    let exact: Vec<(f64, f64)> = known.iter().filter(|k| k.1 == 0.0).map(|k| (k.0, 1.0)).collect();
+    let all_exact = !exact.is_empty();
+    let used = if all_exact { exact } else { known };
+    let weight: f64 = used.iter().map(|k| 1.0 / k.1).sum();
+    let value = used.iter().map(|k| k.0 / k.1).sum::<f64>() / weight;
+    let scatter: f64 = used.iter().map(|k| (k.0 - value).powi(2) / k.1).sum();
+    // The larger of the claimed and the observed spread (Birge 1932).
+    let ratio = if used.len() > 1 { scatter / (used.len() - 1) as f64 } else { 1.0 };
+    let ratio = if all_exact { ratio } else { ratio.max(1.0) };
+    Mean { value, std: (ratio / weight).sqrt(), count: used.len() }
+}
+
+fn median_of(mut values: Vec<f64>) -> Mean {
+    let count = values.len();
+    if count == 0 {
+        return Mean { value: f64::NAN, std: f64::NAN, count };
+    }
+    let value = median(&mut values);
+    let mut deviations: Vec<f64> = values.iter().map(|v| (v - value).abs()).collect();
+    let spread = 1.4826 * median(&mut deviations);
+    Mean { value, std: 1.2533 * spread / (count as f64).sqrt(), count }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{FieldLayout, MOTION_NAMES, Sites, Status};
+
+    /// 3 x 2 sites with divergence 0.1, 0.2, ... 0.6 and standard deviation sd each of u_x, none of the others.
+    fn field(sd: Option<f64>, period: Option<f64>) -> FlowField<f64> {
+        let layout = FieldLayout {
+            frame_size: (6, 4),
+            sites: Sites::Grid { region: None, stride: 2 },
+            model: "affine".into(),
+            parameters: MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: period,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 0,
+        };
+        let mut field = FlowField::empty(layout, sd.is_some()).unwrap();
+        field.motion.fill(0.0);
+        field.status.fill(Status::Ok);
+        for i in 0..6 {
+            field.motion[2 * 6 + i] = 0.1 * (i + 1) as f64;
+        }
+        if let (Some(sd), Some(c)) = (sd, &mut field.covariance) {
+            c.fill(0.0);
+            // Plane of (2, 2) in the upper triangle: 6 + 5.
+            c[11 * 6..12 * 6].fill(sd * sd);
+        }
+        field
+    }
+
+    #[test]
+    fn planes_hold_value_and_standard_deviation() {
+        let (value, std) = planes(&field(Some(0.02), Some(0.5)), Quantity::Divergence).unwrap();
+        assert!((value[3] - 0.8).abs() < 1e-12 && (std.unwrap()[3] - 0.04).abs() < 1e-12);
+        assert!(plane(&field(None, None), Quantity::Rpm).unwrap_err().to_string().starts_with("quantity"));
+    }
+
+    #[test]
+    fn a_region_has_one_value() {
+        let region = Some(Rect { x: 0, y: 0, width: 6, height: 2 });
+        let f = field(Some(0.3), None);
+        let mean = region_mean(&f, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
+        assert!((mean.value - 0.2).abs() < 1e-12 && mean.count == 3);
+        assert!((mean.std - 0.3 / 3f64.sqrt()).abs() < 1e-12);
+        // Claimed errors far below the scatter are not believed.
+        let tight =
+            region_mean(&field(Some(1e-6), None), Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();
+        assert!((tight.value - 0.35).abs() < 1e-9 && tight.std > 0.05);
+        let median = region_mean(&field(None, None), Quantity::Divergence, None, Aggregate::Median).unwrap();
+        assert!((median.value - 0.35).abs() < 1e-12 && median.std > 0.0);
+        assert!(region_mean(&field(None, None), Quantity::Divergence, None, Aggregate::InverseVariance).is_err());
+    }
+
+    #[test]
+    fn sites_without_an_estimate_do_not_take_part() {
+        let mut f = field(Some(0.3), None);
+        f.status[0] = Status::Masked;
+        f.motion[2 * 6] = f64::NAN;
+        let mean = region_mean(&f, Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();
+        assert!(mean.count == 5 && (mean.value - 0.4).abs() < 1e-12);
+        f.status.fill(Status::Border);
+        assert!(region_mean(&f, Quantity::Divergence, None, Aggregate::Median).unwrap().value.is_nan());
+    }
+}

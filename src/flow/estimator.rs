@@ -1,0 +1,209 @@
+//! One door to all methods.
+
+use super::baseline::{HornSchunck, LucasKanade};
+use super::instantaneous::Instantaneous;
+use super::model::{ModelKind, Parameter};
+use super::options::{Common, Method};
+use super::windowed::Windowed;
+use crate::error::{Error, Result};
+use crate::simd::SimdReal;
+use crate::types::{FieldLayout, FlowField, Frame};
+
+/// A method made ready: options checked, stencils and kernels computed.
+///
+/// ```
+/// use jacoflow::flow::{Common, Estimator, Method};
+/// use jacoflow::types::Frame;
+/// let estimator = Estimator::new(Method::parse("instantaneous")?, Common::default())?;
+/// let frames: Vec<Frame<f64>> = (0..3)
+///     .map(|t| Frame::from_fn(8, 8, |x, y| ((x as f64 - 0.25 * t as f64) * 0.7).sin() * 50.0 + ((y as f64) * 0.4).cos() * 40.0))
+///     .collect();
+/// let field = estimator.estimate(&[&frames[0], &frames[1], &frames[2]], 0)?;
+/// assert_eq!((field.width, field.height, field.layout.frame_index), (8, 8, 1));
+/// # Ok::<(), jacoflow::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Estimator {
+    engine: Engine,
+    method: Method,
+    common: Common,
+}
+
+#[derive(Debug)]
+enum Engine {
+    Instantaneous(Instantaneous),
+    Windowed(Windowed),
+    LucasKanade(LucasKanade),
+    HornSchunck(HornSchunck),
+}
+
+impl Estimator {
+    /// Checks the options and prepares the method.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option that cannot be used.
+    pub fn new(method: Method, common: Common) -> Result<Self> {
+        common.check()?;
+        let engine = match &method {
+            Method::Instantaneous(o) => Engine::Instantaneous(Instantaneous::new(o, &common)?),
+            Method::Windowed(o) => Engine::Windowed(Windowed::new(o, &common)?),
+            Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &common)?),
+            Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &common)?),
+        };
+        Ok(Self { engine, method, common })
+    }
+
+    /// The method with its options.
+    pub fn method(&self) -> &Method {
+        &self.method
+    }
+    /// The shared options.
+    pub fn common(&self) -> &Common {
+        &self.common
+    }
+
+    /// Frames that one field is estimated from: 3, or 2 for a baseline that differences a pair.
+    pub fn frames_needed(&self) -> usize {
+        match &self.engine {
+            Engine::Instantaneous(_) | Engine::Windowed(_) => 3,
+            Engine::LucasKanade(e) => e.frames_needed(),
+            Engine::HornSchunck(e) => e.frames_needed(),
+        }
+    }
+
+    /// Which of the frames the field belongs to, 0 being the oldest.
+    pub fn reference_frame(&self) -> usize {
+        match &self.engine {
+            Engine::Instantaneous(e) => e.frame(),
+            Engine::Windowed(e) => e.frame(),
+            Engine::LucasKanade(e) => e.frame(),
+            Engine::HornSchunck(e) => e.frame(),
+        }
+    }
+
+    /// The motion model: what the planes of the field are.
+    pub fn model(&self) -> ModelKind {
+        match &self.engine {
+            Engine::Instantaneous(e) => e.model(),
+            Engine::Windowed(_) => ModelKind::Affine,
+            Engine::LucasKanade(_) | Engine::HornSchunck(_) => ModelKind::Translational,
+        }
+    }
+
+    /// Flow at the sites, from [`Estimator::frames_needed`] frames, oldest first; the first of them is frame `first_index` of its sequence.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `frames` when their number or sizes are wrong or they are smaller than 3x3; naming `mask`, `region` or
+    /// `points` when those do not fit the frames.
+    pub fn estimate<T: SimdReal>(&self, frames: &[&Frame<T>], first_index: usize) -> Result<FlowField<T>> {
+        self.check(frames)?;
+        let mut field = FlowField::empty(self.layout(frames[0].size(), first_index), self.common.covariance)?;
+        self.fill(frames, &mut field)?;
+        Ok(field)
+    }
+
+    /// As [`Estimator::estimate`], into a field that an earlier call made: nothing is allocated when its size fits, else it is replaced.
+    ///
+    /// # Errors
+    /// As [`Estimator::estimate`]; the field's values are then unspecified.
+    pub fn estimate_into<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        first_index: usize,
+        field: &mut FlowField<T>,
+    ) -> Result<()> {
+        self.check(frames)?;
+        let layout = self.layout(frames[0].size(), first_index);
+        let shape = layout.sites.shape(layout.frame_size)?;
+        let (n, p) = (shape.0 * shape.1, layout.parameters.len());
+        let covariance = if self.common.covariance { Some(p * (p + 1) / 2 * n) } else { None };
+        let fits = (field.width, field.height) == shape
+            && field.motion.len() == p * n
+            && field.status.len() == n
+            && field.covariance.as_ref().map(Vec::len) == covariance;
+        if fits {
+            field.layout = layout;
+        } else {
+            *field = FlowField::empty(layout, self.common.covariance)?;
+        }
+        self.fill(frames, field)
+    }
+
+    fn layout(&self, frame_size: (usize, usize), first_index: usize) -> FieldLayout {
+        let model = self.model();
+        FieldLayout {
+            frame_size,
+            sites: self.common.sites.clone(),
+            model: model.name().into(),
+            parameters: model.parameters().iter().map(|p| p.name.to_string()).collect(),
+            frame_period: self.common.frame_period,
+            pixel_pitch: self.common.pixel_pitch,
+            frame_index: first_index + self.reference_frame(),
+        }
+    }
+
+    fn check<T: SimdReal>(&self, frames: &[&Frame<T>]) -> Result<()> {
+        let needed = self.frames_needed();
+        if frames.len() != needed {
+            return Err(Error::argument("frames", format!("{needed} frames"), format!("{} frames", frames.len())));
+        }
+        let (w, h) = frames[0].size();
+        if let Some(other) = frames.iter().find(|f| f.size() != (w, h)) {
+            let got = format!("one of {} x {}", other.width(), other.height());
+            return Err(Error::argument("frames", format!("frames of one size (the first is {w} x {h})"), got));
+        }
+        if w < 3 || h < 3 {
+            return Err(Error::argument("frames", "at least 3 x 3 pixels", format!("{w} x {h}")));
+        }
+        if let Some(mask) = self.common.mask.as_ref().filter(|m| m.size() != (w, h)) {
+            let got = format!("{} x {}", mask.width(), mask.height());
+            return Err(Error::argument("mask", format!("the size of the frames, {w} x {h}"), got));
+        }
+        Ok(())
+    }
+
+    fn fill<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
+        let n = field.len();
+        if self.common.diagnostics {
+            field.residual.get_or_insert_default().resize(n, T::nan());
+            field.condition.get_or_insert_default().resize(n, T::nan());
+            field.rank.get_or_insert_default().resize(n, 0);
+        } else {
+            (field.residual, field.condition, field.rank) = (None, None, None);
+        }
+        match (&self.engine, frames) {
+            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field)?,
+            (Engine::Instantaneous(_), _) => {}
+            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field)?,
+            (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.common, field)?,
+            (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.common, field)?,
+        }
+        if self.common.pixel_pitch != (1.0, 1.0) {
+            to_pitch(field, self.model().parameters(), self.common.pixel_pitch);
+        }
+        Ok(())
+    }
+}
+
+/// From px to units of the pixel pitch.
+fn to_pitch<T: SimdReal>(field: &mut FlowField<T>, parameters: &[Parameter], pitch: (f64, f64)) {
+    let n = field.len();
+    if n == 0 {
+        return;
+    }
+    let scale: Vec<f64> = parameters.iter().map(|p| p.scale(pitch)).collect();
+    let by = |plane: &mut [T], factor: f64| {
+        if factor != 1.0 {
+            plane.iter_mut().for_each(|v| *v *= T::from_f64(factor));
+        }
+    };
+    for (plane, &factor) in field.motion.chunks_mut(n).zip(&scale) {
+        by(plane, factor);
+    }
+    if let Some(covariance) = &mut field.covariance {
+        let pairs = (0..scale.len()).flat_map(|i| (i..scale.len()).map(move |j| (i, j)));
+        for (plane, (i, j)) in covariance.chunks_mut(n).zip(pairs) {
+            by(plane, scale[i] * scale[j]);
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Motion models: what the flow around a pixel is assumed to be, and the equations that follow.
+//!
+//! A new model is one file beside this one, with a type that implements [`MotionModel`], and one line in the
+//! registry below. The registry makes the [`ModelKind`], its name for the command line and Python, and runs the shared conformance tests on the model.
+
+mod conformance;
+
+use crate::error::{Error, Result};
+use crate::jet::JetRates;
+
+/// Along which axis a parameter is a velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// x, to the right.
+    X,
+    /// y, down.
+    Y,
+}
+
+/// What a parameter is the derivative with respect to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Per {
+    /// The flow itself.
+    Nothing,
+    /// Its derivative along x.
+    X,
+    /// Its derivative along y.
+    Y,
+    /// Its derivative in time.
+    Frame,
+}
+
+/// One unknown of a motion model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parameter {
+    /// Its name, such as `u_x`.
+    pub name: &'static str,
+    /// The component of the flow.
+    pub of: Axis,
+    /// The derivative taken.
+    pub per: Per,
+}
+
+impl Parameter {
+    /// A parameter called `name`.
+    pub const fn new(name: &'static str, of: Axis, per: Per) -> Self {
+        Self { name, of, per }
+    }
+
+    /// Its unit for a pixel pitch of 1 px.
+    pub fn unit(self) -> &'static str {
+        match self.per {
+            Per::Nothing => "px/frame",
+            Per::X | Per::Y => "1/frame",
+            Per::Frame => "px/frame^2",
+        }
+    }
+
+    /// Factor from px to units of the pixel pitch `(dx, dy)`.
+    pub fn scale(self, (dx, dy): (f64, f64)) -> f64 {
+        let length = match self.of {
+            Axis::X => dx,
+            Axis::Y => dy,
+        };
+        match self.per {
+            Per::Nothing | Per::Frame => length,
+            Per::X => length / dx,
+            Per::Y => length / dy,
+        }
+    }
+}
+
+/// A motion model with P unknowns, determined at a pixel by N linear equations in the jet and its time derivatives.
+pub trait MotionModel<const N: usize, const P: usize> {
+    /// Name on the command line and in Python.
+    const NAME: &'static str;
+    /// The unknowns, `u` and `v` first.
+    const PARAMETERS: [Parameter; P];
+
+    /// The equations `A m = b`. Each is linear in `(i, i', i'')`, coefficients and right side alike, so that noise can be propagated.
+    fn equations(rates: &JetRates<f64>) -> ([[f64; P]; N], [f64; N]);
+
+    /// The flow that the unknowns describe, at offset `(dx, dy)` px from the pixel and `t` frames from the estimate.
+    fn velocity(m: &[f64; P], dx: f64, dy: f64, t: f64) -> (f64, f64);
+}
+
+/// Declares the models: module, type, number of equations, number of unknowns.
+macro_rules! motion_models {
+    ($($(#[$doc:meta])* $module:ident => $model:ident($n:literal, $p:literal);)*) => {
+        $(mod $module; pub use $module::$model;)*
+
+        /// The motion models by name.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum ModelKind {
+            $($(#[$doc])* $model,)*
+        }
+
+        impl ModelKind {
+            /// Every model.
+            pub const ALL: &'static [Self] = &[$(Self::$model,)*];
+
+            /// The model's name, as [`ModelKind::parse`] takes it.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$model => <$model as MotionModel<$n, $p>>::NAME,)*
+                }
+            }
+
+            /// The model's unknowns, in the order of their planes.
+            pub fn parameters(self) -> &'static [Parameter] {
+                match self {
+                    $(Self::$model => &<$model as MotionModel<$n, $p>>::PARAMETERS,)*
+                }
+            }
+
+            /// Calls `visitor` with the model's type.
+            pub(super) fn visit<V: ModelVisitor>(self, visitor: V) -> V::Output {
+                match self {
+                    $(Self::$model => visitor.visit::<$model, $n, $p>(),)*
+                }
+            }
+        }
+
+        #[cfg(test)]
+        mod conform {
+            $(mod $module {
+                use crate::flow::model::{$model, conformance};
+                #[test]
+                fn parameters_are_what_their_names_say() {
+                    conformance::parameters::<$model, $n, $p>();
+                }
+                #[test]
+                fn truth_is_recovered_from_transported_brightness() {
+                    conformance::recovery::<$model, $n, $p>();
+                }
+                #[test]
+                fn equations_are_linear_in_the_jets() {
+                    conformance::linearity::<$model, $n, $p>();
+                }
+                #[test]
+                fn a_flat_patch_is_not_observable() {
+                    conformance::flat::<$model, $n, $p>();
+                }
+            })*
+        }
+    };
+}
+
+motion_models! {
+    /// Flow affine in space and constant in time (34): `u, v, u_x, v_x, u_y, v_y`.
+    affine => Affine(12, 6);
+    /// Flow constant in space and time (2): `u, v`.
+    translational => Translational(2, 2);
+    /// Flow constant in space and linear in time (36)-(39): `u, v, u_t, v_t`.
+    accelerating => Accelerating(6, 4);
+}
+
+/// Something done with a model's type, chosen at run time by [`ModelKind::visit`].
+pub(super) trait ModelVisitor {
+    /// What comes of it.
+    type Output;
+    /// Does it.
+    fn visit<M: MotionModel<N, P>, const N: usize, const P: usize>(self) -> Self::Output;
+}
+
+impl ModelKind {
+    /// The model called `name`.
+    ///
+    /// # Errors
+    /// [`Error::NotObservable`] for `affine_accelerating`: flow that varies in space and in time at once cannot be told from brightness (0071).
+    /// [`Error::Argument`] naming `model` for any other unknown word.
+    pub fn parse(name: &str) -> Result<Self> {
+        if matches!(name, "affine_accelerating" | "accelerating_affine" | "affine+accelerating") {
+            return Err(Error::NotObservable(format!(
+                "model: {name} assumes neither that the flow is constant in time nor that it is constant in space; brightness alone does not determine \
+                 such motion even in the basic case of uniform expansion (WO2010/098160, 0071). Choose affine (constant in time) or accelerating \
+                 (constant in space)"
+            )));
+        }
+        let found = Self::ALL.iter().copied().find(|m| m.name() == name);
+        found.ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|m| m.name()).collect();
+            Error::argument("model", format!("one of {}", names.join(", ")), name)
+        })
+    }
+}
+
+impl Default for ModelKind {
+    fn default() -> Self {
+        Self::Affine
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip_and_neither_assumption_is_refused_with_its_reason() {
+        for &model in ModelKind::ALL {
+            assert_eq!(ModelKind::parse(model.name()).unwrap(), model);
+            assert_eq!((model.parameters()[0].name, model.parameters()[1].name), ("u", "v"));
+        }
+        let refused = ModelKind::parse("affine_accelerating").unwrap_err();
+        assert!(matches!(refused, Error::NotObservable(_)) && refused.to_string().contains("0071"));
+        let unknown = ModelKind::parse("rigid").unwrap_err().to_string();
+        assert!(unknown.starts_with("model") && unknown.contains("accelerating") && unknown.contains("rigid"));
+    }
+
+    #[test]
+    fn parameters_scale_with_the_pixel_pitch() {
+        let scales: Vec<f64> = ModelKind::Affine.parameters().iter().map(|p| p.scale((2.0, 0.5))).collect();
+        assert_eq!(scales, [2.0, 0.5, 1.0, 0.25, 4.0, 1.0]);
+    }
+}

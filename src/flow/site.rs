@@ -1,0 +1,134 @@
+//! The sites of a field as independent bands, and the mask's share in their status.
+
+use crate::jet::Reach;
+use crate::parallel::BAND_ROWS;
+use crate::types::{FlowField, Mask, Sites, Status};
+use std::ops::Range;
+
+/// Points of one task, where the sites are a list. Fixed, like [`BAND_ROWS`].
+const BAND_POINTS: usize = 256;
+
+/// A run of consecutive sites with their share of every plane of the field.
+pub(super) struct FieldBand<'a, T> {
+    /// The sites, as indices into the field's planes.
+    pub sites: Range<usize>,
+    /// One slice a parameter.
+    pub motion: Vec<&'a mut [T]>,
+    /// One slice a pair of parameters, or none.
+    pub covariance: Vec<&'a mut [T]>,
+    /// Status.
+    pub status: &'a mut [Status],
+    /// Root mean square residual.
+    pub residual: Option<&'a mut [T]>,
+    /// Rank.
+    pub rank: Option<&'a mut [u8]>,
+    /// Condition number.
+    pub condition: Option<&'a mut [T]>,
+}
+
+/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), never depending on the number of threads.
+pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
+    let n = field.width * field.height;
+    if n == 0 {
+        return Vec::new();
+    }
+    let size = match field.layout.sites {
+        Sites::Points(_) => BAND_POINTS,
+        Sites::Grid { .. } => BAND_ROWS * field.width,
+    };
+    let mut motion: Vec<_> = field.motion.chunks_mut(n).map(|p| p.chunks_mut(size)).collect();
+    let mut covariance: Vec<_> =
+        field.covariance.iter_mut().flat_map(|c| c.chunks_mut(n)).map(|p| p.chunks_mut(size)).collect();
+    let mut status = field.status.chunks_mut(size);
+    let mut residual = field.residual.as_mut().map(|r| r.chunks_mut(size));
+    let mut rank = field.rank.as_mut().map(|r| r.chunks_mut(size));
+    let mut condition = field.condition.as_mut().map(|r| r.chunks_mut(size));
+    (0..n.div_ceil(size))
+        .map(|b| FieldBand {
+            sites: b * size..((b + 1) * size).min(n),
+            motion: motion.iter_mut().map(|c| c.next().unwrap_or_default()).collect(),
+            covariance: covariance.iter_mut().map(|c| c.next().unwrap_or_default()).collect(),
+            status: status.next().unwrap_or_default(),
+            residual: residual.as_mut().and_then(Iterator::next),
+            rank: rank.as_mut().and_then(Iterator::next),
+            condition: condition.as_mut().and_then(Iterator::next),
+        })
+        .collect()
+}
+
+/// Answers in constant time whether a rectangle of pixels holds a masked one.
+pub(super) struct MaskCounts {
+    width: usize,
+    /// Masked pixels above and to the left of each corner; `width + 1` values a row.
+    sums: Vec<u32>,
+}
+
+impl MaskCounts {
+    /// The running sums of the masked pixels.
+    pub fn new(mask: &Mask) -> Self {
+        let (width, height) = mask.size();
+        let stride = width + 1;
+        let mut sums = vec![0u32; stride * (height + 1)];
+        for y in 0..height {
+            let mut row = 0;
+            for x in 0..width {
+                row += u32::from(!mask.get(x, y));
+                sums[(y + 1) * stride + x + 1] = sums[y * stride + x + 1] + row;
+            }
+        }
+        Self { width, sums }
+    }
+
+    /// Whether any pixel within `reach` of `(x, y)` is masked. The reach must fit.
+    pub fn touches(&self, (x, y): (usize, usize), reach: Reach) -> bool {
+        let at = |x: usize, y: usize| self.sums[y * (self.width + 1) + x];
+        let (x0, x1) = (x - reach.left, x + reach.right + 1);
+        let (y0, y1) = (y - reach.up, y + reach.down + 1);
+        at(x1, y1) + at(x0, y0) != at(x0, y1) + at(x1, y0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{FieldLayout, Frame};
+
+    #[test]
+    fn mask_counts_see_exactly_the_rectangle() {
+        let mask = Frame::from_fn(9, 7, |x, y| (x, y) != (4, 3));
+        let counts = MaskCounts::new(&mask);
+        let reach = Reach { left: 1, right: 2, up: 0, down: 1 };
+        for y in 0..6usize {
+            for x in 1..7usize {
+                let want = (x - 1..=x + 2).contains(&4) && (y..=y + 1).contains(&3);
+                assert_eq!(counts.touches((x, y), reach), want, "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn bands_share_out_every_site_once() {
+        let points = Sites::Points((0..600).map(|k| (k % 40, k % 50)).collect());
+        for sites in [Sites::default(), points] {
+            let layout = FieldLayout {
+                frame_size: (40, 50),
+                sites,
+                model: "affine".into(),
+                parameters: vec!["u".into(), "v".into()],
+                frame_period: None,
+                pixel_pitch: (1.0, 1.0),
+                frame_index: 0,
+            };
+            let mut field = FlowField::<f32>::empty(layout, true).unwrap();
+            let n = field.len();
+            let mut seen = 0;
+            for band in bands(&mut field) {
+                assert_eq!(band.sites.start, seen);
+                seen = band.sites.end;
+                assert!(band.motion.iter().chain(&band.covariance).all(|p| p.len() == band.sites.len()));
+                assert_eq!((band.motion.len(), band.covariance.len(), band.status.len()), (2, 3, band.sites.len()));
+            }
+            assert_eq!(seen, n);
+        }
+    }
+}
