@@ -4,23 +4,35 @@
 //! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
 
 mod decode;
+mod field_format;
+mod field_npz;
 mod flo;
 mod flow_image;
 mod jpeg;
 mod kitti;
 mod npy;
 pub mod npz;
+mod numbered;
 mod pfm;
+mod picture_png;
+mod sink;
 mod source;
+mod table;
 pub mod write;
 
 pub use decode::read_image;
+pub use field_format::FieldFormat;
+pub use field_npz::{StoredField, read_npz, read_npz_from, write_npz, write_npz_to};
 pub use flo::{read_flo, write_flo};
 pub use flow_image::FlowImage;
 pub use kitti::{read_kitti, write_kitti};
 pub use npy::{Element, ElementType, NpyHeader};
+pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
+pub use picture_png::{write_frame_png, write_picture};
+pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, open_sink};
 pub use source::{
     Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, Y4mSource, kind_of,
     open,
 };
+pub use table::{FieldTable, TableWriter, cell};

@@ -1,0 +1,102 @@
+//! The formats a flow field can be written in: one variant and one arm each.
+
+use super::npy::Element;
+use super::{FloatMap, FlowImage, write_flo, write_kitti, write_npz, write_pfm};
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::FlowField;
+use std::path::Path;
+
+/// A file format for one flow field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FieldFormat {
+    /// Every plane and the metadata: [`write_npz`].
+    Npz,
+    /// Flow only, float32: [`write_flo`].
+    Flo,
+    /// Flow only, in steps of 1/64 px: [`write_kitti`].
+    Kitti,
+    /// Flow only, float32, as three planes u, v, 0: [`write_pfm`].
+    Pfm,
+}
+
+impl FieldFormat {
+    /// Every format.
+    pub const ALL: [Self; 4] = [Self::Npz, Self::Flo, Self::Kitti, Self::Pfm];
+
+    /// The format's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Npz => "npz",
+            Self::Flo => "flo",
+            Self::Kitti => "kitti",
+            Self::Pfm => "pfm",
+        }
+    }
+
+    /// Its files' extension.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Kitti => "png",
+            other => other.name(),
+        }
+    }
+
+    /// The format called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `format` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|f| f.name() == name)
+            .ok_or_else(|| Error::argument("format", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
+    }
+
+    /// Writes a field. `options` says how it was made, where the format has room for it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a field of points in a format of pictures; [`Error::Io`] with the path.
+    pub fn write<T: Real + Element>(self, path: impl AsRef<Path>, field: &FlowField<T>, options: &str) -> Result<()> {
+        match self {
+            Self::Npz => write_npz(path, field, options),
+            Self::Flo => write_flo(path, &FlowImage::from_field(field)?),
+            Self::Kitti => write_kitti(path, &FlowImage::from_field(field)?),
+            Self::Pfm => {
+                let flow = FlowImage::from_field(field)?;
+                let planes = vec![flow.u().to_vec(), flow.v().to_vec(), vec![0.0; flow.u().len()]];
+                write_pfm(path, &FloatMap { width: flow.width(), height: flow.height(), planes })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::field_npz::tests::numbered;
+    use super::super::{read_flo, read_kitti, read_npz, read_pfm};
+    use super::*;
+    use crate::types::Sites;
+
+    #[test]
+    fn every_format_holds_the_flow() {
+        let folder = tempfile::tempdir().unwrap();
+        let field = numbered(Sites::default());
+        for format in FieldFormat::ALL {
+            assert_eq!(FieldFormat::parse(format.name()).unwrap(), format);
+            let path = folder.path().join(format!("{}.{}", format.name(), format.extension()));
+            format.write(&path, &field, "").unwrap();
+            let v: Vec<f32> = match format {
+                FieldFormat::Npz => read_npz::<f32>(&path).unwrap().field.plane("v").unwrap().to_vec(),
+                FieldFormat::Flo => read_flo(&path).unwrap().v().to_vec(),
+                FieldFormat::Kitti => read_kitti(&path).unwrap().v().to_vec(),
+                FieldFormat::Pfm => read_pfm(&path).unwrap().planes[1].clone(),
+            };
+            assert_eq!(v, field.plane("v").unwrap(), "{format:?}");
+        }
+        assert!(FieldFormat::parse("gif").unwrap_err().to_string().contains("npz, flo, kitti, pfm"));
+        assert!(
+            FieldFormat::Flo.write(folder.path().join("p.flo"), &numbered(Sites::Points(vec![(0, 0)])), "").is_err()
+        );
+    }
+}

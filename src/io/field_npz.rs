@@ -1,0 +1,381 @@
+//! A flow field as `.npz`: every plane, and what it means as JSON.
+//!
+//! | array | shape | content |
+//! |---|---|---|
+//! | `motion` | (P, H, W) | parameter planes, in the order of `parameters` in the metadata |
+//! | `flow` | (H, W, 2) | (u, v), for convenience |
+//! | `jacobian` | (H, W, 2, 2) | [[u_x, u_y], [v_x, v_y]], for convenience; 0 for parameters that the model lacks |
+//! | `status` | (H, W) uint8 | codes, spelled out in the metadata |
+//! | `covariance` | (P (P + 1) / 2, H, W) | upper triangle, row by row; if asked for |
+//! | `residual`, `rank`, `condition` | (H, W) | if the estimator gives them |
+//! | `points` | (N, 2) int64 | pixels (x, y) of the sites, if they are points (then H = 1, W = N) |
+//! | `metadata` | text | JSON: model, parameters, units, sites, frame, library version, options |
+
+use super::npy::Element;
+use super::npz::{NpzReader, NpzWriter};
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FieldLayout, FlowField, Rect, Sites, Status};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, Write};
+use std::path::Path;
+
+/// The JSON text `metadata`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Metadata {
+    /// What the file is: `jacoflow.field` (one) or `jacoflow.stack` (with a leading axis of frames).
+    pub(super) format: String,
+    /// Version of this layout.
+    version: u32,
+    /// Library and version that wrote it.
+    library: String,
+    model: String,
+    parameters: Vec<String>,
+    /// Unit of each parameter.
+    units: Vec<String>,
+    frame_size: [usize; 2],
+    frame_index: usize,
+    /// Seconds between frames, if known.
+    frame_period: Option<f64>,
+    pixel_pitch: [f64; 2],
+    /// Upper left corner and size `[x, y, width, height]` of the region; absent: the whole frame, or points.
+    region: Option<[usize; 4]>,
+    /// Distance between sites, px; absent: the sites are in `points`.
+    stride: Option<usize>,
+    /// Words for the status codes.
+    statuses: BTreeMap<u8, String>,
+    /// How the field was made, in the caller's words.
+    options: String,
+}
+
+/// Highest layout version this library reads.
+const VERSION: u32 = 1;
+const FORMAT: &str = "jacoflow.field";
+
+impl Metadata {
+    pub(super) fn new(layout: &FieldLayout, options: &str) -> Self {
+        let (region, stride) = match &layout.sites {
+            Sites::Grid { region, stride } => (region.map(|r| [r.x, r.y, r.width, r.height]), Some(*stride)),
+            Sites::Points(_) => (None, None),
+        };
+        Self {
+            format: FORMAT.into(),
+            version: VERSION,
+            library: concat!("jacoflow ", env!("CARGO_PKG_VERSION")).into(),
+            model: layout.model.clone(),
+            parameters: layout.parameters.clone(),
+            units: layout.parameters.iter().map(|p| unit(p, layout.pixel_pitch).into()).collect(),
+            frame_size: [layout.frame_size.0, layout.frame_size.1],
+            frame_index: layout.frame_index,
+            frame_period: layout.frame_period,
+            pixel_pitch: [layout.pixel_pitch.0, layout.pixel_pitch.1],
+            region,
+            stride,
+            statuses: Status::ALL.iter().map(|s| (*s as u8, s.name().into())).collect(),
+            options: options.into(),
+        }
+    }
+
+    pub(super) fn to_json(&self, path: &Path) -> Result<String> {
+        serde_json::to_string(self).map_err(|e| Error::format(path, e.to_string()))
+    }
+
+    fn layout(&self, points: Option<Vec<(usize, usize)>>) -> FieldLayout {
+        let region = self.region.map(|[x, y, width, height]| Rect { x, y, width, height });
+        FieldLayout {
+            frame_size: (self.frame_size[0], self.frame_size[1]),
+            sites: match (points, self.stride) {
+                (Some(points), _) => Sites::Points(points),
+                (None, stride) => Sites::Grid { region, stride: stride.unwrap_or(1) },
+            },
+            model: self.model.clone(),
+            parameters: self.parameters.clone(),
+            frame_period: self.frame_period,
+            pixel_pitch: (self.pixel_pitch[0], self.pixel_pitch[1]),
+            frame_index: self.frame_index,
+        }
+    }
+}
+
+/// Unit of a parameter: velocities per frame, derivatives per frame, accelerations per frame squared.
+fn unit(parameter: &str, pitch: (f64, f64)) -> &'static str {
+    let physical = pitch != (1.0, 1.0);
+    match parameter {
+        "u" | "v" if physical => "pitch unit/frame",
+        "u" | "v" => "px/frame",
+        "u_t" | "v_t" if physical => "pitch unit/frame^2",
+        "u_t" | "v_t" => "px/frame^2",
+        _ => "1/frame",
+    }
+}
+
+/// A field as it came from a file, with what was said about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredField<T> {
+    /// The field.
+    pub field: FlowField<T>,
+    /// How it was made, in the writer's words.
+    pub options: String,
+    /// Library and version that wrote it.
+    pub library: String,
+}
+
+/// Writes a field, with `options` (free text, by custom JSON) saying how it was made.
+///
+/// # Errors
+/// [`Error::Io`] with the path.
+pub fn write_npz<T: Real + Element>(path: impl AsRef<Path>, field: &FlowField<T>, options: &str) -> Result<()> {
+    let path = path.as_ref();
+    let mut npz = NpzWriter::create(path)?;
+    write_arrays(&mut npz, path, field, options)?;
+    npz.finish()
+}
+
+/// As [`write_npz`], into any seekable place; `name` stands for it in messages.
+///
+/// # Errors
+/// [`Error::Io`] with the name.
+pub fn write_npz_to<T: Real + Element, W: Write + Seek>(
+    place: W,
+    name: impl AsRef<Path>,
+    field: &FlowField<T>,
+    options: &str,
+) -> Result<W> {
+    let mut npz = NpzWriter::new(place, &name);
+    write_arrays(&mut npz, name.as_ref(), field, options)?;
+    npz.into_inner()
+}
+
+fn write_arrays<T: Real + Element, W: Write + Seek>(
+    npz: &mut NpzWriter<W>,
+    path: &Path,
+    field: &FlowField<T>,
+    options: &str,
+) -> Result<()> {
+    let (w, h, p) = (field.width, field.height, field.layout.parameters.len());
+    npz.text("metadata", &Metadata::new(&field.layout, options).to_json(path)?)?;
+    npz.array("motion", &[p, h, w], &field.motion)?;
+    npz.array("flow", &[h, w, 2], &interleaved(field, &["u", "v"]))?;
+    npz.array("jacobian", &[h, w, 2, 2], &interleaved(field, &["u_x", "u_y", "v_x", "v_y"]))?;
+    npz.array("status", &[h, w], &status_codes(field))?;
+    if let Some(covariance) = &field.covariance {
+        npz.array("covariance", &[p * (p + 1) / 2, h, w], covariance)?;
+    }
+    if let Some(residual) = &field.residual {
+        npz.array("residual", &[h, w], residual)?;
+    }
+    if let Some(rank) = &field.rank {
+        npz.array("rank", &[h, w], rank)?;
+    }
+    if let Some(condition) = &field.condition {
+        npz.array("condition", &[h, w], condition)?;
+    }
+    if let Sites::Points(points) = &field.layout.sites {
+        let pairs: Vec<i64> = points.iter().flat_map(|&(x, y)| [x as i64, y as i64]).collect();
+        npz.array("points", &[points.len(), 2], &pairs)?;
+    }
+    Ok(())
+}
+
+/// The planes called `names`, interleaved site by site. Where the estimate is missing so are the parameters that the model assumes zero.
+pub(super) fn interleaved<T: Real>(field: &FlowField<T>, names: &[&str]) -> Vec<T> {
+    let planes: Vec<Option<&[T]>> = names.iter().map(|name| field.plane(name)).collect();
+    let mut out = Vec::with_capacity(names.len() * field.len());
+    for i in 0..field.len() {
+        let absent = if field.motion[i].finite() { T::from_f64(0.0) } else { T::nan() };
+        out.extend(planes.iter().map(|plane| plane.map_or(absent, |p| p[i])));
+    }
+    out
+}
+
+pub(super) fn status_codes<T>(field: &FlowField<T>) -> Vec<u8> {
+    field.status.iter().map(|s| *s as u8).collect()
+}
+
+/// Reads a field, in working precision.
+///
+/// # Errors
+/// [`Error::Io`] when it cannot be read; [`Error::Format`] when it is no such file, damaged, or its arrays do not fit together.
+pub fn read_npz<T: Real>(path: impl AsRef<Path>) -> Result<StoredField<T>> {
+    read_npz_from(&mut NpzReader::open(path)?)
+}
+
+/// As [`read_npz`], from an open archive.
+///
+/// # Errors
+/// As [`read_npz`].
+pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<StoredField<T>> {
+    let text = npz.text("metadata")?;
+    let metadata: Metadata =
+        serde_json::from_str(&text).map_err(|e| npz.wrong("metadata", &format!("is not that of a flow field: {e}")))?;
+    if metadata.format != FORMAT || metadata.version > VERSION {
+        let what = format!(
+            "is of format {} version {}; expected {FORMAT} up to version {VERSION}",
+            metadata.format, metadata.version
+        );
+        return Err(npz.wrong("metadata", &what));
+    }
+    let points = if metadata.stride.is_none() { Some(read_points(npz)?) } else { None };
+    let layout = metadata.layout(points);
+    let (width, height) = layout.sites.shape(layout.frame_size).map_err(|e| npz.wrong("metadata", &e.to_string()))?;
+    let shape = Shape { p: layout.parameters.len(), width, height };
+    let codes = npz.array::<u8>("status")?;
+    shape.check(npz, "status", &codes.shape, None)?;
+    let status: Option<Vec<Status>> = codes.values.iter().map(|&c| Status::from_code(c)).collect();
+    let field = FlowField {
+        motion: shape.planes(npz, "motion", Some(shape.p))?,
+        covariance: if npz.contains("covariance") {
+            Some(shape.planes(npz, "covariance", Some(shape.p * (shape.p + 1) / 2))?)
+        } else {
+            None
+        },
+        residual: if npz.contains("residual") { Some(shape.planes(npz, "residual", None)?) } else { None },
+        condition: if npz.contains("condition") { Some(shape.planes(npz, "condition", None)?) } else { None },
+        rank: if npz.contains("rank") { Some(shape.ranks(npz)?) } else { None },
+        status: status.ok_or_else(|| npz.wrong("status", "holds an unknown code"))?,
+        width,
+        height,
+        layout,
+    };
+    Ok(StoredField { field, options: metadata.options, library: metadata.library })
+}
+
+fn read_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<Vec<(usize, usize)>> {
+    let points = npz.array::<i64>("points")?;
+    if points.shape.len() != 2 || points.shape[1] != 2 {
+        return Err(npz.wrong("points", &format!("has shape {:?}, expected (N, 2)", points.shape)));
+    }
+    let pair = |p: &[i64]| Some((usize::try_from(p[0]).ok()?, usize::try_from(p[1]).ok()?));
+    let points: Option<_> = points.values.chunks_exact(2).map(pair).collect();
+    points.ok_or_else(|| npz.wrong("points", "holds a negative coordinate"))
+}
+
+/// What the arrays of a field must measure.
+#[derive(Clone, Copy)]
+struct Shape {
+    p: usize,
+    width: usize,
+    height: usize,
+}
+
+impl Shape {
+    fn check<R: Read + Seek>(self, npz: &NpzReader<R>, name: &str, got: &[usize], planes: Option<usize>) -> Result<()> {
+        let wanted: Vec<usize> = planes.into_iter().chain([self.height, self.width]).collect();
+        if got == wanted { Ok(()) } else { Err(npz.wrong(name, &format!("has shape {got:?}, expected {wanted:?}"))) }
+    }
+
+    fn planes<T: Real, R: Read + Seek>(
+        self,
+        npz: &mut NpzReader<R>,
+        name: &str,
+        planes: Option<usize>,
+    ) -> Result<Vec<T>> {
+        let array = npz.real_array::<T>(name)?;
+        self.check(npz, name, &array.shape, planes)?;
+        Ok(array.values)
+    }
+
+    fn ranks<R: Read + Seek>(self, npz: &mut NpzReader<R>) -> Result<Vec<u8>> {
+        let array = npz.array::<u8>("rank")?;
+        self.check(npz, "rank", &array.shape, None)?;
+        Ok(array.values)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    /// A field with a distinct number everywhere and every optional plane.
+    pub(in crate::io) fn numbered(sites: Sites) -> FlowField<f32> {
+        let layout = FieldLayout {
+            frame_size: (7, 5),
+            sites,
+            model: "affine".into(),
+            parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: Some(0.04),
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 3,
+        };
+        let mut field = FlowField::empty(layout, true).unwrap();
+        let n = field.len();
+        field.motion = (0..6 * n).map(|i| i as f32).collect();
+        field.covariance = Some((0..21 * n).map(|i| 0.5 * i as f32).collect());
+        field.residual = Some(vec![0.25; n]);
+        field.condition = Some(vec![9.0; n]);
+        field.rank = Some(vec![6; n]);
+        field.status = vec![Status::Ok; n];
+        field.status[n - 1] = Status::MinNorm;
+        field
+    }
+
+    fn stored(field: &FlowField<f32>) -> NpzReader<Cursor<Vec<u8>>> {
+        let bytes = write_npz_to(Cursor::new(Vec::new()), "x.npz", field, "{\"method\":\"windowed\"}").unwrap();
+        NpzReader::new(bytes, "x.npz").unwrap()
+    }
+
+    #[test]
+    fn every_plane_and_the_layout_come_back() {
+        let region = Some(Rect { x: 1, y: 0, width: 5, height: 5 });
+        for sites in [
+            Sites::default(),
+            Sites::Grid { region, stride: 2 },
+            Sites::Points(vec![(6, 4), (0, 0), (3, 2)]),
+            Sites::Points(vec![]),
+        ] {
+            if matches!(&sites, Sites::Points(p) if p.is_empty()) {
+                let field = FlowField::<f32>::empty(numbered(Sites::default()).layout, false).unwrap();
+                let mut layout = field.layout.clone();
+                layout.sites = sites;
+                let empty = FlowField::<f32>::empty(layout, false).unwrap();
+                assert_eq!(read_npz_from::<f32, _>(&mut stored(&empty)).unwrap().field, empty);
+                continue;
+            }
+            let field = numbered(sites);
+            let back = read_npz_from::<f32, _>(&mut stored(&field)).unwrap();
+            assert_eq!(back.field, field);
+            assert!(back.options.contains("windowed") && back.library.starts_with("jacoflow "));
+            let wide = read_npz_from::<f64, _>(&mut stored(&field)).unwrap().field;
+            assert_eq!(wide.motion[5], 5.0);
+        }
+    }
+
+    #[test]
+    fn flow_and_jacobian_are_arranged_for_numpy() {
+        let mut npz = stored(&numbered(Sites::default()));
+        let n = 35.0;
+        assert_eq!(npz.array::<f32>("flow").unwrap().values[2..4], [1.0, n + 1.0]);
+        let jacobian = npz.array::<f32>("jacobian").unwrap();
+        assert_eq!(jacobian.shape, [5, 7, 2, 2]);
+        assert_eq!(jacobian.values[..4], [2.0 * n, 4.0 * n, 3.0 * n, 5.0 * n], "u_x, u_y, v_x, v_y");
+        assert!(npz.text("metadata").unwrap().contains("\"min_norm\""));
+    }
+
+    #[test]
+    fn parameters_that_the_model_lacks_are_zero_but_not_where_there_is_no_estimate() {
+        let mut layout = numbered(Sites::default()).layout;
+        (layout.model, layout.parameters) = ("translational".into(), vec!["u".into(), "v".into()]);
+        let mut field = FlowField::<f32>::empty(layout, false).unwrap();
+        (field.motion[1], field.motion[36]) = (2.0, 3.0);
+        let jacobian = interleaved(&field, &["u_x", "u_y"]);
+        assert!(jacobian[0].is_nan() && jacobian[2..4] == [0.0, 0.0]);
+    }
+
+    #[test]
+    fn arrays_that_do_not_fit_are_refused() {
+        let field = numbered(Sites::default());
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+        npz.text("metadata", &Metadata::new(&field.layout, "").to_json(Path::new("x")).unwrap()).unwrap();
+        npz.array("status", &[5, 7], &[0u8; 35]).unwrap();
+        npz.array("motion", &[6, 7, 5], &field.motion).unwrap();
+        let mut npz = NpzReader::new(npz.into_inner().unwrap(), "x").unwrap();
+        let message = read_npz_from::<f32, _>(&mut npz).unwrap_err().to_string();
+        assert!(message.contains("'motion'") && message.contains("[6, 5, 7]"), "{message}");
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+        npz.text("metadata", "{}").unwrap();
+        let mut npz = NpzReader::new(npz.into_inner().unwrap(), "x").unwrap();
+        assert!(matches!(read_npz_from::<f32, _>(&mut npz), Err(Error::Format { .. })));
+    }
+}

@@ -1,0 +1,92 @@
+//! Pictures and frames as PNG, whole or not at all.
+
+use super::write::atomic;
+use crate::error::{Error, Result};
+use crate::image::picture::Picture;
+use crate::types::AnyFrame;
+use std::path::Path;
+
+/// Writes a picture as an 8-bit RGB PNG.
+///
+/// # Errors
+/// [`Error::Argument`] named `picture` for an empty one; [`Error::Io`] with the path.
+pub fn write_picture(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
+    let size = (picture.width(), picture.height());
+    write_png(path.as_ref(), size, png::ColorType::Rgb, png::BitDepth::Eight, picture.data())
+}
+
+/// Writes a frame as a grey PNG: 8 bit for uint8, 16 bit for uint16.
+///
+/// # Errors
+/// [`Error::Type`] named `frame` for float samples, which PNG cannot hold; [`Error::Argument`] for an empty frame; [`Error::Io`] with the path.
+pub fn write_frame_png(path: impl AsRef<Path>, frame: &AnyFrame) -> Result<()> {
+    let path = path.as_ref();
+    match frame {
+        AnyFrame::U8(f) => write_png(path, f.size(), png::ColorType::Grayscale, png::BitDepth::Eight, f.data()),
+        AnyFrame::U16(f) => {
+            let bytes: Vec<u8> = f.data().iter().flat_map(|s| s.to_be_bytes()).collect();
+            write_png(path, f.size(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+        }
+        AnyFrame::F32(_) | AnyFrame::F64(_) => Err(Error::Type {
+            argument: "frame",
+            expected: "uint8 or uint16 samples for PNG (floats go to .npy)".into(),
+            got: frame.dtype().into(),
+        }),
+    }
+}
+
+fn write_png(
+    path: &Path,
+    (width, height): (usize, usize),
+    colour: png::ColorType,
+    depth: png::BitDepth,
+    bytes: &[u8],
+) -> Result<()> {
+    let sides = (u32::try_from(width).ok().filter(|w| *w > 0), u32::try_from(height).ok().filter(|h| *h > 0));
+    let (Some(w), Some(h)) = sides else {
+        return Err(Error::argument("picture", "at least one pixel", format!("{width} x {height}")));
+    };
+    atomic(path, |file| {
+        let mut encoder = png::Encoder::new(file, w, h);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        encoder.set_compression(png::Compression::Fast);
+        let written = encoder.write_header().and_then(|mut png| {
+            png.write_image_data(bytes)?;
+            png.finish()
+        });
+        written.map_err(|e| Error::io(path, e.into()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Colour, read_image};
+    use super::*;
+    use crate::types::Frame;
+
+    #[test]
+    fn frames_and_pictures_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        for frame in [
+            AnyFrame::U8(Frame::from_fn(5, 3, |x, y| (40 * x + y) as u8)),
+            AnyFrame::U16(Frame::from_fn(5, 3, |x, y| (9000 * x + y) as u16)),
+        ] {
+            write_frame_png(&path, &frame).unwrap();
+            assert_eq!(read_image(&path, Colour::Error).unwrap(), frame);
+        }
+        write_picture(&path, &Picture::filled(2, 1, [255, 0, 0])).unwrap();
+        assert_eq!(read_image(&path, Colour::Luminance).unwrap(), AnyFrame::U8(Frame::filled(2, 1, 76)));
+    }
+
+    #[test]
+    fn what_png_cannot_hold_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let error = write_frame_png(&path, &AnyFrame::F32(Frame::filled(2, 2, 0.5))).unwrap_err();
+        assert!(matches!(error, Error::Type { argument: "frame", .. }));
+        assert!(write_picture(&path, &Picture::filled(0, 3, [0; 3])).is_err());
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,131 @@
+//! Where frames go: one file for each kind of sink and one line in [`KINDS`].
+
+mod npy;
+mod png;
+mod y4m;
+
+pub use npy::NpySink;
+pub use png::PngSink;
+pub use y4m::Y4mSink;
+
+use crate::error::{Error, Result};
+use crate::types::AnyFrame;
+
+/// Takes grey frames, one at a time, all of one size and sample type.
+pub trait FrameSink: Send {
+    /// Adds a frame.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] or [`Error::Type`] named `frame` for a frame unlike the first or of a type that the format cannot hold; [`Error::Io`] with the path.
+    fn write(&mut self, frame: &AnyFrame) -> Result<()>;
+
+    /// Ends the sequence; files of several frames get their name only now.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the rest cannot be written.
+    fn finish(self: Box<Self>) -> Result<()>;
+}
+
+/// A kind of sink: which specifications it takes and how it is opened, with the frame rate (frames per second).
+struct Kind {
+    accepts: fn(&str) -> bool,
+    open: fn(&str, f64) -> Result<Box<dyn FrameSink>>,
+}
+
+/// Every kind of sink; the first that accepts a specification opens it.
+const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, png::KIND];
+
+/// Opens a frame sink by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for numbered PNG files.
+///
+/// # Errors
+/// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or `output` for an extension that no sink has.
+pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
+    if !(frame_rate > 0.0 && frame_rate.is_finite()) {
+        return Err(Error::argument("frame_rate", "a positive number of frames per second", frame_rate));
+    }
+    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec));
+    let kind = kind.ok_or_else(|| {
+        Error::argument("output", "a folder (for PNG files), *.npy, *.y4m or - for Y4M on standard output", spec)
+    })?;
+    (kind.open)(spec, frame_rate)
+}
+
+/// What every later frame must be like.
+#[derive(Debug, Default)]
+struct Uniform(Option<((usize, usize), &'static str)>);
+
+impl Uniform {
+    /// Whether this is the first frame; an error for one unlike the first.
+    fn check(&mut self, frame: &AnyFrame) -> Result<bool> {
+        let this = (frame.size(), frame.dtype());
+        match self.0 {
+            None => {
+                self.0 = Some(this);
+                Ok(true)
+            }
+            Some(first) if first == this => Ok(false),
+            Some(((w, h), dtype)) => {
+                let got = format!("{} x {} {}", this.0.0, this.0.1, this.1);
+                Err(Error::argument("frame", format!("{w} x {h} {dtype}, as the first"), got))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{OpenOptions, open};
+    use super::*;
+    use crate::types::Frame;
+
+    fn frames(n: usize) -> Vec<AnyFrame> {
+        (0..n).map(|i| AnyFrame::U8(Frame::from_fn(5, 3, |x, y| (40 * i + 10 * y + x) as u8))).collect()
+    }
+
+    fn written(spec: &str, frames: &[AnyFrame]) -> Result<Vec<AnyFrame>> {
+        let mut sink = open_sink(spec, 29.97)?;
+        for frame in frames {
+            sink.write(frame)?;
+        }
+        sink.finish()?;
+        let mut source = open(spec, &OpenOptions::default())?;
+        let mut back = Vec::new();
+        while let Some(frame) = source.next_frame()? {
+            back.push(frame);
+        }
+        Ok(back)
+    }
+
+    #[test]
+    fn every_sink_is_read_back_by_its_source() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep: Vec<_> =
+            (0..3).map(|i| AnyFrame::U16(Frame::from_fn(5, 3, |x, y| (9000 * i + 10 * y + x) as u16))).collect();
+        for (name, i) in [("a.y4m", 0), ("a.npy", 1), ("pictures", 2)] {
+            let spec = folder.path().join(name).to_string_lossy().into_owned();
+            assert_eq!(written(&spec, &frames(3)).unwrap(), frames(3), "{name}");
+            if i > 0 {
+                assert_eq!(written(&spec, &deep).unwrap(), deep, "{name}");
+            }
+        }
+        let float = vec![AnyFrame::F64(Frame::filled(2, 2, 0.5)); 2];
+        let spec = folder.path().join("f.npy").to_string_lossy().into_owned();
+        assert_eq!(written(&spec, &float).unwrap(), float);
+        let spec = folder.path().join("d.y4m").to_string_lossy().into_owned();
+        assert_eq!(written(&spec, &deep).unwrap(), deep);
+    }
+
+    #[test]
+    fn unlike_frames_and_unknown_outputs_are_refused_and_leave_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.y4m", "a.npy"] {
+            let spec = folder.path().join(name).to_string_lossy().into_owned();
+            let mut mixed = frames(2);
+            mixed.push(AnyFrame::U8(Frame::filled(3, 5, 0)));
+            assert!(written(&spec, &mixed).unwrap_err().to_string().contains("3 x 5"), "{name}");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(open_sink("a.avi", 25.0).err().unwrap().to_string().starts_with("output"));
+        assert!(open_sink("-", 0.0).err().unwrap().to_string().starts_with("frame_rate"));
+    }
+}

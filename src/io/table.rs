@@ -1,0 +1,224 @@
+//! Tables as CSV, written row by row.
+
+use super::write::AtomicFile;
+use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FieldLayout, FlowField};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A CSV table with a header (RFC 4180, lines end in `\n`): to a file, which appears under its name when the table is finished, or to standard output.
+pub struct TableWriter {
+    csv: csv::Writer<Target>,
+    path: PathBuf,
+    columns: usize,
+}
+
+/// Where the rows go.
+enum Target {
+    File(AtomicFile),
+    Stream(Box<dyn Write + Send>),
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Stream(stream) => stream.write(bytes),
+        }
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Stream(stream) => stream.flush(),
+        }
+    }
+}
+
+impl std::fmt::Debug for TableWriter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TableWriter").field("path", &self.path).field("columns", &self.columns).finish_non_exhaustive()
+    }
+}
+
+impl TableWriter {
+    /// Begins a table in a file, or on standard output for `-`.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`].
+    pub fn create<S: AsRef<str>>(path: impl AsRef<Path>, header: &[S]) -> Result<Self> {
+        let path = path.as_ref();
+        if path == Path::new("-") {
+            return Self::begin(Target::Stream(Box::new(std::io::stdout())), "standard output".into(), header);
+        }
+        Self::begin(Target::File(AtomicFile::create(path)?), path.to_path_buf(), header)
+    }
+
+    /// Begins a table on any stream; `name` stands for it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the header cannot be written.
+    pub fn on_stream<S: AsRef<str>>(stream: Box<dyn Write + Send>, name: &str, header: &[S]) -> Result<Self> {
+        Self::begin(Target::Stream(stream), name.into(), header)
+    }
+
+    fn begin<S: AsRef<str>>(target: Target, path: PathBuf, header: &[S]) -> Result<Self> {
+        let csv = csv::WriterBuilder::new().flexible(true).from_writer(target);
+        let mut table = Self { csv, path, columns: header.len() };
+        table.row(header.iter().map(AsRef::as_ref))?;
+        Ok(table)
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `row` for another number of cells than the header has; [`Error::Io`] when it cannot be written.
+    pub fn row<S: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = S>) -> Result<()> {
+        let cells: Vec<S> = cells.into_iter().collect();
+        if cells.len() != self.columns {
+            return Err(Error::argument("row", format!("{} cells", self.columns), cells.len()));
+        }
+        self.csv.write_record(cells.iter().map(|c| c.as_ref().as_bytes())).map_err(|e| Error::io(&self.path, e.into()))
+    }
+
+    /// Pushes the rows so far to where they go: for a reader that follows a stream.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when they cannot be written.
+    pub fn flush(&mut self) -> Result<()> {
+        self.csv.flush().map_err(|e| Error::io(&self.path, e))
+    }
+
+    /// Ends the table and gives the file its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the rest cannot be written.
+    pub fn finish(self) -> Result<()> {
+        let target =
+            self.csv.into_inner().map_err(|e| Error::io(&self.path, std::io::Error::from(e.error().kind())))?;
+        match target {
+            Target::File(file) => file.commit(),
+            Target::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
+        }
+    }
+}
+
+/// A number as a table cell: the shortest digits that read back as the same value; `nan`, `inf` and `-inf` in words that numpy and pandas read.
+pub fn cell<T: Real>(value: T) -> String {
+    let wide = value.to_f64();
+    if wide.is_nan() { "nan".into() } else { value.to_string() }
+}
+
+/// One row a site: frame, x, y, status, the motion parameters, and the standard deviation of each where the field has covariance.
+#[derive(Debug)]
+pub struct FieldTable {
+    table: TableWriter,
+    covariance: bool,
+    parameters: usize,
+}
+
+impl FieldTable {
+    /// Begins a table for fields of this layout.
+    ///
+    /// # Errors
+    /// As [`TableWriter::create`].
+    pub fn create(path: impl AsRef<Path>, layout: &FieldLayout, covariance: bool) -> Result<Self> {
+        let mut header: Vec<String> = ["frame", "x", "y", "status"].map(String::from).to_vec();
+        header.extend(layout.parameters.iter().cloned());
+        if covariance {
+            header.extend(layout.parameters.iter().map(|p| format!("std_{p}")));
+        }
+        Ok(Self { table: TableWriter::create(path, &header)?, covariance, parameters: layout.parameters.len() })
+    }
+
+    /// Adds the sites of a field, in their order.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] when the field has other columns than the table; [`Error::Io`] when the rows cannot be written.
+    pub fn write<T: Real>(&mut self, field: &FlowField<T>) -> Result<()> {
+        let (n, p) = (field.len(), field.layout.parameters.len());
+        if p != self.parameters || field.covariance.is_some() != self.covariance {
+            return Err(Error::argument(
+                "field",
+                "the columns that the table began with",
+                "another model or covariance",
+            ));
+        }
+        let frame = field.layout.frame_index.to_string();
+        let mut cells: Vec<String> = Vec::new();
+        for i in 0..n {
+            let (x, y) = field.layout.sites.pixel(i % field.width, i / field.width);
+            cells.clear();
+            cells.extend([frame.clone(), x.to_string(), y.to_string(), field.status[i].name().to_string()]);
+            cells.extend((0..p).map(|k| cell(field.motion[k * n + i])));
+            if let Some(covariance) = &field.covariance {
+                // Plane of the variance (k, k) in the upper triangle, row by row.
+                let plane = |k: usize| k * p - k * k.saturating_sub(1) / 2;
+                cells.extend((0..p).map(|k| cell(covariance[plane(k) * n + i].to_f64().sqrt())));
+            }
+            self.table.row(&cells)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the table and gives the file its name.
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn finish(self) -> Result<()> {
+        self.table.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::field_npz::tests::numbered;
+    use super::*;
+    use crate::types::{Sites, Status};
+
+    #[test]
+    fn cells_are_quoted_where_needed_and_the_file_appears_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut table = TableWriter::create(&path, &["name", "value"]).unwrap();
+        table.row(["a, b", "1"]).unwrap();
+        assert!(table.row(["only one"]).unwrap_err().to_string().starts_with("row"));
+        table.flush().unwrap();
+        assert!(!path.exists());
+        table.finish().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "name,value\n\"a, b\",1\n");
+        drop(TableWriter::create(folder.path().join("b.csv"), &["x"]).unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn numbers_read_back_exactly() {
+        assert_eq!([cell(0.1f32), cell(0.1f64), cell(1e-20f64)].map(|c| c.parse::<f64>().unwrap()), [0.1, 0.1, 1e-20]);
+        assert_eq!([cell(f32::NAN), cell(f64::INFINITY), cell(-f32::INFINITY)], ["nan", "inf", "-inf"]);
+    }
+
+    #[test]
+    fn a_field_gives_a_row_a_site() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut field = numbered(Sites::Points(vec![(6, 4), (1, 2)]));
+        field.status[1] = Status::Unobservable;
+        field.motion[1] = f32::NAN;
+        let mut table = FieldTable::create(&path, &field.layout, true).unwrap();
+        table.write(&field).unwrap();
+        field.covariance = None;
+        assert!(table.write(&field).unwrap_err().to_string().starts_with("field"));
+        table.finish().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        assert_eq!(lines.len(), 3);
+        assert_eq!(lines[0][..6], ["frame", "x", "y", "status", "u", "v"]);
+        assert_eq!(lines[0][10..12], ["std_u", "std_v"]);
+        assert_eq!(lines[1][..6], ["3", "6", "4", "ok", "0", "2"]);
+        assert_eq!(lines[2][..5], ["3", "1", "2", "unobservable", "nan"]);
+        // Variances are planes 0, 6, 11, 15, 18, 20 of the triangle; plane k at site 0 holds k.
+        for (column, plane) in [(10, 0.0f64), (11, 6.0), (12, 11.0), (13, 15.0), (14, 18.0), (15, 20.0)] {
+            assert!((lines[1][column].parse::<f64>().unwrap() - plane.sqrt()).abs() < 1e-12);
+        }
+    }
+}
