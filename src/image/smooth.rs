@@ -157,7 +157,7 @@ impl<T: SimdReal> BandConvolution<'_, T> {
         let (radius, half) = (kernel.radius(), kernel.half.as_slice());
         let row = |y: usize| &input[y * width..(y + 1) * width];
         let mut scratch = vec![T::from_f64(0.0); width + 2 * radius];
-        let mut pairs: Vec<(&[T], &[T])> = Vec::with_capacity(radius);
+        let mut pairs: Vec<RowPair<'_, T>> = Vec::with_capacity(radius);
         for (offset, out) in output.chunks_exact_mut(width).enumerate() {
             let y = first_row + offset;
             pairs.clear();
@@ -171,6 +171,9 @@ impl<T: SimdReal> BandConvolution<'_, T> {
         }
     }
 }
+
+/// The rows at equal distance above and below.
+type RowPair<'a, T> = (&'a [T], &'a [T]);
 
 /// Fills the `radius` samples before and after the `width` samples in the middle of `row`.
 #[inline(always)]
@@ -206,7 +209,7 @@ macro_rules! cover {
 #[inline(always)]
 fn sum_down<V: Lanes>(
     centre: &[V::Scalar],
-    pairs: &[(&[V::Scalar], &[V::Scalar])],
+    pairs: &[RowPair<'_, V::Scalar>],
     half: &[V::Scalar],
     out: &mut [V::Scalar],
 ) {

@@ -46,13 +46,11 @@ pub fn read_image(path: impl AsRef<Path>, colour: Colour) -> Result<AnyFrame> {
     if is_tiff(path)? {
         let mut pages = TiffPages::open(path, colour)?;
         let first = pages.next_page()?.ok_or_else(|| Error::format(path, "holds no picture"))?;
-        return match pages.at_end() {
-            true => Ok(first),
-            false => Err(Error::format(
-                path,
-                "holds several pages; expected one picture a file (or open this file by itself, as a sequence)",
-            )),
-        };
+        if pages.at_end() {
+            return Ok(first);
+        }
+        let message = "holds several pages; expected one picture a file (or open this file by itself, as a sequence)";
+        return Err(Error::format(path, message));
     }
     read_one_picture(path, colour)
 }

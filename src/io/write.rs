@@ -155,7 +155,7 @@ mod tests {
         let path = folder.path().join("out.bin");
         fs::write(&path, b"old").unwrap();
         let result: Result<()> = atomic(&path, |file| {
-            file.write_all(&[0; 100_000]).unwrap();
+            file.write_all(&vec![0; 100_000]).unwrap();
             Err(Error::Interrupted)
         });
         assert!(matches!(result, Err(Error::Interrupted)));

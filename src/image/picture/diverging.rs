@@ -58,7 +58,7 @@ impl SignedMap {
 
 /// Colour of a value in units of the range.
 fn colour(value: f64) -> Rgb {
-    let place = (value.clamp(-1.0, 1.0) + 1.0) / 2.0 * (STOPS.len() - 1) as f64;
+    let place = (1.0 + value.clamp(-1.0, 1.0)) * (STOPS.len() / 2) as f64;
     let first = (place as usize).min(STOPS.len() - 2);
     let part = place - first as f64;
     let (a, b) = (STOPS[first], STOPS[first + 1]);

@@ -23,7 +23,7 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>> {
         .map_err(|e| Error::argument("frames", "a pattern of * ? [..] **", format!("{pattern} ({e})")))?;
     let mut found = Vec::new();
     for path in paths {
-        let path = path.map_err(|e| Error::io(e.path().to_path_buf(), std::io::Error::from(e.error().kind())))?;
+        let path = path.map_err(|e| Error::io(e.path(), std::io::Error::from(e.error().kind())))?;
         if has_extension(&path, EXTENSIONS) && path.is_file() {
             found.push(path);
         }

@@ -69,7 +69,7 @@ mod tests {
         fn selects_as_an_iterator_does(n in 0usize..20, first in 0usize..25, step in 1usize..6, limit in proptest::option::of(0usize..10)) {
             let frames: Vec<_> = (0..n).map(|i| AnyFrame::U8(Frame::filled(1, 1, i as u8))).collect();
             let want: Vec<_> = frames.iter().skip(first).step_by(step).take(limit.unwrap_or(usize::MAX)).cloned().collect();
-            let options = OpenOptions { first, step, limit, ..OpenOptions::default() };
+            let options = OpenOptions { first, limit, step, ..OpenOptions::default() };
             let mut source = Selected::new(MemorySource::new(frames).unwrap().with_frame_rate(30.0), &options).unwrap();
             prop_assert_eq!(source.len_hint(), Some(want.len()));
             prop_assert_eq!(source.frame_rate(), Some(30.0 / step as f64));
