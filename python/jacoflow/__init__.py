@@ -2,29 +2,55 @@
 
 Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow (u, v) is in px/frame along (x, y); the Jacobian
 is [[u_x, u_y], [v_x, v_y]] in 1/frame.
+
+>>> import jacoflow
+>>> frames = jacoflow.scenes.Scene("affine", width=96, height=64).frames(3)
+>>> field = jacoflow.estimate(frames)
+>>> field.shape
+(1, 64, 96)
 """
 
 from . import filters, scenes
 from ._jacoflow import (
+    FlowEstimator,
     FlowField,
+    FlowFilter,
     FormatError,
     JacoflowError,
     MissingDependencyError,
     NotObservableError,
     NumericalError,
     __version__,
+    estimate,
+    luminance,
+    quantise,
+    quantities,
+    smooth,
 )
+from ._observability import Condition, Observability, ObservabilityMap, classify, observability
 from .status import Status
 
 __all__ = [
+    "Condition",
+    "FlowEstimator",
     "FlowField",
+    "FlowFilter",
     "FormatError",
     "JacoflowError",
     "MissingDependencyError",
     "NotObservableError",
     "NumericalError",
+    "Observability",
+    "ObservabilityMap",
     "Status",
     "__version__",
+    "classify",
+    "estimate",
     "filters",
+    "luminance",
+    "observability",
+    "quantise",
+    "quantities",
     "scenes",
+    "smooth",
 ]

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::types::{AnyFrame, Frame, Mask, Sample};
-use numpy::ndarray::{ArrayView, IntoDimension};
+use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -18,12 +18,10 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bou
             "{argument}: expected a plain array, got a masked one; pass `frame.data` and the option mask=~frame.mask"
         )));
     }
-    let array = match object.cast::<PyUntypedArray>() {
-        Ok(array) => array.clone(),
-        Err(_) => {
-            let asarray = py.import("numpy")?.getattr("asarray")?;
-            asarray.call1((object,))?.cast_into::<PyUntypedArray>()?
-        }
+    let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
+        array.clone()
+    } else {
+        py.import("numpy")?.getattr("asarray")?.call1((object,))?.cast_into::<PyUntypedArray>()?
     };
     if array.getattr("flags")?.getattr("aligned")?.extract::<bool>()? {
         return Ok(array);
@@ -78,18 +76,11 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> P
     let shape = array.shape().to_vec();
     match shape[..] {
         [height, width] => {
-            fn build<T: Sample + Element>(
-                array: &Bound<'_, PyUntypedArray>,
-                (w, h): (usize, usize),
-                wrap: fn(Frame<T>) -> AnyFrame,
-            ) -> Option<PyResult<AnyFrame>> {
-                Some(Frame::new(w, h, elements::<T>(array)?).map(wrap).map_err(PyErr::from))
-            }
             let size = (width, height);
-            build(&array, size, AnyFrame::U8)
-                .or_else(|| build(&array, size, AnyFrame::U16))
-                .or_else(|| build(&array, size, AnyFrame::F32))
-                .or_else(|| build(&array, size, AnyFrame::F64))
+            grey::<u8>(&array, size)
+                .or_else(|| grey::<u16>(&array, size))
+                .or_else(|| grey::<f32>(&array, size))
+                .or_else(|| grey::<f64>(&array, size))
                 .unwrap_or_else(|| Err(wrong_dtype(argument, &array)))
         }
         [height, width, channels @ (3 | 4)] if colour == ColourRule::Luminance => {
@@ -108,14 +99,37 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> P
     }
 }
 
+/// A sample type that [`AnyFrame`] knows.
+trait Wrapped: Sized {
+    fn wrap(frame: Frame<Self>) -> AnyFrame;
+}
+macro_rules! wrapped {
+    ($($t:ty => $variant:ident),*) => {$(
+        impl Wrapped for $t {
+            fn wrap(frame: Frame<Self>) -> AnyFrame {
+                AnyFrame::$variant(frame)
+            }
+        }
+    )*};
+}
+wrapped!(u8 => U8, u16 => U16, f32 => F32, f64 => F64);
+
+/// A frame of samples `T`; `None` where the array holds another type.
+fn grey<T: Element + Copy + Wrapped>(
+    array: &Bound<'_, PyUntypedArray>,
+    (width, height): (usize, usize),
+) -> Option<PyResult<AnyFrame>> {
+    Some(Frame::new(width, height, elements::<T>(array)?).map(T::wrap).map_err(PyErr::from))
+}
+
 /// An interleaved colour frame as luminance.
-fn luminance<T: Sample + Element>(
+fn luminance<T: Sample + Element + Wrapped>(
     array: &Bound<'_, PyUntypedArray>,
     (width, height): (usize, usize),
     channels: usize,
 ) -> Option<PyResult<AnyFrame>> {
-    let _ = (elements::<T>(array)?, width, height, channels);
-    None
+    let grey = crate::image::luminance(width, height, channels, &elements::<T>(array)?);
+    Some(grey.map(T::wrap).map_err(PyErr::from))
 }
 
 /// What came as `frames`: a stack along the first axis, or a list or tuple of separate frames.
@@ -239,7 +253,6 @@ pub fn view<'py, T: Element>(
     if shape.contains(&0) {
         return Ok(PyArray::<T, _>::zeros(owner.py(), shape.into_dimension(), false).into_any());
     }
-    use numpy::ndarray::ShapeBuilder;
     let layout = shape.into_dimension().strides(strides.into_dimension());
     let array = ArrayView::from_shape(layout, data).map_err(|e| PyValueError::new_err(e.to_string()))?;
     // SAFETY: callers pass memory owned by the frozen Python object `owner`, which never reallocates or frees it while it lives;

@@ -1,10 +1,19 @@
 //! The Python binding: convert, detach from the interpreter, call, wrap.
+#![allow(clippy::needless_pass_by_value, reason = "Python hands arguments over by value")]
+#![allow(clippy::too_many_arguments, reason = "keyword options of Python functions")]
+#![allow(clippy::type_complexity, reason = "what __reduce__ must return")]
 
 mod arrays;
 mod command;
 mod errors;
+mod estimate;
 mod field;
 mod filters;
+mod flow_filter;
+mod image;
+mod observability;
+mod options;
+mod progress;
 mod scenes;
 
 use pyo3::prelude::*;
@@ -17,13 +26,21 @@ mod _jacoflow {
     #[pymodule_export]
     use super::errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError};
     #[pymodule_export]
-    use super::field::{FlowField, restore_field};
+    use super::estimate::{FlowEstimator, estimate, restore_estimator};
+    #[pymodule_export]
+    use super::field::{FlowField, quantities, restore_field};
     #[pymodule_export]
     use super::filters::{
         ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter,
         restore_extended, restore_kalman, restore_unscented,
     };
 
+    #[pymodule_export]
+    use super::flow_filter::FlowFilter;
+    #[pymodule_export]
+    use super::image::{luminance, quantise, smooth};
+    #[pymodule_export]
+    use super::observability::{classify, observability};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
 

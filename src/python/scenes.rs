@@ -18,14 +18,13 @@ use pyo3::types::{PyDict, PyTuple};
 pub struct Scene {
     kind: String,
     options: SceneOptions,
-    scene: Box<dyn CoreScene>,
+    core: Box<dyn CoreScene>,
 }
 
 #[pymethods]
 impl Scene {
     #[new]
     #[pyo3(signature = (name, *, width=None, height=None, origin=None, seed=None, carrier=None, **parameters))]
-    #[allow(clippy::too_many_arguments)]
     fn new(
         name: String,
         width: Option<usize>,
@@ -47,8 +46,8 @@ impl Scene {
             carrier,
             values,
         };
-        let scene = build(&name, &options)?;
-        Ok(Self { kind: name, options, scene })
+        let core = build(&name, &options)?;
+        Ok(Self { kind: name, options, core })
     }
 
     /// Name of the scene (no unit).
@@ -60,29 +59,29 @@ impl Scene {
     /// Size (width, height) of the frames, px.
     #[getter]
     fn size(&self) -> (usize, usize) {
-        self.scene.size()
+        self.core.size()
     }
 
     /// Scene point (x, y) of pixel (0, 0), px.
     #[getter]
     fn origin(&self) -> (f64, f64) {
-        self.scene.origin()
+        self.core.origin()
     }
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped.
     fn frame<'py>(&self, py: Python<'py>, t: f64) -> PyResult<Bound<'py, PyAny>> {
-        let frame = py.detach(|| Threads::default().install(|| self.scene.frame(t)));
+        let frame = py.detach(|| Threads::default().install(|| self.core.frame(t)));
         arrays::from_frame(py, frame)
     }
 
     /// Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
     #[pyo3(signature = (count, start=0.0))]
     fn frames<'py>(&self, py: Python<'py>, count: usize, start: f64) -> PyResult<Bound<'py, PyAny>> {
-        let (width, height) = self.scene.size();
+        let (width, height) = self.core.size();
         let mut data = Vec::new();
         for index in 0..count {
             py.check_signals()?;
-            let frame = py.detach(|| Threads::default().install(|| self.scene.frame(start + index as f64)));
+            let frame = py.detach(|| Threads::default().install(|| self.core.frame(start + index as f64)));
             data.extend(frame.into_data());
         }
         Ok(arrays::owned(py, &[count, height, width], data)?.into_any())
@@ -92,17 +91,17 @@ impl Scene {
     ///
     /// Status MASKED and NaN where the scene has no single truth.
     fn truth(&self, py: Python<'_>, t: f64) -> PyResult<FlowField> {
-        Ok(FlowField::single(py.detach(|| truth(self.scene.as_ref(), t))?))
+        Ok(FlowField::single(py.detach(|| truth(self.core.as_ref(), t))?))
     }
 
     /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth.
     fn motion<'py>(&self, py: Python<'py>, x: f64, y: f64, t: f64) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let motion = self.scene.motion(x, y, t);
+        let motion = self.core.motion(x, y, t);
         motion.map(|m| Ok(arrays::owned(py, &[6], m.to_array().to_vec())?.into_any())).transpose()
     }
 
     fn __repr__(&self) -> String {
-        let (width, height) = self.scene.size();
+        let (width, height) = self.core.size();
         format!("Scene({:?}, width={width}, height={height}, seed={})", self.kind, self.options.seed)
     }
 

@@ -95,6 +95,14 @@ impl<T: Real> FlowField<T> {
         }
         if m[0].finite() { AffineFlow::from_array(m) } else { AffineFlow::from_array([T::nan(); 6]) }
     }
+    /// Standard deviation of the parameter called `name` at every site: the root of its variance. `None` without covariance or such a parameter.
+    pub fn standard_deviation(&self, name: &str) -> Option<Vec<T>> {
+        let (planes, n, p) = (self.covariance.as_ref()?, self.len(), self.layout.parameters.len());
+        let k = self.layout.parameters.iter().position(|q| q == name)?;
+        // Row k of the upper triangle begins after k rows of p, p - 1, ... planes.
+        let plane = k * p - k * k.saturating_sub(1) / 2;
+        Some(planes[plane * n..(plane + 1) * n].iter().map(|v| T::from_f64(v.to_f64().sqrt())).collect())
+    }
     /// The six planes `u, v, u_x, v_x, u_y, v_y`, one after the other; parameters that the model lacks are zero where the flow is
     /// known and NaN elsewhere.
     pub fn affine_planes(&self) -> Vec<T> {
@@ -166,5 +174,8 @@ mod tests {
         assert_eq!((planes[4], planes[6 + 4], planes[12 + 4]), (1.0, 2.0, 0.0));
         assert!(planes[12].is_nan());
         assert_eq!(matrices[4 * 36 + 1], 0.5);
+        field.covariance.as_mut().unwrap()[2 * 6 + 4] = 9.0;
+        assert_eq!(field.standard_deviation("v").unwrap()[4], 3.0);
+        assert!(field.standard_deviation("u_x").is_none());
     }
 }

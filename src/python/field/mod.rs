@@ -1,5 +1,6 @@
 //! `FlowField`: flow, Jacobian, covariance and status of one frame or of a stack, as arrays that share the core's memory.
 
+mod derived;
 mod packed;
 mod properties;
 mod state;
@@ -12,6 +13,7 @@ use numpy::Element;
 use pyo3::prelude::*;
 use std::sync::Arc;
 
+pub use derived::quantities;
 pub use packed::Packed;
 pub use state::restore_field;
 

@@ -37,10 +37,10 @@ fn on_rows(
 impl ExtendedKalmanFilter {
     #[new]
     #[pyo3(signature = (dim_x, dim_z, *, batch=None))]
-    fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> PyResult<(Self, GaussianFilter)> {
+    fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> PyResult<PyClassInitializer<Self>> {
         let core = Core::new(batch.unwrap_or(1), dim_x, dim_z)?;
         let base = GaussianFilter::new(py, &core.state, batch)?;
-        Ok((Self { core: Mutex::new(core) }, base))
+        Ok(PyClassInitializer::from(base).add_subclass(Self { core: Mutex::new(core) }))
     }
 
     /// x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B, ...), in the state's units.

@@ -41,12 +41,16 @@ impl KalmanFilter {
 impl KalmanFilter {
     #[new]
     #[pyo3(signature = (dim_x, dim_z, *, batch=None))]
-    fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> PyResult<(Self, GaussianFilter)> {
+    fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> PyResult<PyClassInitializer<Self>> {
         let core = Core::new(batch.unwrap_or(1), dim_x, dim_z)?;
         let base = GaussianFilter::new(py, &core.state, batch)?;
         let f = arrays::owned(py, &[dim_x, dim_x], core.F.clone())?.into_any().unbind();
         let h = arrays::owned(py, &[dim_z, dim_x], core.H.clone())?.into_any().unbind();
-        Ok((Self { core: Mutex::new(core), f: Mutex::new(f), h: Mutex::new(h) }, base))
+        Ok(PyClassInitializer::from(base).add_subclass(Self {
+            core: Mutex::new(core),
+            f: Mutex::new(f),
+            h: Mutex::new(h),
+        }))
     }
 
     /// Transition matrix, array (n, n) or (B, n, n), in the state's units; identity at first.

@@ -31,7 +31,6 @@ pub struct UnscentedKalmanFilter {
 impl UnscentedKalmanFilter {
     #[new]
     #[pyo3(signature = (dim_x, dim_z, dt, hx, fx, points, *, batch=None, augmented=false, redraw=true))]
-    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         dim_x: usize,
@@ -43,7 +42,7 @@ impl UnscentedKalmanFilter {
         batch: Option<usize>,
         augmented: bool,
         redraw: bool,
-    ) -> PyResult<(Self, GaussianFilter)> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         if points.n != dim_x {
             let expected = format!("sigma points of dim_x = {dim_x} dimensions");
             return Err(Error::argument("points", expected, format!("{} dimensions", points.n)).into());
@@ -51,7 +50,14 @@ impl UnscentedKalmanFilter {
         let mut core = Core::new(batch.unwrap_or(1), dim_x, dim_z, points.points)?;
         core.redraw = redraw;
         let base = GaussianFilter::new(py, &core.state, batch)?;
-        Ok((Self { core: Mutex::new(core), fx: Mutex::new(fx), hx: Mutex::new(hx), points, dt, augmented }, base))
+        Ok(PyClassInitializer::from(base).add_subclass(Self {
+            core: Mutex::new(core),
+            fx: Mutex::new(fx),
+            hx: Mutex::new(hx),
+            points,
+            dt,
+            augmented,
+        }))
     }
 
     /// Transition function (points, dt) -> points, on arrays (..., n) in the state's units.

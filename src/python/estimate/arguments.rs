@@ -1,0 +1,209 @@
+//! What `estimate` and `FlowEstimator` are told, and the core options that it means.
+
+use crate::error::{Error, Result};
+use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
+use crate::flow::instantaneous::InstantaneousOptions;
+use crate::flow::model::ModelKind;
+use crate::flow::windowed::WindowedOptions;
+use crate::flow::{Common, Estimator, Method, RankPolicy};
+use crate::image::Preprocess;
+use crate::jet::{Neighbourhood, TimeScheme};
+use crate::python::arrays::{self, ColourRule};
+use crate::python::image::renamed;
+use crate::python::options::{self, Object, Precision};
+use pyo3::prelude::*;
+
+/// The keyword options, as a dictionary when pickled.
+#[derive(FromPyObject, IntoPyObject)]
+#[pyo3(from_item_all)]
+pub struct Arguments {
+    pub method: String,
+    pub model: String,
+    pub time_scheme: Option<String>,
+    pub neighbourhood: Object,
+    pub neighbourhood_sigma: Option<f64>,
+    pub window_sigma: Option<f64>,
+    pub rows: Option<String>,
+    pub smoothness: Option<f64>,
+    pub iterations: Option<i64>,
+    pub rank_deficient: String,
+    pub smooth: Option<f64>,
+    pub quantise: Option<f64>,
+    pub colour: Option<String>,
+    pub points: Object,
+    pub region: Option<(i64, i64, i64, i64)>,
+    pub stride: Option<i64>,
+    pub mask: Object,
+    pub fps: Option<f64>,
+    pub frame_period: Option<f64>,
+    pub pixel_pitch: Object,
+    pub covariance: bool,
+    pub diagnostics: bool,
+    pub noise: Option<f64>,
+    pub precision: Option<String>,
+    pub threads: Option<i64>,
+    pub simd: Option<String>,
+}
+
+/// Everything that a sequence of frames goes through.
+pub struct Plan {
+    pub estimator: Estimator,
+    pub preprocess: Preprocess,
+    pub colour: ColourRule,
+    pub precision: Precision,
+}
+
+impl Arguments {
+    /// With copies of the arrays, safe from later changes.
+    pub fn keep(mut self, py: Python<'_>) -> PyResult<Self> {
+        self.neighbourhood = options::keep(py, self.neighbourhood)?;
+        self.points = options::keep(py, self.points)?;
+        self.mask = options::keep(py, self.mask)?;
+        Ok(self)
+    }
+
+    /// The same options again.
+    pub fn copy(&self, py: Python<'_>) -> Self {
+        let object = |object: &Object| object.as_ref().map(|o| o.clone_ref(py));
+        Self {
+            method: self.method.clone(),
+            model: self.model.clone(),
+            time_scheme: self.time_scheme.clone(),
+            neighbourhood: object(&self.neighbourhood),
+            rows: self.rows.clone(),
+            rank_deficient: self.rank_deficient.clone(),
+            colour: self.colour.clone(),
+            points: object(&self.points),
+            mask: object(&self.mask),
+            pixel_pitch: object(&self.pixel_pitch),
+            precision: self.precision.clone(),
+            simd: self.simd.clone(),
+            ..*self
+        }
+    }
+
+    /// The core's options; errors name the arguments as Python knows them.
+    pub fn plan(&self, py: Python<'_>) -> PyResult<Plan> {
+        let common = self.common(py)?;
+        let method = self.method(py)?;
+        let estimator = Estimator::new(method, common).map_err(|e| renamed(e, "sigma", "window_sigma"))?;
+        Ok(Plan {
+            estimator,
+            preprocess: options::preprocess(self.smooth, self.quantise)?,
+            colour: ColourRule::parse(self.colour.as_deref())?,
+            precision: Precision::parse(self.precision.as_deref())?,
+        })
+    }
+
+    /// Whether the method can make do with two frames.
+    pub fn takes_pairs(&self) -> bool {
+        matches!(Method::parse(&self.method), Ok(Method::LucasKanade(_) | Method::HornSchunck(_)))
+    }
+
+    fn common(&self, py: Python<'_>) -> PyResult<Common> {
+        let default = Common::default();
+        Ok(Common {
+            sites: options::sites(py, &self.points, self.region, self.stride)?,
+            mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
+            pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
+            frame_period: options::frame_period(self.fps, self.frame_period)?,
+            covariance: self.covariance,
+            diagnostics: self.diagnostics,
+            noise: self.noise,
+            threads: options::threads(self.threads)?,
+            simd: options::simd(self.simd.as_deref())?,
+        })
+    }
+
+    fn method(&self, py: Python<'_>) -> PyResult<Method> {
+        let mut method = Method::parse(&self.method)?;
+        let fit = |default: &Neighbourhood| {
+            options::neighbourhood(py, &self.neighbourhood, self.neighbourhood_sigma, default)
+        };
+        match &mut method {
+            Method::Instantaneous(o) => self.instantaneous(o, fit(&Neighbourhood::default())?)?,
+            Method::Windowed(o) => self.windowed(o, fit(&Neighbourhood::default())?)?,
+            Method::LucasKanade(o) => self.lucas_kanade(o)?,
+            Method::HornSchunck(o) => self.horn_schunck(o)?,
+        }
+        Ok(method)
+    }
+
+    fn instantaneous(&self, o: &mut InstantaneousOptions, neighbourhood: Neighbourhood) -> Result<()> {
+        self.refuse(&["window_sigma", "rows", "smoothness", "iterations"])?;
+        o.model = ModelKind::parse(&self.model)?;
+        o.neighbourhood = neighbourhood;
+        o.scheme = self.scheme(o.scheme)?;
+        o.rank_deficient = RankPolicy::parse(&self.rank_deficient)?;
+        Ok(())
+    }
+
+    fn windowed(&self, o: &mut WindowedOptions, _neighbourhood: Neighbourhood) -> Result<()> {
+        self.refuse(&["smoothness", "iterations", "rank_deficient"])?;
+        self.expect_model("affine")?;
+        //D o.neighbourhood = neighbourhood;
+        o.scheme = self.scheme(o.scheme)?;
+        o.sigma = self.window_sigma.unwrap_or(o.sigma);
+        //D o.rows = self.rows.as_deref().map_or(Ok(o.rows), RowSet::parse)?;
+        // Smoothing correlates the noise of neighbouring pixels; the covariance must know.
+        //D o.already_smoothed = self.smooth.filter(|&sigma| sigma > 0.0);
+        Ok(())
+    }
+
+    fn lucas_kanade(&self, o: &mut LucasKanadeOptions) -> Result<()> {
+        self.refuse(&["neighbourhood", "rows", "smoothness", "iterations", "rank_deficient"])?;
+        self.expect_model("translational")?;
+        o.window = self.window_sigma.map_or(o.window, Window::Gaussian);
+        o.differences = self.differences(o.differences)?;
+        Ok(())
+    }
+
+    fn horn_schunck(&self, o: &mut HornSchunckOptions) -> Result<()> {
+        self.refuse(&["neighbourhood", "window_sigma", "rows", "rank_deficient"])?;
+        self.expect_model("translational")?;
+        o.smoothness = self.smoothness.map_or(o.smoothness, Smoothness::Absolute);
+        if let Some(iterations) = self.iterations {
+            let count = usize::try_from(iterations).ok().filter(|&n| n > 0);
+            o.iterations = count.ok_or_else(|| Error::argument("iterations", "a positive integer", iterations))?;
+        }
+        o.differences = self.differences(o.differences)?;
+        Ok(())
+    }
+
+    fn scheme(&self, default: TimeScheme) -> Result<TimeScheme> {
+        let named = self.time_scheme.as_deref().map_or(Ok(default), TimeScheme::parse);
+        named.map_err(|e| renamed(e, "scheme", "time_scheme"))
+    }
+
+    fn differences(&self, default: Differences) -> Result<Differences> {
+        let named = self.time_scheme.as_deref().map_or(Ok(default), Differences::parse);
+        named.map_err(|e| renamed(e, "differences", "time_scheme"))
+    }
+
+    /// Baselines and the windowed method have one model each; "affine" is also what everybody gets who does not choose.
+    fn expect_model(&self, only: &str) -> Result<()> {
+        ModelKind::parse(&self.model)?;
+        if self.model == only || self.model == ModelKind::default().name() {
+            return Ok(());
+        }
+        Err(Error::argument("model", format!("{only:?} for method {:?}", self.method), format!("{:?}", self.model)))
+    }
+
+    /// Options that the method does not have must not have been given.
+    fn refuse(&self, names: &[&'static str]) -> Result<()> {
+        for &name in names {
+            let given = match name {
+                "neighbourhood" => self.neighbourhood.is_some() || self.neighbourhood_sigma.is_some(),
+                "window_sigma" => self.window_sigma.is_some(),
+                "rows" => self.rows.is_some(),
+                "smoothness" => self.smoothness.is_some(),
+                "iterations" => self.iterations.is_some(),
+                _ => self.rank_deficient != RankPolicy::default().name(),
+            };
+            if given {
+                return Err(Error::argument(name, format!("nothing for method {:?}", self.method), "a value"));
+            }
+        }
+        Ok(())
+    }
+}

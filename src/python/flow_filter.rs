@@ -1,0 +1,366 @@
+//! `FlowFilter`: flow filtered in time.
+
+use super::arrays::{self, ColourRule};
+use super::field::FlowField;
+use super::options::{self, Object, Precision};
+use crate::error::Error;
+use crate::filter::SigmaPoints;
+use crate::image::Preprocess;
+use crate::simd::SimdReal;
+use crate::temporal::{FilterForm, FlowFilter as Core, FlowFilterOptions, Transition};
+use crate::types::{AnyFrame, Frame, Sample, Sites};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// The keyword options, as a dictionary when pickled.
+#[derive(FromPyObject, IntoPyObject)]
+#[pyo3(from_item_all)]
+#[allow(non_snake_case)]
+pub struct Arguments {
+    profile: String,
+    form: Option<String>,
+    transition: Option<String>,
+    neighbourhood: Object,
+    neighbourhood_sigma: Option<f64>,
+    Q: Object,
+    R: Option<f64>,
+    x0: Object,
+    P0: Object,
+    alpha: Option<f64>,
+    beta: Option<f64>,
+    kappa: Option<f64>,
+    full_scale: Option<f64>,
+    smooth: Option<f64>,
+    quantise: Option<f64>,
+    colour: Option<String>,
+    points: Object,
+    region: Option<(i64, i64, i64, i64)>,
+    stride: Option<i64>,
+    mask: Object,
+    fps: Option<f64>,
+    frame_period: Option<f64>,
+    pixel_pitch: Object,
+    covariance: bool,
+    precision: Option<String>,
+    threads: Option<i64>,
+    simd: Option<String>,
+}
+
+/// Twelve numbers, one for each component of the state.
+fn twelve(py: Python<'_>, name: &'static str, value: &Object, default: [f64; 12]) -> PyResult<[f64; 12]> {
+    let Some(value) = value else { return Ok(default) };
+    let (shape, values) = arrays::doubles(name, value.bind(py))?;
+    values
+        .try_into()
+        .map_err(|_| Error::argument(name, "twelve numbers, shape (12,)", format!("shape {shape:?}")).into())
+}
+
+impl Arguments {
+    fn keep(mut self, py: Python<'_>) -> PyResult<Self> {
+        let kept = [&mut self.neighbourhood, &mut self.Q, &mut self.x0, &mut self.P0, &mut self.points, &mut self.mask];
+        for object in kept {
+            *object = options::keep(py, object.take())?;
+        }
+        Ok(self)
+    }
+
+    fn copy(&self, py: Python<'_>) -> Self {
+        let object = |object: &Object| object.as_ref().map(|o| o.clone_ref(py));
+        Self {
+            profile: self.profile.clone(),
+            form: self.form.clone(),
+            transition: self.transition.clone(),
+            neighbourhood: object(&self.neighbourhood),
+            Q: object(&self.Q),
+            x0: object(&self.x0),
+            P0: object(&self.P0),
+            colour: self.colour.clone(),
+            points: object(&self.points),
+            mask: object(&self.mask),
+            pixel_pitch: object(&self.pixel_pitch),
+            precision: self.precision.clone(),
+            simd: self.simd.clone(),
+            ..*self
+        }
+    }
+
+    /// The core's options; `full_scale` stays that of the profile unless it was given.
+    fn options(&self, py: Python<'_>) -> PyResult<FlowFilterOptions> {
+        let base = match self.profile.as_str() {
+            "patent" => FlowFilterOptions::patent(),
+            "measured" => FlowFilterOptions::measured(),
+            other => {
+                let expected = "\"patent\" or \"measured\"";
+                return Err(Error::argument("profile", expected, format!("{other:?}")).into());
+            }
+        };
+        let points = base.sigma_points;
+        Ok(FlowFilterOptions {
+            neighbourhood: options::neighbourhood(
+                py,
+                &self.neighbourhood,
+                self.neighbourhood_sigma,
+                &base.neighbourhood,
+            )?,
+            form: self.form.as_deref().map_or(Ok(base.form), FilterForm::parse)?,
+            transition: self.transition.as_deref().map_or(Ok(base.transition), Transition::parse)?,
+            process_noise: twelve(py, "Q", &self.Q, base.process_noise)?,
+            measurement_noise: self.R.unwrap_or(base.measurement_noise),
+            initial_mean: twelve(py, "x0", &self.x0, base.initial_mean)?,
+            initial_covariance: twelve(py, "P0", &self.P0, base.initial_covariance)?,
+            sigma_points: SigmaPoints::new(
+                self.alpha.unwrap_or(points.alpha),
+                self.beta.unwrap_or(points.beta),
+                self.kappa.unwrap_or(points.kappa),
+            )?,
+            full_scale: self.full_scale.unwrap_or(base.full_scale),
+            sites: options::sites(py, &self.points, self.region, self.stride)?,
+            mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
+            covariance: self.covariance,
+            residual: base.residual,
+            pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(base.pixel_pitch),
+            frame_period: options::frame_period(self.fps, self.frame_period)?,
+            threads: options::threads(self.threads)?,
+            simd: options::simd(self.simd.as_deref())?,
+        })
+    }
+}
+
+/// The filters, once the first frame has told their number and precision.
+enum Engine {
+    Waiting,
+    Single(Core<f32>, &'static str),
+    Double(Core<f64>, &'static str),
+}
+
+/// Runs `$body` with `$core` bound to the filters of either precision, `$none` before the first frame.
+macro_rules! each_engine {
+    ($engine:expr, $core:ident => $body:expr, $none:expr) => {
+        match $engine {
+            Engine::Waiting => $none,
+            Engine::Single($core, _) => $body,
+            Engine::Double($core, _) => $body,
+        }
+    };
+}
+
+/// Flow and Jacobian filtered in time: one small Kalman filter at each site, WO2010/098160 (44)-(55).
+///
+/// Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
+/// v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
+/// frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
+#[pyclass(module = "jacoflow")]
+pub struct FlowFilter {
+    arguments: Arguments,
+    options: FlowFilterOptions,
+    preprocess: Preprocess,
+    colour: ColourRule,
+    precision: Precision,
+    engine: Engine,
+}
+
+#[pymethods]
+impl FlowFilter {
+    #[new]
+    #[pyo3(signature = (
+        *, profile="patent", form=None, transition=None, neighbourhood=None, neighbourhood_sigma=None, Q=None, R=None, x0=None, P0=None,
+        alpha=None, beta=None, kappa=None, full_scale=None, smooth=None, quantise=None, colour=None, points=None, region=None,
+        stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=true, precision=None, threads=None, simd=None
+    ))]
+    fn new(
+        py: Python<'_>,
+        profile: &str,
+        form: Option<String>,
+        transition: Option<String>,
+        neighbourhood: Object,
+        neighbourhood_sigma: Option<f64>,
+        Q: Object,
+        R: Option<f64>,
+        x0: Object,
+        P0: Object,
+        alpha: Option<f64>,
+        beta: Option<f64>,
+        kappa: Option<f64>,
+        full_scale: Option<f64>,
+        smooth: Option<f64>,
+        quantise: Option<f64>,
+        colour: Option<String>,
+        points: Object,
+        region: Option<(i64, i64, i64, i64)>,
+        stride: Option<i64>,
+        mask: Object,
+        fps: Option<f64>,
+        frame_period: Option<f64>,
+        pixel_pitch: Object,
+        covariance: bool,
+        precision: Option<String>,
+        threads: Option<i64>,
+        simd: Option<String>,
+    ) -> PyResult<Self> {
+        Self::from_arguments(
+            py,
+            Arguments {
+                profile: profile.into(),
+                form,
+                transition,
+                neighbourhood,
+                neighbourhood_sigma,
+                Q,
+                R,
+                x0,
+                P0,
+                alpha,
+                beta,
+                kappa,
+                full_scale,
+                smooth,
+                quantise,
+                colour,
+                points,
+                region,
+                stride,
+                mask,
+                fps,
+                frame_period,
+                pixel_pitch,
+                covariance,
+                precision,
+                threads,
+                simd,
+            },
+        )
+    }
+
+    /// Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
+    ///
+    /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status NON_FINITE. ValueError for a frame of another
+    /// size, TypeError for another dtype; the filter is then unchanged.
+    fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<FlowField> {
+        let py = frame.py();
+        let frame = arrays::frame("frame", frame, self.colour)?;
+        if matches!(self.engine, Engine::Waiting) {
+            self.engine = self.start(&frame)?;
+        }
+        match &mut self.engine {
+            Engine::Waiting => Err(Error::Numerical("the filter has not started".into()).into()),
+            Engine::Single(core, dtype) => advance(py, core, dtype, &self.preprocess, &frame).map(FlowField::single),
+            Engine::Double(core, dtype) => advance(py, core, dtype, &self.preprocess, &frame).map(FlowField::single),
+        }
+    }
+
+    /// Forgets every frame (H, W): the next one starts new filters.
+    fn reset(&mut self) {
+        self.engine = Engine::Waiting;
+    }
+
+    /// Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN where there is no filter (border, mask).
+    ///
+    /// None before the first frame.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each_engine!(&self.engine, core => {
+            let values = (0..core.len()).flat_map(|site| core.state(site).map_or([f64::NAN; 12], |(mean, _)| mean));
+            Ok(Some(arrays::owned(py, &shape(core, &[12])?, values.collect())?.into_any()))
+        }, Ok(None))
+    }
+
+    /// Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where there is no filter. None before the first frame.
+    #[getter]
+    fn state_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each_engine!(&self.engine, core => {
+            let none = [[f64::NAN; 12]; 12];
+            let values = (0..core.len()).flat_map(|site| core.state(site).map_or(none, |(_, covariance)| covariance)).flatten();
+            Ok(Some(arrays::owned(py, &shape(core, &[12, 12])?, values.collect())?.into_any()))
+        }, Ok(None))
+    }
+
+    /// How many frames have been taken in (a count, no unit).
+    #[getter]
+    fn frames_pushed(&self) -> usize {
+        each_engine!(&self.engine, core => core.frames(), 0)
+    }
+
+    /// How often a site's covariance had lost its positive definiteness and was mended (a count, no unit).
+    #[getter]
+    fn repairs(&self) -> u64 {
+        each_engine!(&self.engine, core => core.repairs(), 0)
+    }
+
+    /// The options as a dictionary, in the units of the constructor.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.arguments.copy(py).into_pyobject(py)
+    }
+
+    fn __repr__(&self) -> String {
+        let Arguments { profile, .. } = &self.arguments;
+        let form = self.options.form.name();
+        format!("FlowFilter(profile={profile:?}, form={form:?}, frames_pushed={})", self.frames_pushed())
+    }
+}
+
+impl FlowFilter {
+    fn from_arguments(py: Python<'_>, arguments: Arguments) -> PyResult<Self> {
+        let arguments = arguments.keep(py)?;
+        Ok(Self {
+            options: arguments.options(py)?,
+            preprocess: options::preprocess(arguments.smooth, arguments.quantise)?,
+            colour: ColourRule::parse(arguments.colour.as_deref())?,
+            precision: Precision::parse(arguments.precision.as_deref())?,
+            engine: Engine::Waiting,
+            arguments,
+        })
+    }
+
+    /// The filters for a sequence that begins with `frame`.
+    fn start(&self, frame: &AnyFrame) -> PyResult<Engine> {
+        let mut options = self.options.clone();
+        if self.arguments.full_scale.is_none() {
+            options.full_scale = match frame {
+                AnyFrame::U8(_) => u8::FULL_SCALE,
+                AnyFrame::U16(_) => u16::FULL_SCALE,
+                AnyFrame::F32(_) | AnyFrame::F64(_) => options.full_scale,
+            };
+        }
+        let (size, dtype) = (frame.size(), frame.dtype());
+        let engine = if self.precision.is_double(frame) {
+            Core::new(size, options).map(|core| Engine::Double(core, dtype))
+        } else {
+            Core::new(size, options).map(|core| Engine::Single(core, dtype))
+        };
+        Ok(engine.map_err(named)?)
+    }
+}
+
+/// The core's complaint in the words of this class.
+fn named(error: Error) -> Error {
+    let names = [
+        ("process_noise", "Q"),
+        ("measurement_noise", "R"),
+        ("initial_mean", "x0"),
+        ("initial_covariance", "P0"),
+        ("frame_size", "frame"),
+    ];
+    names.into_iter().fold(error, |error, (core, here)| super::image::renamed(error, core, here))
+}
+
+fn shape<T: SimdReal>(core: &Core<T>, tail: &[usize]) -> PyResult<Vec<usize>> {
+    let (width, height) = core.options().sites.shape(core.frame_size())?;
+    let sites = if matches!(core.options().sites, Sites::Points(_)) { vec![width] } else { vec![height, width] };
+    Ok(sites.into_iter().chain(tail.iter().copied()).collect())
+}
+
+fn advance<T: SimdReal>(
+    py: Python<'_>,
+    core: &mut Core<T>,
+    dtype: &str,
+    preprocess: &Preprocess,
+    frame: &AnyFrame,
+) -> PyResult<crate::types::FlowField<T>> {
+    options::check_dtype("frame", dtype, frame)?;
+    let field = py.detach(|| {
+        let prepared: Frame<T> = core.options().threads.install(|| preprocess.apply(frame.to_real()));
+        core.push(&prepared)
+    });
+    Ok(field?)
+}

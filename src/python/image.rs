@@ -1,0 +1,89 @@
+//! Frames before any motion is looked for: smoothing, quantising, colour to grey.
+
+use super::arrays::{self, ColourRule};
+use crate::image::{Border, GaussianSmoother, Quantiser};
+use crate::parallel::Threads;
+use crate::simd::SimdReal;
+use crate::types::{AnyFrame, Frame};
+use pyo3::prelude::*;
+
+/// Calls `work` on the frame in working precision: float64 for float64 frames, else float32.
+fn in_precision(frame: &AnyFrame, work: impl Work) -> AnyFrame {
+    match frame {
+        AnyFrame::F64(frame) => AnyFrame::F64(work.run(frame)),
+        other => AnyFrame::F32(work.run(&other.to_real())),
+    }
+}
+
+/// A function of frames of either precision.
+trait Work {
+    fn run<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T>;
+}
+
+struct Smooth(GaussianSmoother, Threads);
+impl Work for Smooth {
+    fn run<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
+        self.1.install(|| self.0.apply(frame))
+    }
+}
+
+impl Work for Quantiser {
+    fn run<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
+        self.apply(frame)
+    }
+}
+
+/// `frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard deviations, reflecting borders.
+///
+/// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only the pixels whose kernel reaches
+/// it. ValueError for a negative or infinite `sigma`.
+#[pyfunction]
+#[pyo3(signature = (frame, sigma, *, truncate=None, threads=None))]
+pub fn smooth<'py>(
+    frame: &Bound<'py, PyAny>,
+    sigma: f64,
+    truncate: Option<f64>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = frame.py();
+    let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+    let smoother = match truncate {
+        None => GaussianSmoother::new(sigma),
+        Some(truncate) => GaussianSmoother::with(sigma, truncate, Border::Reflect),
+    };
+    let work = Smooth(smoother.map_err(|e| renamed(e, "smooth", "sigma"))?, Threads::new(threads)?);
+    let smooth = py.detach(|| in_precision(&frame, work));
+    arrays::from_any_frame(py, smooth)
+}
+
+/// `frame` (H, W) rounded down to multiples of `step` grey levels: floor(x / step) * step.
+///
+/// Returns a new array (H, W), float64 for float64, else float32. ValueError unless `step` is positive.
+#[pyfunction]
+#[pyo3(signature = (frame, step=None))]
+pub fn quantise<'py>(frame: &Bound<'py, PyAny>, step: Option<f64>) -> PyResult<Bound<'py, PyAny>> {
+    let py = frame.py();
+    let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+    let quantiser =
+        step.map_or(Ok(Quantiser::default()), Quantiser::new).map_err(|e| renamed(e, "quantise", "step"))?;
+    let levels = py.detach(|| in_precision(&frame, quantiser));
+    arrays::from_any_frame(py, levels)
+}
+
+/// Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green, blue; alpha is left out.
+///
+/// Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is copied.
+#[pyfunction]
+pub fn luminance<'py>(frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    arrays::from_any_frame(frame.py(), arrays::frame("frame", frame, ColourRule::Luminance)?)
+}
+
+/// The same complaint under the name that this function gives the argument.
+pub fn renamed(error: crate::Error, core: &str, here: &'static str) -> crate::Error {
+    match error {
+        crate::Error::Argument { argument, expected, got } if argument == core => {
+            crate::Error::Argument { argument: here, expected, got }
+        }
+        other => other,
+    }
+}

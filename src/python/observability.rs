@@ -1,0 +1,83 @@
+//! `observability`: what theorem 1 of the patent says of every pixel.
+
+use super::arrays::{self, ColourRule, Frames};
+use super::image::renamed;
+use super::options::{self, Object};
+use crate::error::Error;
+use crate::flow::{Observability, ObservabilityMap, observability as core};
+use crate::jet::{Neighbourhood, TimeScheme};
+use crate::parallel::Threads;
+use crate::simd::SimdReal;
+use crate::types::{AnyFrame, Frame};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Observability of the affine model at every pixel, from three frames.
+///
+/// Returns a dictionary of arrays (H, W) without units: `rank` of the twelve equations (6: observable), `rank_single` of the six without second time
+/// derivatives, `condition` code (see `ObservabilityMap`), `condition_number`, and `known`, false at the border and where a sample is not finite.
+#[pyfunction(name = "_observability")]
+#[pyo3(signature = (frames, *, time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, smooth=None, quantise=None, colour=None, threads=None))]
+pub fn observability<'py>(
+    frames: &Bound<'py, PyAny>,
+    time_scheme: Option<&str>,
+    neighbourhood: Object,
+    neighbourhood_sigma: Option<f64>,
+    smooth: Option<f64>,
+    quantise: Option<f64>,
+    colour: Option<&str>,
+    threads: Option<i64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let py = frames.py();
+    let frames = Frames::new(frames, ColourRule::parse(colour)?)?;
+    if frames.count != 3 {
+        return Err(Error::argument("frames", "three frames", format!("{} frames", frames.count)).into());
+    }
+    let frames = [frames.get(0)?, frames.get(1)?, frames.get(2)?];
+    for frame in &frames[1..] {
+        options::check_dtype("frames", frames[0].dtype(), frame)?;
+    }
+    let scheme = time_scheme.map_or(Ok(TimeScheme::default()), TimeScheme::parse);
+    let request = Request {
+        preprocess: options::preprocess(smooth, quantise)?,
+        scheme: scheme.map_err(|e| renamed(e, "scheme", "time_scheme"))?,
+        neighbourhood: options::neighbourhood(py, &neighbourhood, neighbourhood_sigma, &Neighbourhood::default())?,
+        threads: options::threads(threads)?,
+    };
+    let map = py.detach(|| match &frames {
+        [AnyFrame::F64(a), AnyFrame::F64(b), AnyFrame::F64(c)] => request.run([a, b, c].map(Clone::clone)),
+        [a, b, c] => request.run::<f32>([a.to_real(), b.to_real(), c.to_real()]),
+    })?;
+    let known = map.pixels.iter().map(Option::is_some).collect();
+    let result = PyDict::new(py);
+    let shape = [map.height, map.width];
+    let codes = |of: fn(&Observability) -> u8| map.pixels.iter().map(|p| p.as_ref().map_or(0, of)).collect();
+    result.set_item("rank", arrays::owned::<u8>(py, &shape, codes(|p| p.rank))?)?;
+    result.set_item("rank_single", arrays::owned::<u8>(py, &shape, codes(|p| p.rank_single))?)?;
+    result.set_item("condition", arrays::owned::<u8>(py, &shape, codes(|p| p.condition as u8))?)?;
+    let numbers = map.pixels.iter().map(|p| p.as_ref().map_or(f64::NAN, |p| p.condition_number)).collect();
+    result.set_item("condition_number", arrays::owned::<f64>(py, &shape, numbers)?)?;
+    result.set_item("known", arrays::owned::<bool>(py, &shape, known)?)?;
+    Ok(result)
+}
+
+struct Request {
+    preprocess: crate::image::Preprocess,
+    scheme: TimeScheme,
+    neighbourhood: Neighbourhood,
+    threads: Threads,
+}
+
+impl Request {
+    fn run<T: SimdReal>(&self, frames: [Frame<T>; 3]) -> crate::Result<ObservabilityMap> {
+        let frames = frames.map(|frame| self.threads.install(|| self.preprocess.apply(frame)));
+        core(frames.each_ref(), self.scheme, &self.neighbourhood, self.threads)
+    }
+}
+
+/// Theorem 1 for one jet (I, Ix, Iy, Ixx, Ixy, Iyy) moving by (u, v, u_x, v_x, u_y, v_y): (condition code, rank_single, rank, condition number).
+#[pyfunction(name = "_classify")]
+pub fn classify(jet: [f64; 6], motion: [f64; 6]) -> (u8, u8, u8, f64) {
+    let found = crate::flow::classify(jet, motion);
+    (found.condition as u8, found.rank_single, found.rank, found.condition_number)
+}
