@@ -6,9 +6,9 @@ WHEELS := target/wheels
 # Wherever clippy, rustdoc and cargo test look at the binding they look at it with the same features, so that crates are built once.
 ALL := --features python
 
-.PHONY: test demo format clippy rustdoc rust-test wheel install pytest stubtest typing examples develop docs clean
+.PHONY: test demo format clippy rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs clean
 
-test: format clippy rustdoc rust-test pytest stubtest typing examples
+test: format clippy rustdoc rust-test guide pytest stubtest typing examples
 	@echo "everything passed"
 
 # The main job on an embedded example.
@@ -27,6 +27,10 @@ rustdoc:
 
 rust-test:
 	cargo test
+
+# The guide for newcomers, followed literally in a scratch copy.
+guide:
+	$(PYTHON) docs/check_guide.py
 
 $(BIN)/maturin:
 	$(PYTHON) -m venv $(VENV)
