@@ -1,5 +1,6 @@
 //! The subcommands.
 
+use super::flow::FlowCommand;
 use super::interrupt::Watch;
 use super::report::Report;
 use super::synth::SynthCommand;
@@ -9,6 +10,8 @@ use clap::Subcommand;
 /// What the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Estimate flow and its Jacobian from frames
+    Flow(Box<FlowCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
     Synth(SynthCommand),
 }
@@ -17,6 +20,7 @@ impl Command {
     /// Whether standard output is for one JSON object.
     pub fn json(&self) -> bool {
         match self {
+            Self::Flow(command) => command.tell.json,
             Self::Synth(command) => command.tell.json,
         }
     }
@@ -24,6 +28,7 @@ impl Command {
     /// Does it.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         match self {
+            Self::Flow(command) => command.execute(watch),
             Self::Synth(command) => command.execute(watch),
         }
     }

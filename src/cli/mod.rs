@@ -8,9 +8,13 @@
 
 mod arguments;
 mod command;
+mod flow;
 mod interrupt;
+mod open;
 mod progress;
 mod report;
+mod run;
+mod scene_list;
 mod synth;
 
 use clap::Parser;

@@ -1,28 +1,232 @@
 //! `jacoflow synth`: recordings of scenes with known motion.
 
-use super::arguments::TellArguments;
+use super::arguments::{ComputeArguments, TellArguments, parse_not_negative, parse_rate, parse_size};
 use super::interrupt::Watch;
-use super::report::{Report, print};
-use crate::error::Result;
-use clap::Args;
+use super::progress::Bar;
+use super::report::{Report, tell};
+use super::scene_list;
+use crate::error::{Error, Result};
+use crate::io::{FieldFormat, open_sink};
+use crate::parallel::{Progress, Threads};
+use crate::pipeline::check_target;
+use crate::synth::{Rounding, Scene, SceneOptions, Sensor, build, truth};
+use crate::types::{AnyFrame, Frame};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::path::{Path, PathBuf};
 
 /// Options of `synth`.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Frames are written as a folder of PNG files (OUT without an extension), a .npy stack or a .y4m file.\n\
+    Truth is the velocity and its Jacobian at the time of each frame.\n\n\
+    Examples:\n  \
+    jacoflow synth --list\n  \
+    jacoflow synth ramp -o ramp --frames 400 --rounding floor --truth ramp_truth\n  \
+    jacoflow synth disc -o disc.y4m --set rpm=45 --set fps=100 --rate 100 --noise 2"
+)]
 pub struct SynthCommand {
-    /// List the scenes
+    /// Name of the scene (see --list)
+    #[arg(value_name = "SCENE", required_unless_present = "list")]
+    pub scene: Option<String>,
+    /// List the scenes, what they can carry and what they can be given
     #[arg(long)]
     pub list: bool,
+    /// A folder, a .npy or a .y4m file
+    #[arg(long, short, value_name = "OUT", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Number of frames
+    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub frames: usize,
+    /// Size of a frame in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "256x256", value_parser = parse_size)]
+    pub size: (usize, usize),
+    /// Scene coordinates of the upper left pixel
+    #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = parse_point, allow_hyphen_values = true)]
+    pub origin: (f64, f64),
+    /// What the motion carries (see --list)
+    #[arg(long, value_name = "NAME")]
+    pub carrier: Option<String>,
+    /// A parameter of the scene or its carrier; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parse_setting)]
+    pub settings: Vec<(String, f64)>,
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Standard deviation of added white noise, 8-bit grey levels
+    #[arg(long, value_name = "LEVELS", default_value = "0", value_parser = parse_not_negative)]
+    pub noise: f64,
+    /// Samples of the frames
+    #[arg(long, value_enum, value_name = "TYPE", default_value = "8")]
+    pub depth: Depth,
+    /// How brightness becomes whole levels
+    #[arg(long, value_enum, value_name = "HOW", default_value = "nearest")]
+    pub rounding: RoundingWord,
+    /// Frames per second noted in a .y4m file
+    #[arg(long, value_name = "RATE", default_value = "25", value_parser = parse_rate)]
+    pub rate: f64,
+    /// Write the true flow and Jacobian of each frame into this folder
+    #[arg(long, value_name = "FOLDER")]
+    pub truth: Option<PathBuf>,
+    /// Formats of the truth: npz (flow and Jacobian), flo, kitti, pfm
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "npz", requires = "truth")]
+    pub truth_format: Vec<String>,
+    /// Replace files that exist
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub compute: ComputeArguments,
     #[command(flatten)]
     pub tell: TellArguments,
+}
+
+/// Samples of the frames written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Depth {
+    /// 8-bit, 0 to 255
+    #[value(name = "8")]
+    Eight,
+    /// 16-bit: 257 times the 8-bit scale, rounded
+    #[value(name = "16")]
+    Sixteen,
+    /// Double precision on the 8-bit scale, neither rounded nor clipped (.npy only)
+    Float,
+}
+
+/// How brightness becomes whole levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RoundingWord {
+    /// To the nearest level
+    Nearest,
+    /// To the level below, as the patent's quantiser
+    Floor,
 }
 
 impl SynthCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        watch.check()?;
         if self.list {
-            print("ramp\n")?;
+            return scene_list::show(self.tell.json);
         }
-        Ok(Report::default())
+        let (Some(name), Some(output)) = (&self.scene, &self.output) else {
+            return Err(Error::argument("scene", "the name of a scene and --output", "neither"));
+        };
+        let (width, height) = self.size;
+        let scene = build(
+            name,
+            &SceneOptions {
+                width,
+                height,
+                origin: self.origin,
+                seed: self.seed,
+                carrier: self.carrier.clone(),
+                values: self.settings.clone(),
+            },
+        )?;
+        let formats = self.truth_formats()?;
+        self.check_output(output)?;
+        let written = self.write(&*scene, output, &formats, &Bar::new(watch, "synth", self.tell.quiet));
+        if !self.tell.quiet {
+            tell(&format!("{} of {} frames written to {}", written.0, self.frames, output.display()));
+        }
+        let summary = json!({
+            "command": "synth", "scene": name, "output": output, "frames": written.0, "width": width, "height": height,
+            "truth": self.truth, "seed": self.seed, "interrupted": matches!(written.1, Err(Error::Interrupted)),
+        });
+        Ok(Report { summary, failure: written.1.err() })
+    }
+
+    /// Writes the frames and their truth; how many frames are in place, and what stopped it.
+    fn write(&self, scene: &dyn Scene, output: &Path, formats: &[FieldFormat], bar: &Bar<'_>) -> (usize, Result<()>) {
+        let mut done = 0;
+        let result = (|| {
+            let threads = Threads::new(self.compute.threads)?;
+            let mut recording = open_sink(&output.to_string_lossy(), self.rate)?;
+            if let Some(folder) = &self.truth {
+                std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
+            }
+            for index in 0..self.frames {
+                bar.step(index, self.frames)?;
+                let frame = threads.install(|| scene.frame(index as f64));
+                recording.write(&self.sample(&frame, index as u64))?;
+                if let Some(folder) = &self.truth {
+                    let field = truth(scene, index as f64)?;
+                    for format in formats {
+                        let path = folder.join(format!("{index:06}.{}", format.extension()));
+                        format.write(path, &field, "")?;
+                    }
+                }
+                done = index + 1;
+            }
+            recording.finish()
+        })();
+        // One file appears whole or not at all; of a folder what was complete stays.
+        let kept = if result.is_err() && output.extension().is_some() { 0 } else { done };
+        (kept, result)
+    }
+
+    /// The frame as the camera delivers it.
+    fn sample(&self, frame: &Frame<f64>, index: u64) -> AnyFrame {
+        let rounding = match self.rounding {
+            RoundingWord::Nearest => Rounding::Nearest,
+            RoundingWord::Floor => Rounding::Floor,
+        };
+        let sensor = Sensor { noise: self.noise, rounding: Rounding::None, saturate: false, seed: self.seed };
+        match self.depth {
+            Depth::Eight => AnyFrame::U8(Sensor { rounding, saturate: true, ..sensor }.apply_u8(frame, index)),
+            Depth::Float => AnyFrame::F64(sensor.apply(frame, index)),
+            Depth::Sixteen => {
+                let whole = |level: f64| if rounding == Rounding::Floor { level.floor() } else { level.round() };
+                let to_level = |value: &f64| whole(value * 257.0).clamp(0.0, 65535.0) as u16;
+                AnyFrame::U16(sensor.apply(frame, index).map(to_level))
+            }
+        }
+    }
+
+    fn truth_formats(&self) -> Result<Vec<FieldFormat>> {
+        self.truth_format.iter().map(|name| FieldFormat::parse(name)).collect()
+    }
+
+    /// Refuses what could only fail after work has been done.
+    fn check_output(&self, output: &Path) -> Result<()> {
+        let extension = output.extension().and_then(|extension| extension.to_str());
+        if self.depth == Depth::Float && extension != Some("npy") {
+            return Err(Error::argument("output", "a .npy file for --depth float", output.display()));
+        }
+        if extension.is_some() {
+            check_target(output, self.force)?;
+        }
+        for folder in [(extension.is_none()).then_some(output), self.truth.as_deref()].into_iter().flatten() {
+            let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+            if occupied && !self.force {
+                let wanted = "an empty or new folder (--force writes into it)";
+                return Err(Error::argument("output", wanted, folder.display()));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn parse_point(text: &str) -> std::result::Result<(f64, f64), String> {
+    let number = |word: &str| word.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let (x, y) = text.split_once(',').ok_or("expected X,Y")?;
+    number(x).zip(number(y)).ok_or_else(|| "expected two numbers X,Y".into())
+}
+
+fn parse_setting(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    let value = value.trim().parse::<f64>().map_err(|_| "expected a number behind the =".to_string())?;
+    Ok((name.trim().to_string(), value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_a_name_and_a_number() {
+        assert_eq!(parse_setting("rpm=45"), Ok(("rpm".into(), 45.0)));
+        assert!(parse_setting("rpm").is_err() && parse_setting("rpm=fast").is_err());
+        assert_eq!(parse_point("-80,60"), Ok((-80.0, 60.0)));
     }
 }

@@ -94,10 +94,25 @@ impl TableWriter {
     /// # Errors
     /// [`Error::Io`] when the rest cannot be written.
     pub fn finish(self) -> Result<()> {
+        self.end(None)
+    }
+
+    /// As [`TableWriter::finish`], under another name in the same folder: for the rows that an interrupted run has got so far.
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+        self.end(Some(path.as_ref()))
+    }
+
+    fn end(self, other: Option<&Path>) -> Result<()> {
         let target =
             self.csv.into_inner().map_err(|e| Error::io(&self.path, std::io::Error::from(e.error().kind())))?;
         match target {
-            Target::File(file) => file.commit(),
+            Target::File(file) => match other {
+                Some(path) => file.commit_as(path),
+                None => file.commit(),
+            },
             Target::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
         }
     }
@@ -167,6 +182,22 @@ impl FieldTable {
     /// As [`TableWriter::finish`].
     pub fn finish(self) -> Result<()> {
         self.table.finish()
+    }
+
+    /// As [`TableWriter::finish_as`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish_as`].
+    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+        self.table.finish_as(path)
+    }
+
+    /// As [`TableWriter::flush`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::flush`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.table.flush()
     }
 }
 

@@ -61,6 +61,17 @@ impl AtomicFile {
     }
 }
 
+impl AtomicFile {
+    /// As [`AtomicFile::commit`], under another name in the same folder: for what an interrupted run has got so far.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::commit`].
+    pub fn commit_as(mut self, path: impl AsRef<Path>) -> Result<()> {
+        self.target = path.as_ref().to_path_buf();
+        self.commit()
+    }
+}
+
 impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.inner.write(bytes)

@@ -1,1 +1,19 @@
-//! To be written.
+//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks.
+//!
+//! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`] frames wait behind the reader,
+//! and a stage keeps the few frames that it needs (figures 1 and 2 of WO2010/098160). Frames are read and decoded on a thread of their own
+//! while the stage works; results come in the order of the frames and do not depend on timing.
+
+mod output;
+mod prefetch;
+mod region_motion;
+mod run;
+mod sink;
+mod stage;
+
+pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target};
+pub use prefetch::{FirstFrame, READ_AHEAD, peek};
+pub use region_motion::{RegionMotion, fit_region};
+pub use run::{Numbering, Pipeline, Summary};
+pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};
+pub use stage::{EstimatorStage, FilterStage, Output, Stage};

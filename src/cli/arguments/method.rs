@@ -1,77 +1,158 @@
 //! Which estimator, and its options.
 
 use super::{parse_not_negative, parse_pair, parse_positive, parse_size};
-use clap::{Args, ValueEnum};
+use crate::error::{Error, Result};
+use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
+use crate::flow::instantaneous::InstantaneousOptions;
+use crate::flow::model::ModelKind;
+use crate::flow::windowed::WindowedOptions;
+use crate::flow::{Method, RankPolicy};
+use crate::jet::{Neighbourhood, TimeScheme};
+use clap::Args;
+use serde_json::{Value, json};
 
-/// The estimators of single fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// Least squares of the transported equations over a Gaussian window: the accurate one
-    Windowed,
-    /// Least squares per pixel, WO2010/098160 (34): locally quadratic, nearly noise-free images only
-    Instantaneous,
-    /// Baseline: brightness constancy in a window (Lucas and Kanade 1981)
-    LucasKanade,
-    /// Baseline: global smoothness (Horn and Schunck 1981)
-    HornSchunck,
-}
-
-/// What becomes of a pixel whose equations do not determine every unknown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum RankWord {
-    /// NaN and a status that says why
-    Nan,
-    /// The solution of minimum norm, marked as such
-    MinNorm,
-}
-
-/// How time derivatives are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SchemeWord {
-    /// Around the middle one of three frames
-    Central,
-    /// From the latest of three frames backwards (the patent)
-    Backward,
-}
-
-/// Estimator options.
+/// Estimator options. Those that are not given keep the estimator's own default; those that the estimator does not know are refused.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MethodArguments {
-    /// Estimator
-    #[arg(long, value_enum, value_name = "NAME", default_value = "windowed")]
-    pub method: MethodName,
-    /// Motion model of the instantaneous method: affine, translational or accelerating [default: affine]
+    /// Estimator: windowed (accurate), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the baselines
+    /// lucas-kanade and horn-schunck
+    #[arg(long, value_name = "NAME", default_value = "windowed")]
+    pub method: String,
+    /// instantaneous: motion model, affine (default), translational or accelerating
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
-    /// Time differences [default: central]
-    #[arg(long, value_enum, value_name = "NAME")]
-    pub scheme: Option<SchemeWord>,
-    /// Pixels of the local quadratic fit, at least 3x3 [default: 3x3]
+    /// windowed, instantaneous: time differences, central (default) or backward (the patent's)
+    #[arg(long, value_name = "NAME")]
+    pub scheme: Option<String>,
+    /// windowed, baselines: estimate from two frames instead of three (also chosen when there are just two)
+    #[arg(long)]
+    pub pair: bool,
+    /// windowed, instantaneous: pixels of the local quadratic fit [default: 3x3]
     #[arg(long, value_name = "KxL", visible_alias = "neighborhood", value_parser = parse_size)]
     pub neighbourhood: Option<(usize, usize)>,
-    /// Standard deviation of the window (windowed, lucas-kanade), px
+    /// windowed, lucas-kanade: standard deviation of the Gaussian window, px [default: 4]
     #[arg(long, value_name = "SIGMA", value_parser = parse_positive)]
     pub window: Option<f64>,
-    /// Equations of the windowed method
+    /// windowed: equations used, brightness (1), gradient (3), jet (6) or all (12)
     #[arg(long, value_name = "SET")]
     pub rows: Option<String>,
-    /// Smoothness weight of horn-schunck
+    /// horn-schunck: weight of smoothness, in units of the frame's root mean square gradient [default: 1]
     #[arg(long, value_name = "WEIGHT", value_parser = parse_positive)]
     pub smoothness: Option<f64>,
-    /// Iterations of horn-schunck, at most
-    #[arg(long, value_name = "N")]
-    pub iterations: Option<usize>,
-    /// Pixels whose equations do not determine every unknown
-    #[arg(long, value_enum, value_name = "POLICY")]
-    pub rank_deficient: Option<RankWord>,
-    /// Leave the covariance out (faster, smaller files)
+    /// instantaneous: what becomes of pixels whose equations do not determine every unknown, nan (default) or min-norm
+    #[arg(long, value_name = "POLICY")]
+    pub rank_deficient: Option<String>,
+    /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
-    /// Standard deviation of the pixel noise in grey levels [default: from the residual]
+    /// Standard deviation of the pixel noise, grey levels [default: from the residual]
     #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
     pub noise: Option<f64>,
-    /// Physical size of a pixel, DX or DX,DY; flow then comes in that unit per frame
-    #[arg(long, value_name = "DX,DY", value_parser = parse_pair)]
+    /// Physical size of a pixel; flow then comes in that unit per frame
+    #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
     pub pixel_pitch: Option<(f64, f64)>,
+}
+
+/// `lucas-kanade` and `lucas_kanade` are the same word.
+pub fn word(text: &str) -> String {
+    text.replace('-', "_")
+}
+
+/// A rectangle of equally weighted pixels.
+pub fn rectangle((width, height): (usize, usize)) -> Neighbourhood {
+    Neighbourhood::Rectangle { width, height, sigma: None }
+}
+
+impl MethodArguments {
+    /// The method with its options, for a sequence of `frames` frames (if known) that were smoothed by `smoothed` px.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option that is unusable, or that this method does not know.
+    pub fn method(&self, frames: Option<usize>, smoothed: Option<f64>) -> Result<Method> {
+        let method = Method::parse(&word(&self.method))?;
+        self.refuse_foreign(&method)?;
+        let pair = self.pair || frames == Some(2);
+        Ok(match method {
+            Method::Windowed(options) => Method::Windowed(self.windowed(options, smoothed)?),
+            Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
+            Method::LucasKanade(mut options) => {
+                options.window = self.window.map_or(options.window, Window::Gaussian);
+                Method::LucasKanade(LucasKanadeOptions { differences: differences(pair), ..options })
+            }
+            Method::HornSchunck(mut options) => {
+                options.smoothness = self.smoothness.map_or(options.smoothness, Smoothness::Relative);
+                Method::HornSchunck(HornSchunckOptions { differences: differences(pair), ..options })
+            }
+        })
+    }
+
+    fn windowed(&self, mut options: WindowedOptions, smoothed: Option<f64>) -> Result<WindowedOptions> {
+        options.sigma = self.window.unwrap_or(options.sigma);
+        options.scheme = self.scheme(options.scheme)?;
+        let _ = smoothed;
+        Ok(options)
+    }
+
+    fn instantaneous(&self, mut options: InstantaneousOptions) -> Result<InstantaneousOptions> {
+        options.model = self.model.as_deref().map_or(Ok(options.model), ModelKind::parse)?;
+        options.scheme = self.scheme(options.scheme)?;
+        options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
+        let policy = self.rank_deficient.as_deref().map(word);
+        options.rank_deficient = policy.as_deref().map_or(Ok(options.rank_deficient), RankPolicy::parse)?;
+        Ok(options)
+    }
+
+    fn scheme(&self, default: TimeScheme) -> Result<TimeScheme> {
+        self.scheme.as_deref().map_or(Ok(default), TimeScheme::parse)
+    }
+
+    /// An option that would silently do nothing is a mistake.
+    fn refuse_foreign(&self, method: &Method) -> Result<()> {
+        let (windowed, instantaneous) =
+            (matches!(method, Method::Windowed(_)), matches!(method, Method::Instantaneous(_)));
+        let lucas_kanade = matches!(method, Method::LucasKanade(_));
+        let given: [(&'static str, bool, bool); 8] = [
+            ("model", self.model.is_some(), instantaneous),
+            ("scheme", self.scheme.is_some(), windowed || instantaneous),
+            ("pair", self.pair, !instantaneous),
+            ("neighbourhood", self.neighbourhood.is_some(), windowed || instantaneous),
+            ("window", self.window.is_some(), windowed || lucas_kanade),
+            ("rows", self.rows.is_some(), windowed),
+            ("smoothness", self.smoothness.is_some(), matches!(method, Method::HornSchunck(_))),
+            ("rank_deficient", self.rank_deficient.is_some(), instantaneous),
+        ];
+        match given.iter().find(|(_, given, known)| *given && !known) {
+            Some((name, ..)) => Err(Error::argument(name, "a method that has this option", method.name())),
+            None => Ok(()),
+        }
+    }
+
+    /// Standard deviation (px) of the area that one estimate draws on, for estimates from frames smoothed by `smoothed` px.
+    pub fn reach(method: &Method, smoothed: Option<f64>) -> f64 {
+        let of = |neighbourhood: &Neighbourhood| {
+            let offsets = neighbourhood.offsets();
+            let square: f64 = offsets.iter().map(|(x, y)| f64::from(x * x + y * y)).sum();
+            square / (2.0 * offsets.len().max(1) as f64)
+        };
+        let variance = match method {
+            Method::Windowed(options) => options.sigma.powi(2),
+            Method::Instantaneous(options) => of(&options.neighbourhood),
+            Method::LucasKanade(options) => match options.window {
+                Window::Gaussian(sigma) => sigma * sigma,
+                Window::Box(side) => (side as f64).powi(2) / 12.0,
+            },
+            Method::HornSchunck(_) => 0.0,
+        };
+        (variance + smoothed.unwrap_or(0.0).powi(2)).sqrt()
+    }
+
+    /// How fields are made, for the metadata of files.
+    pub fn describe(&self, method: &Method) -> Value {
+        json!({"method": method.name(), "options": format!("{method:?}"), "noise": self.noise})
+    }
+}
+
+fn differences(pair: bool) -> Differences {
+    if pair { Differences::Pair } else { Differences::Central }
 }

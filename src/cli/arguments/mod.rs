@@ -8,7 +8,7 @@ mod sites;
 
 pub use compute::{ComputeArguments, Precision, TellArguments};
 pub use input::InputArguments;
-pub use method::MethodArguments;
+pub use method::{MethodArguments, rectangle, word};
 pub use output::OutputArguments;
 pub use sites::SiteArguments;
 

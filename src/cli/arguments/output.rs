@@ -1,5 +1,7 @@
 //! Where results go.
 
+use super::parse_positive;
+use crate::pipeline::PictureRanges;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -17,7 +19,20 @@ pub struct OutputArguments {
     /// Pictures (PNG): colour, quiver, divergence, curl
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub picture: Vec<String>,
+    /// Speed of the full colour (and of the usual arrow) in pictures, px/frame [default: from the first field]
+    #[arg(long, value_name = "SPEED", value_parser = parse_positive)]
+    pub max_speed: Option<f64>,
+    /// Divergence or curl of the full red and blue in pictures, 1/frame [default: from the first field]
+    #[arg(long, value_name = "RATE", value_parser = parse_positive)]
+    pub max_rate: Option<f64>,
     /// Replace files that exist
     #[arg(long)]
     pub force: bool,
+}
+
+impl OutputArguments {
+    /// Ranges of the pictures.
+    pub fn ranges(&self) -> PictureRanges {
+        PictureRanges { speed: self.max_speed, rate: self.max_rate }
+    }
 }

@@ -1,0 +1,100 @@
+//! From input arguments to a source, and what is known about it before the run.
+
+use super::arguments::{ComputeArguments, InputArguments, Precision};
+use crate::error::{Error, Result};
+use crate::image::{GaussianSmoother, Preprocess, Quantiser};
+use crate::io::{Colour, FilesSource, FrameSource, OpenOptions, Selected, open, read_image};
+use crate::parallel::Threads;
+use crate::pipeline::{FirstFrame, Numbering, peek};
+use crate::simd::Level;
+use crate::types::{AnyFrame, Frame, Mask};
+use std::path::{Path, PathBuf};
+
+/// A source that is ready, with its first frame looked at.
+pub struct Opened {
+    /// The frames.
+    pub source: Box<dyn FrameSource>,
+    /// What the first frame tells.
+    pub first: FirstFrame,
+    /// Number of frames, where it is known.
+    pub frames: Option<usize>,
+    /// Which frames of the input these are, and how fast.
+    pub numbering: Numbering,
+    /// What the input is, for messages and metadata.
+    pub name: String,
+}
+
+/// Opens the input and looks at its first frame.
+pub fn open_input(arguments: &InputArguments) -> Result<Opened> {
+    let source = open_source(&arguments.input, &options(arguments))?;
+    let frames = source.len_hint();
+    let name = source.describe();
+    // The source speaks of the frames it delivers; the numbering of those of the input.
+    let rate = arguments.fps.or_else(|| source.frame_rate().map(|rate| rate * arguments.step as f64));
+    let (first, source) = peek(source)?;
+    let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
+    let numbering = Numbering { first: arguments.first, step: arguments.step, rate };
+    Ok(Opened { source, first, frames, numbering, name })
+}
+
+fn options(arguments: &InputArguments) -> OpenOptions {
+    OpenOptions {
+        colour: if arguments.luminance { Colour::Luminance } else { Colour::Error },
+        first: arguments.first,
+        limit: arguments.limit,
+        step: arguments.step,
+    }
+}
+
+/// One specification, or several image files in the order given.
+pub fn open_source(input: &[String], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    match input {
+        [one] => open(one, options),
+        many => {
+            if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
+                return Err(Error::argument("input", "image files only, when several inputs are given", folder));
+            }
+            let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), options.colour)?;
+            Ok(Box::new(Selected::new(files, options)?))
+        }
+    }
+}
+
+/// Quantiser and smoother.
+pub fn preprocess(arguments: &InputArguments) -> Result<Preprocess> {
+    Ok(Preprocess {
+        quantise: arguments.quantise.map(Quantiser::new).transpose()?,
+        smooth: arguments.smooth.map(GaussianSmoother::new).transpose()?,
+    })
+}
+
+/// Number of threads and instruction set.
+pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)> {
+    Ok((Threads::new(arguments.threads)?, arguments.simd.as_deref().map(Level::parse).transpose()?))
+}
+
+/// Whether to compute in double precision for frames of this type; `demanding` work does so unless told otherwise.
+pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
+    match precision {
+        Precision::Auto => demanding || first.dtype == "float64",
+        Precision::Single => false,
+        Precision::Double => true,
+    }
+}
+
+/// Reads a mask: pixels that are not black may be used.
+pub fn read_mask(path: Option<&Path>, frame_size: (usize, usize)) -> Result<Option<Mask>> {
+    let Some(path) = path else { return Ok(None) };
+    let mask = match read_image(path, Colour::Luminance)? {
+        AnyFrame::U8(frame) => frame.map(|&value| value > 0),
+        AnyFrame::U16(frame) => frame.map(|&value| value > 0),
+        AnyFrame::F32(frame) => frame.map(|&value| value > 0.0),
+        AnyFrame::F64(frame) => frame.map(|&value| value > 0.0),
+    };
+    if Frame::size(&mask) != frame_size {
+        let words = |(width, height): (usize, usize)| format!("{width} x {height}");
+        let expected = format!("an image of the frames' size {}", words(frame_size));
+        return Err(Error::argument("mask", expected, format!("{} in {}", words(mask.size()), path.display())));
+    }
+    Ok(Some(mask))
+}

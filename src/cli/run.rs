@@ -1,0 +1,86 @@
+//! What the commands with a pipeline have in common: running it, and telling how it ended.
+
+use super::arguments::{SiteArguments, TellArguments};
+use super::interrupt::Watch;
+use super::open::Opened;
+use super::progress::Bar;
+use super::report::{Report, tell};
+use crate::error::Error;
+use crate::io::FrameSource;
+use crate::pipeline::{Pipeline, Summary};
+use crate::simd::SimdReal;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What a command tells beside the figures of its run.
+pub struct Telling<'a> {
+    /// The subcommand.
+    pub command: &'static str,
+    /// The arguments about messages.
+    pub tell: &'a TellArguments,
+    /// Where results go, if anywhere.
+    pub output: Option<&'a Path>,
+    /// Further entries of the summary.
+    pub details: Value,
+}
+
+/// Runs the pipeline; what it did, with the error or interruption that ended it early.
+pub fn run_pipeline<T: SimdReal>(
+    pipeline: &mut Pipeline<T>,
+    source: Box<dyn FrameSource>,
+    telling: &Telling<'_>,
+    watch: &Watch,
+) -> (Summary, Option<Error>) {
+    let failure = pipeline.run(source, &Bar::new(watch, telling.command, telling.tell.quiet)).err();
+    (pipeline.summary(), failure)
+}
+
+/// The report of a run, told in words on standard error unless asked not to.
+pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -> Report {
+    let interrupted = matches!(failure, Some(Error::Interrupted));
+    if !telling.tell.quiet && (failure.is_none() || interrupted) {
+        tell(&in_words(summary, telling.output));
+    }
+    let mut object = json!({
+        "command": telling.command,
+        "frames": summary.frames,
+        "fields": summary.fields,
+        "valid_share": summary.valid_share(),
+        "repairs": summary.repairs,
+        "files": summary.files,
+        "seconds": summary.seconds,
+        "output": telling.output,
+        "interrupted": interrupted,
+    });
+    if let (Some(object), Value::Object(details)) = (object.as_object_mut(), telling.details) {
+        object.extend(details);
+    }
+    Report { summary: object, failure }
+}
+
+fn in_words(summary: &Summary, output: Option<&Path>) -> String {
+    let mut line = format!(
+        "{} frames, {} fields, {:.1} % of the sites valid, {:.2} s",
+        summary.frames,
+        summary.fields,
+        100.0 * summary.valid_share(),
+        summary.seconds
+    );
+    if summary.repairs > 0 {
+        line += &format!(", {} repairs", summary.repairs);
+    }
+    if let Some(output) = output.filter(|_| summary.files > 0) {
+        line += &format!("; {} files: {}", summary.files, output.display());
+    }
+    line
+}
+
+/// The entries about the input that every summary has.
+pub fn input_details(opened: &Opened, sites: &SiteArguments) -> Value {
+    let (width, height) = opened.first.size;
+    json!({
+        "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype,
+        "fps": opened.numbering.rate,
+        "region": sites.region.map(|r| [r.x, r.y, r.width, r.height]), "stride": sites.stride.unwrap_or(1),
+    })
+}

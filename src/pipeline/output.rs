@@ -1,0 +1,381 @@
+//! Where the results of a run go, decided and checked before the run starts.
+
+use super::sink::{Fields, PictureRanges, Pictures, Rows, Sink, TableTarget};
+use crate::error::{Error, Result};
+use crate::io::{Element, FieldFormat};
+use crate::math::Real;
+use crate::types::Sites;
+use std::path::{Path, PathBuf};
+
+/// A picture of one field, PNG.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureKind {
+    /// Direction as hue, speed as saturation.
+    Colour,
+    /// Arrows over the frame.
+    Quiver,
+    /// `u_x + v_y`: red is expansion, blue contraction.
+    Divergence,
+    /// `v_x - u_y`: red is turning from x to y (clockwise on the screen), blue the other way.
+    Curl,
+}
+
+impl PictureKind {
+    /// Every kind.
+    pub const ALL: [Self; 4] = [Self::Colour, Self::Quiver, Self::Divergence, Self::Curl];
+
+    /// The kind's word, also the end of its files' names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Colour => "colour",
+            Self::Quiver => "quiver",
+            Self::Divergence => "divergence",
+            Self::Curl => "curl",
+        }
+    }
+
+    /// The kind called `name` (`color` is understood too).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] listing the known names.
+    pub fn parse(name: &str) -> Result<Self> {
+        let wanted = if name == "color" { "colour" } else { name };
+        Self::ALL
+            .into_iter()
+            .find(|kind| kind.name() == wanted)
+            .ok_or_else(|| Error::argument("picture", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
+    }
+}
+
+/// What a user may ask for: field formats, and a table of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Field(FieldFormat),
+    Table,
+}
+
+fn parse_format(name: &str) -> Result<Format> {
+    if name == "csv" {
+        return Ok(Format::Table);
+    }
+    FieldFormat::ALL.into_iter().find(|format| format.name() == name).map(Format::Field).ok_or_else(|| {
+        let names = FieldFormat::ALL.map(FieldFormat::name).join(", ");
+        Error::argument("format", format!("one of {names}, csv"), name)
+    })
+}
+
+/// What an extension stands for.
+fn format_of(path: &Path) -> Option<Format> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    if extension == "csv" {
+        return Some(Format::Table);
+    }
+    FieldFormat::ALL.into_iter().find(|format| format.extension() == extension).map(Format::Field)
+}
+
+/// Where everything of a run goes.
+///
+/// A path is a **folder** when it exists as one, ends in a separator or has no extension; it then gets, for every field, `000012.npz`
+/// (and `.flo`, `.png`, `.pfm`) and `000012_colour.png`, numbered by the frame that the field belongs to, and for the run one `points.csv`. Any
+/// other path is a **file** whose extension tells its format: `.csv` takes every field of the run; the others take exactly one field, and its pictures
+/// lie beside it as `name_colour.png`.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct OutputPlan {
+    /// Formats written for each field.
+    pub formats: Vec<FieldFormat>,
+    /// Pictures written for each field.
+    pub pictures: Vec<PictureKind>,
+    /// Where rows go, if they are wanted.
+    pub table: Option<TableTarget>,
+    /// Where the files of fields lie.
+    pub place: Place,
+    /// Whether existing files may be replaced.
+    pub replace: bool,
+}
+
+/// Where the files of fields lie.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Place {
+    /// No such file is written.
+    #[default]
+    Nowhere,
+    /// Numbered files in a folder.
+    Folder(PathBuf),
+    /// One field only, with these folder and stem.
+    Single(PathBuf),
+}
+
+/// What the user asked for, in words.
+#[derive(Debug, Clone, Default)]
+pub struct OutputWish<'a> {
+    /// The path given, `-` for standard output.
+    pub path: Option<&'a Path>,
+    /// Names of formats.
+    pub formats: &'a [String],
+    /// Names of pictures.
+    pub pictures: &'a [String],
+    /// Replace existing files.
+    pub replace: bool,
+    /// How many fields will come, where that is known.
+    pub fields: Option<usize>,
+}
+
+impl OutputPlan {
+    /// Decides from the user's words where results go, makes the folder if there is none, and refuses what could only fail later.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `output`, `format` or `picture`; [`Error::Io`] when the place cannot be written.
+    pub fn decide(wish: &OutputWish<'_>) -> Result<Self> {
+        let formats: Vec<Format> = wish.formats.iter().map(|name| parse_format(name)).collect::<Result<_>>()?;
+        let pictures: Vec<PictureKind> =
+            wish.pictures.iter().map(|name| PictureKind::parse(name)).collect::<Result<_>>()?;
+        let plan = Self { pictures, replace: wish.replace, ..Self::default() };
+        match wish.path {
+            None if formats.is_empty() && plan.pictures.is_empty() => Ok(plan),
+            None => Err(Error::argument("output", "a folder or a file for the formats and pictures asked for", "none")),
+            Some(path) if path == Path::new("-") => plan.to_standard_output(&formats),
+            Some(path) if is_folder(path) => plan.into_folder(path, &formats),
+            Some(path) => plan.into_file(path, &formats, wish.fields),
+        }
+    }
+
+    /// Refuses what a list of points has no place in: formats and pictures of a whole grid.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `format` or `picture`.
+    pub fn check_sites(&self, sites: &Sites) -> Result<()> {
+        if !matches!(sites, Sites::Points(_)) {
+            return Ok(());
+        }
+        if let Some(format) = self.formats.iter().find(|format| **format != FieldFormat::Npz) {
+            return Err(Error::argument("format", "csv or npz for a list of points", format.name()));
+        }
+        match self.pictures.first() {
+            Some(kind) => Err(Error::argument("picture", "none for a list of points", kind.name())),
+            None => Ok(()),
+        }
+    }
+
+    /// The sinks of this plan; `options` says (in JSON) how the fields are made.
+    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Vec<Box<dyn Sink<T>>> {
+        let mut sinks: Vec<Box<dyn Sink<T>>> = Vec::new();
+        if !self.formats.is_empty() {
+            sinks.push(Box::new(Fields::new(self.clone(), options)));
+        }
+        if !self.pictures.is_empty() {
+            sinks.push(Box::new(Pictures::new(self.clone(), ranges)));
+        }
+        if let Some(target) = &self.table {
+            sinks.push(Box::new(Rows::new(target.clone())));
+        }
+        sinks
+    }
+
+    fn to_standard_output(mut self, formats: &[Format]) -> Result<Self> {
+        if !self.pictures.is_empty() || formats.iter().any(|format| *format != Format::Table) {
+            return Err(Error::argument("output", "a folder or a file; standard output takes CSV only", "-"));
+        }
+        self.table = Some(TableTarget::StandardOutput);
+        Ok(self)
+    }
+
+    fn into_folder(mut self, folder: &Path, formats: &[Format]) -> Result<Self> {
+        self.formats = formats.iter().filter_map(|f| if let Format::Field(f) = f { Some(*f) } else { None }).collect();
+        if formats.is_empty() {
+            self.formats.push(FieldFormat::Npz);
+        }
+        if formats.contains(&Format::Table) {
+            self.table = Some(TableTarget::File(folder.join("points.csv")));
+        }
+        std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
+        check_writable(folder)?;
+        self.place = Place::Folder(folder.to_path_buf());
+        if !self.replace {
+            self.refuse_earlier_results(folder)?;
+        }
+        Ok(self)
+    }
+
+    fn into_file(mut self, path: &Path, formats: &[Format], fields: Option<usize>) -> Result<Self> {
+        let Some(format) = format_of(path) else {
+            let wanted = "a folder, or a file ending in .npz, .flo, .png, .pfm or .csv";
+            return Err(Error::argument("output", wanted, path.display()));
+        };
+        if formats.iter().any(|other| *other != format) {
+            let got = format!("{} with another format beside it", path.display());
+            return Err(Error::argument("output", "a folder for several formats", got));
+        }
+        let one_only = format != Format::Table || !self.pictures.is_empty();
+        if let Some(fields) = fields.filter(|n| *n > 1 && one_only) {
+            return Err(too_many(path, &fields.to_string()));
+        }
+        check_writable(parent(path))?;
+        let stem = path.with_extension("");
+        let mut targets = vec![path.to_path_buf()];
+        targets.extend(self.pictures.iter().map(|kind| picture_beside(&stem, *kind)));
+        if let Some(existing) = targets.iter().find(|target| !self.replace && is_file(target)) {
+            return Err(exists(existing));
+        }
+        match format {
+            Format::Table => self.table = Some(TableTarget::File(path.to_path_buf())),
+            Format::Field(format) => self.formats.push(format),
+        }
+        if one_only {
+            self.place = Place::Single(stem);
+        }
+        Ok(self)
+    }
+
+    /// A folder that holds results of an earlier run would end up with a mixture.
+    fn refuse_earlier_results(&self, folder: &Path) -> Result<()> {
+        let entries = std::fs::read_dir(folder).map_err(|source| Error::io(folder, source))?;
+        for entry in entries {
+            let path = entry.map_err(|source| Error::io(folder, source))?.path();
+            let in_table = self.table == Some(TableTarget::File(path.clone()));
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            if in_table || self.is_numbered_result(&name) {
+                return Err(exists(&path));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether this run could write a file of that name.
+    fn is_numbered_result(&self, name: &str) -> bool {
+        let digits = name.bytes().take_while(u8::is_ascii_digit).count();
+        let rest = &name[digits..];
+        let as_field = self.formats.iter().any(|format| rest.strip_prefix('.') == Some(format.extension()));
+        let as_picture = self
+            .pictures
+            .iter()
+            .any(|kind| rest.strip_suffix(".png").is_some_and(|r| r == format!("_{}", kind.name())));
+        digits >= 6 && (as_field || as_picture)
+    }
+
+    /// The file of the field of frame `index` in `format`.
+    pub(super) fn field_path(&self, index: usize, format: FieldFormat) -> Option<PathBuf> {
+        match &self.place {
+            Place::Nowhere => None,
+            Place::Folder(folder) => Some(folder.join(format!("{index:06}.{}", format.extension()))),
+            Place::Single(stem) => Some(with_ending(stem, &format!(".{}", format.extension()))),
+        }
+    }
+
+    /// The file of a picture of the field of frame `index`.
+    pub(super) fn picture_path(&self, index: usize, kind: PictureKind) -> Option<PathBuf> {
+        match &self.place {
+            Place::Nowhere => None,
+            Place::Folder(folder) => Some(picture_beside(&folder.join(format!("{index:06}")), kind)),
+            Place::Single(stem) => Some(picture_beside(stem, kind)),
+        }
+    }
+}
+
+/// The error for a second field where one file was named.
+pub(super) fn too_many(path: &Path, fields: &str) -> Error {
+    let got = format!("the file {} for {fields} fields", path.display());
+    Error::argument("output", "a folder when there is more than one field", got)
+}
+
+fn picture_beside(stem: &Path, kind: PictureKind) -> PathBuf {
+    with_ending(stem, &format!("_{}.png", kind.name()))
+}
+
+/// `stem` with `ending` put behind it; not `with_extension`, which would eat a dot in the stem.
+fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_os_string();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+fn is_folder(path: &Path) -> bool {
+    let ends_in_separator = path.to_string_lossy().ends_with(std::path::is_separator);
+    path.is_dir() || ends_in_separator || path.extension().is_none()
+}
+
+/// A regular file; devices and pipes may be written without being replaced.
+fn is_file(path: &Path) -> bool {
+    path.metadata().is_ok_and(|meta| meta.is_file())
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn exists(path: &Path) -> Error {
+    Error::argument("output", "a place without earlier results (--force replaces them)", path.display())
+}
+
+/// Refuses, before any work is done, a single file that exists (unless `replace`) or whose folder cannot be written.
+///
+/// # Errors
+/// [`Error::Argument`] naming `output`; [`Error::Io`].
+pub fn check_target(path: &Path, replace: bool) -> Result<()> {
+    if !replace && is_file(path) {
+        return Err(exists(path));
+    }
+    check_writable(parent(path))
+}
+
+/// Makes sure that files can be made in `folder`, by making one.
+fn check_writable(folder: &Path) -> Result<()> {
+    tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decide(path: &Path, formats: &[&str], pictures: &[&str], fields: Option<usize>) -> Result<OutputPlan> {
+        let words = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let (formats, pictures) = (words(formats), words(pictures));
+        let wish = OutputWish { path: Some(path), formats: &formats, pictures: &pictures, replace: false, fields };
+        OutputPlan::decide(&wish)
+    }
+
+    #[test]
+    fn folders_get_numbered_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let plan = decide(&out, &["npz", "kitti", "csv"], &["curl"], None).unwrap();
+        assert_eq!(plan.field_path(12, FieldFormat::Kitti), Some(out.join("000012.png")));
+        assert_eq!(plan.picture_path(12, PictureKind::Curl), Some(out.join("000012_curl.png")));
+        assert_eq!(plan.table, Some(TableTarget::File(out.join("points.csv"))));
+        assert!(out.is_dir() && out.read_dir().unwrap().next().is_none());
+    }
+
+    #[test]
+    fn a_file_takes_one_field_and_a_table_takes_many() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("v1.2.npz");
+        let plan = decide(&file, &[], &["color"], Some(1)).unwrap();
+        assert_eq!(plan.field_path(0, FieldFormat::Npz), Some(file.clone()));
+        assert_eq!(plan.picture_path(0, PictureKind::Colour), Some(folder.path().join("v1.2_colour.png")));
+        assert!(decide(&file, &[], &[], Some(2)).unwrap_err().to_string().starts_with("output"));
+        assert!(decide(&folder.path().join("a.csv"), &[], &[], Some(9)).is_ok());
+    }
+
+    #[test]
+    fn what_would_fail_later_fails_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let wrong = |path: &str, formats: &[&str], pictures: &[&str]| {
+            decide(&folder.path().join(path), formats, pictures, None).unwrap_err().to_string()
+        };
+        assert!(wrong("a.xyz", &[], &[]).starts_with("output"));
+        assert!(wrong("a.npz", &["flo"], &[]).starts_with("output"));
+        assert!(wrong("a", &["mp4"], &[]).starts_with("format"));
+        assert!(wrong("a", &[], &["heat"]).starts_with("picture"));
+        assert!(wrong("no/such/a.npz", &[], &[]).contains("no/such"));
+        assert!(decide(Path::new("-"), &["npz"], &[], None).is_err());
+    }
+
+    #[test]
+    fn earlier_results_are_not_mixed_with_new_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("000003.flo"), b"").unwrap();
+        assert!(decide(folder.path(), &["npz"], &[], None).is_ok());
+        assert!(decide(folder.path(), &["flo"], &[], None).unwrap_err().to_string().contains("000003.flo"));
+        std::fs::write(folder.path().join("000003_curl.png"), b"").unwrap();
+        assert!(decide(folder.path(), &["npz"], &["curl"], None).is_err());
+    }
+}

@@ -1,0 +1,95 @@
+//! Reading ahead: the source works on its own thread, so that decoding and estimating overlap and a blocked read never
+//! keeps the run from being stopped.
+
+use crate::error::{Error, Result};
+use crate::io::FrameSource;
+use crate::types::AnyFrame;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+/// Frames that may wait, decoded, for the stage.
+pub const READ_AHEAD: usize = 2;
+
+/// How often a waiting run looks whether it should stop.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// The receiving end of a reader thread.
+pub(super) struct Prefetch {
+    frames: Receiver<Result<AnyFrame>>,
+}
+
+impl Prefetch {
+    /// Starts to read `source`. The thread ends with the source, at the first error, or when this end is dropped.
+    pub(super) fn start(mut source: Box<dyn FrameSource>) -> Result<Self> {
+        let (sender, frames) = sync_channel(READ_AHEAD);
+        std::thread::Builder::new()
+            .name("jacoflow-reader".into())
+            .spawn(move || {
+                while let Some(frame) = source.next_frame().transpose() {
+                    let last = frame.is_err();
+                    if sender.send(frame).is_err() || last {
+                        break;
+                    }
+                }
+            })
+            .map_err(|error| Error::io("reader thread", error))?;
+        Ok(Self { frames })
+    }
+
+    /// The next frame; calls `wait` while there is none yet and stops when `wait` fails.
+    pub(super) fn next(&self, wait: impl Fn() -> Result<()>) -> Result<Option<AnyFrame>> {
+        loop {
+            match self.frames.recv_timeout(PATIENCE) {
+                Ok(frame) => return frame.map(Some),
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => wait()?,
+            }
+        }
+    }
+}
+
+/// A source whose first frame has been looked at.
+struct Peeked {
+    hint: Option<usize>,
+    first: Option<AnyFrame>,
+    rest: Box<dyn FrameSource>,
+}
+
+impl FrameSource for Peeked {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        match self.first.take() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.rest.next_frame(),
+        }
+    }
+    fn len_hint(&self) -> Option<usize> {
+        self.hint
+    }
+    fn frame_rate(&self) -> Option<f64> {
+        self.rest.frame_rate()
+    }
+    fn describe(&self) -> String {
+        self.rest.describe()
+    }
+}
+
+/// What the first frame tells about a sequence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FirstFrame {
+    /// `(width, height)` in pixels.
+    pub size: (usize, usize),
+    /// numpy's name of the sample type.
+    pub dtype: &'static str,
+}
+
+/// Looks at the first frame of `source` without losing it: what it is (`None`: no frame at all), and the whole source again.
+///
+/// # Errors
+/// Those of the source.
+pub fn peek(mut source: Box<dyn FrameSource>) -> Result<(Option<FirstFrame>, Box<dyn FrameSource>)> {
+    // A source may count what is left, so the hint is asked before the first frame is taken.
+    let hint = source.len_hint();
+    let first = source.next_frame()?;
+    let seen = first.as_ref().map(|frame| FirstFrame { size: frame.size(), dtype: frame.dtype() });
+    Ok((seen, Box::new(Peeked { hint, first, rest: source })))
+}

@@ -1,0 +1,206 @@
+//! One affine motion for a whole region, from the estimates of its sites.
+
+use crate::math::Real;
+use crate::types::{FlowField, Rect, Sites};
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
+
+/// Variance added to every estimate, (px/frame)^2 and 1/frame^2: no estimate is taken for exact.
+const FLOOR: f64 = 1e-14;
+
+/// The motion of a region about its centre.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegionMotion {
+    /// `(u, v, u_x, v_x, u_y, v_y)` at the centre, units of the field.
+    pub motion: [f64; 6],
+    /// Covariance of the motion.
+    pub covariance: [[f64; 6]; 6],
+    /// The centre in pixels.
+    pub centre: (f64, f64),
+    /// Sites that took part.
+    pub count: usize,
+    /// Sites in the region.
+    pub sites: usize,
+}
+
+impl RegionMotion {
+    /// Share of the region's sites that took part, 0 to 1.
+    pub fn valid_share(&self) -> f64 {
+        if self.sites == 0 { 0.0 } else { self.count as f64 / self.sites as f64 }
+    }
+}
+
+/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of a field's valid sites:
+/// `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine motion from the centre to the site.
+///
+/// Estimates of neighbouring sites share pixels: with a window of standard deviation `window` px their errors are correlated by
+/// `exp(-d^2 / (4 window^2))` at distance d, and the covariance is enlarged by the sum of these correlations. Where the estimates
+/// scatter more than their covariances allow, it is enlarged by that ratio too (R. T. Birge, "The calculation of errors by the method of least squares", 1932), so that a region
+/// that does not move as one affine motion shows in the standard deviation.
+///
+/// The motion is NaN where the field has no covariance or the sites do not determine six parameters.
+pub fn fit_region<T: Real>(field: &FlowField<T>, window: f64) -> RegionMotion {
+    let centre = centre_of(field);
+    let (dx, dy) = field.layout.pixel_pitch;
+    let observed: Vec<usize> = observed_parameters(field);
+    let (mut normal, mut right, mut square, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0, 0);
+    for site in (0..field.len()).filter(|&site| field.status[site].is_valid()) {
+        let Some(weight) = inverse_covariance(field, site, &observed) else { continue };
+        let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
+        let carry = carry_to((x as f64 - centre.0) * dx, (y as f64 - centre.1) * dy);
+        let rows = carry.select_rows(observed.iter());
+        let estimate = field.affine(site).to_array().map(Real::to_f64);
+        let value = DVector::from_iterator(observed.len(), observed.iter().map(|&k| estimate[k]));
+        let weighted = rows.transpose() * &weight;
+        normal += &weighted * &rows;
+        right += &weighted * &value;
+        square += (value.transpose() * &weight * &value)[0];
+        count += 1;
+    }
+    let unknown =
+        RegionMotion { motion: [f64::NAN; 6], covariance: [[f64::NAN; 6]; 6], centre, count, sites: field.len() };
+    let Some(inverse) = invert_scaled(&normal) else { return unknown };
+    let motion = inverse * right;
+    let freedom = (count * observed.len()) as f64 - 6.0;
+    let scatter = if freedom > 0.0 { ((square - right.dot(&motion)) / freedom).max(1.0) } else { 1.0 };
+    let covariance = inverse * (scatter * shared(field, window));
+    RegionMotion { motion: motion.into(), covariance: covariance.transpose().into(), ..unknown }
+}
+
+/// `(u, v, ...)(p) = T m0` at the offset `(dx, dy)`.
+fn carry_to(dx: f64, dy: f64) -> SMatrix<f64, 6, 6> {
+    let mut carry = Matrix6::identity();
+    (carry[(0, 2)], carry[(0, 4)]) = (dx, dy);
+    (carry[(1, 3)], carry[(1, 5)]) = (dx, dy);
+    carry
+}
+
+/// Which of the six parameters the model estimates.
+fn observed_parameters<T: Real>(field: &FlowField<T>) -> Vec<usize> {
+    let known = |name: &str| field.layout.parameters.iter().any(|parameter| parameter == name);
+    (0..6).filter(|&k| known(crate::types::MOTION_NAMES[k])).collect()
+}
+
+fn inverse_covariance<T: Real>(field: &FlowField<T>, site: usize, observed: &[usize]) -> Option<DMatrix<f64>> {
+    let covariance = field.covariance_at(site)?;
+    let n = observed.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| covariance[observed[i]][observed[j]] + if i == j { FLOOR } else { 0.0 });
+    matrix.iter().all(|value| value.is_finite()).then_some(())?;
+    matrix.cholesky().map(|factor| factor.inverse())
+}
+
+/// The inverse of a symmetric positive matrix, its rows and columns scaled to a unit diagonal first.
+fn invert_scaled(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let scale = matrix.diagonal().map(|value| 1.0 / value.sqrt());
+    if !scale.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let scaled = Matrix6::from_fn(|i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.cholesky()?.inverse();
+    Some(Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// The middle of the sites in pixels; of points, their mean.
+fn centre_of<T>(field: &FlowField<T>) -> (f64, f64) {
+    match &field.layout.sites {
+        Sites::Grid { region, .. } => {
+            let (width, height) = field.layout.frame_size;
+            let r = region.unwrap_or(Rect { x: 0, y: 0, width, height });
+            (r.x as f64 + (r.width as f64 - 1.0) / 2.0, r.y as f64 + (r.height as f64 - 1.0) / 2.0)
+        }
+        Sites::Points(points) => {
+            let n = points.len().max(1) as f64;
+            let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 as f64, y + point.1 as f64));
+            (sum.0 / n, sum.1 / n)
+        }
+    }
+}
+
+/// How many sites share one independent estimate, for a grid: the mean over the sites of their summed correlations.
+fn shared<T>(field: &FlowField<T>, window: f64) -> f64 {
+    let Sites::Grid { stride, .. } = field.layout.sites else { return 1.0 };
+    let along = |n: usize| -> f64 {
+        let pairs = (1..n).map(|lag| {
+            let distance = (lag * stride) as f64;
+            2.0 * (n - lag) as f64 * (-distance * distance / (4.0 * window * window)).exp()
+        });
+        1.0 + if window > 0.0 { pairs.sum::<f64>() / n as f64 } else { 0.0 }
+    };
+    along(field.width.max(1)) * along(field.height.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::types::{FieldLayout, MOTION_NAMES, Status};
+
+    const TRUTH: [f64; 6] = [0.3, -0.2, 0.01, 0.02, -0.02, 0.015];
+
+    fn field(noise: f64, claimed: f64, seed: u64) -> FlowField<f64> {
+        let layout = FieldLayout {
+            frame_size: (40, 30),
+            sites: Sites::Grid { region: Some(Rect { x: 10, y: 5, width: 21, height: 11 }), stride: 2 },
+            model: "affine".into(),
+            parameters: MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 1,
+        };
+        let mut field = FlowField::empty(layout, true).unwrap();
+        let (n, rng) = (field.len(), CounterRng::new(seed));
+        field.status.fill(Status::Ok);
+        field.covariance.as_mut().unwrap().fill(0.0);
+        for site in 0..n {
+            let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
+            let carried = carry_to(x as f64 - 20.0, y as f64 - 10.0) * Vector6::from(TRUTH);
+            for p in 0..6 {
+                let size = if p < 2 { 1.0 } else { 0.1 };
+                field.motion[p * n + site] = carried[p] + noise * size * rng.normal((6 * site + p) as u64);
+                let plane = [0, 6, 11, 15, 18, 20][p];
+                field.covariance.as_mut().unwrap()[plane * n + site] = (claimed * size).powi(2);
+            }
+        }
+        field
+    }
+
+    #[test]
+    fn an_affine_region_is_recovered_exactly() {
+        let fit = fit_region(&field(0.0, 0.01, 1), 0.0);
+        assert_eq!((fit.centre, fit.count, fit.sites), ((20.0, 10.0), 66, 66));
+        for (got, want) in fit.motion.iter().zip(TRUTH) {
+            assert!((got - want).abs() < 1e-9, "{got} {want}");
+        }
+    }
+
+    #[test]
+    fn normalised_errors_have_the_size_they_should() {
+        let mut nees = 0.0;
+        for seed in 0..200 {
+            let fit = fit_region(&field(0.05, 0.05, seed), 0.0);
+            let error = Vector6::from(fit.motion) - Vector6::from(TRUTH);
+            let covariance = Matrix6::from(fit.covariance);
+            nees += (error.transpose() * covariance.try_inverse().unwrap() * error)[0] / 200.0;
+        }
+        assert!((5.0..7.0).contains(&nees), "{nees}");
+    }
+
+    #[test]
+    fn scatter_and_shared_windows_enlarge_the_deviation() {
+        let honest = fit_region(&field(0.05, 0.05, 3), 0.0).covariance[2][2];
+        let boastful = fit_region(&field(0.05, 0.005, 3), 0.0).covariance[2][2];
+        assert!((0.5..2.0).contains(&(boastful / honest)), "{}", boastful / honest);
+        let overlapping = fit_region(&field(0.05, 0.05, 3), 4.0).covariance[2][2];
+        assert!(overlapping > 10.0 * honest);
+    }
+
+    #[test]
+    fn too_few_sites_give_nan_not_a_guess() {
+        let mut none = field(0.0, 0.01, 1);
+        none.status.fill(Status::Border);
+        let fit = fit_region(&none, 0.0);
+        assert!(fit.motion.iter().all(|value| value.is_nan()) && fit.count == 0 && fit.valid_share() == 0.0);
+        let mut bare = field(0.0, 0.01, 1);
+        bare.covariance = None;
+        assert!(fit_region(&bare, 0.0).motion[0].is_nan());
+    }
+}

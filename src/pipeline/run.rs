@@ -1,0 +1,194 @@
+//! The loop over frames.
+
+use super::prefetch::Prefetch;
+use super::sink::{Ending, Sink, Step};
+use super::stage::Stage;
+use crate::error::{Error, Result};
+use crate::image::Preprocess;
+use crate::io::FrameSource;
+use crate::parallel::{Progress, Threads};
+use crate::simd::SimdReal;
+use crate::types::Status;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Which frames of the input the pushed ones are: frame `k` of the run is frame `first + k * step` of the input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbering {
+    /// Index of the first frame.
+    pub first: usize,
+    /// Distance between used frames.
+    pub step: usize,
+    /// Frames per second of the input (before `step`).
+    pub rate: Option<f64>,
+}
+
+impl Default for Numbering {
+    fn default() -> Self {
+        Self { first: 0, step: 1, rate: None }
+    }
+}
+
+impl Numbering {
+    /// Index in the input of the `k`-th pushed frame.
+    pub fn index(&self, k: usize) -> usize {
+        self.first + k * self.step
+    }
+    /// Seconds between pushed frames.
+    pub fn period(&self) -> Option<f64> {
+        self.rate.map(|rate| self.step as f64 / rate)
+    }
+    /// Time of input frame `index`, seconds from input frame 0.
+    pub fn time(&self, index: usize) -> Option<f64> {
+        self.rate.map(|rate| index as f64 / rate)
+    }
+}
+
+/// What a run did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Summary {
+    /// Frames read.
+    pub frames: usize,
+    /// Fields estimated and taken by every sink.
+    pub fields: usize,
+    /// Sites with a valid estimate.
+    pub valid: u64,
+    /// Sites in all.
+    pub sites: u64,
+    /// Restarts of a filter's pixel.
+    pub repairs: usize,
+    /// Files written.
+    pub files: usize,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+impl Summary {
+    /// Valid sites over all sites, 0 to 1 (0 without any site).
+    pub fn valid_share(&self) -> f64 {
+        if self.sites == 0 { 0.0 } else { self.valid as f64 / self.sites as f64 }
+    }
+}
+
+/// A run: frames in, fields out.
+pub struct Pipeline<T> {
+    preprocess: Preprocess,
+    threads: Threads,
+    numbering: Numbering,
+    stage: Box<dyn Stage<T>>,
+    sinks: Vec<Box<dyn Sink<T>>>,
+    summary: Summary,
+}
+
+impl<T: SimdReal> Pipeline<T> {
+    /// A pipeline around `stage`, without preparation and without sinks.
+    pub fn new(stage: Box<dyn Stage<T>>) -> Self {
+        Self {
+            preprocess: Preprocess::default(),
+            threads: Threads::default(),
+            numbering: Numbering::default(),
+            stage,
+            sinks: Vec::new(),
+            summary: Summary::default(),
+        }
+    }
+
+    /// What is done to each frame first (in this order: quantise, smooth).
+    pub fn with_preprocess(mut self, preprocess: Preprocess) -> Self {
+        self.preprocess = preprocess;
+        self
+    }
+    /// Threads of the preparation.
+    pub fn with_threads(mut self, threads: Threads) -> Self {
+        self.threads = threads;
+        self
+    }
+    /// Which frames of the input come.
+    pub fn with_numbering(mut self, numbering: Numbering) -> Self {
+        self.numbering = numbering;
+        self
+    }
+    /// One more receiver of the results.
+    pub fn with_sink(mut self, sink: Box<dyn Sink<T>>) -> Self {
+        self.sinks.push(sink);
+        self
+    }
+
+    /// What was done so far; valid after a failed or interrupted run too.
+    pub fn summary(&self) -> Summary {
+        self.summary
+    }
+    /// The stage, for its state after the run.
+    pub fn stage(&self) -> &dyn Stage<T> {
+        &*self.stage
+    }
+
+    /// Works through `source` and ends every sink, however the run ends.
+    ///
+    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its error stops the run, and what is
+    /// complete then stays.
+    ///
+    /// # Errors
+    /// Those of the source, the stage, the sinks and `progress`; [`Error::Argument`] when there are too few frames or one
+    /// differs in size.
+    pub fn run(&mut self, source: Box<dyn FrameSource>, progress: &dyn Progress) -> Result<()> {
+        let start = Instant::now();
+        let worked = self.work(source, progress);
+        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
+        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        let mut result = worked;
+        for sink in &mut self.sinks {
+            result = result.and(sink.finish(ending));
+        }
+        self.summary.files = self.sinks.iter().map(|sink| sink.files().0).sum();
+        self.summary.repairs = self.stage.repairs();
+        self.summary.seconds = start.elapsed().as_secs_f64();
+        result
+    }
+
+    fn work(&mut self, source: Box<dyn FrameSource>, progress: &dyn Progress) -> Result<()> {
+        let total = source.len_hint().unwrap_or(0);
+        let frames = Prefetch::start(source)?;
+        let mut size = None;
+        loop {
+            let done = self.summary.frames;
+            progress.step(done, total)?;
+            let Some(frame) = frames.next(|| progress.step(done, total))? else { break };
+            check_size(&mut size, frame.size(), self.numbering.index(done))?;
+            self.summary.frames += 1;
+            let frame = self.threads.install(|| self.preprocess.apply(frame.to_real::<T>()));
+            self.push(Arc::new(frame))?;
+        }
+        progress.step(self.summary.frames, total)?;
+        let needed = self.stage.frames_needed();
+        if self.summary.frames < needed {
+            let wanted = format!("at least {needed} frames for this method");
+            return Err(Error::argument("frames", wanted, self.summary.frames));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, frame: Arc<crate::types::Frame<T>>) -> Result<()> {
+        let Some((mut field, frame)) = self.stage.push(frame)? else { return Ok(()) };
+        field.layout.frame_index = self.numbering.index(field.layout.frame_index);
+        let time = self.numbering.time(field.layout.frame_index);
+        let step = Step { field: &field, frame: &frame, time };
+        for sink in &mut self.sinks {
+            sink.accept(&step)?;
+        }
+        self.summary.fields += 1;
+        self.summary.sites += field.len() as u64;
+        self.summary.valid += field.status.iter().filter(|status| Status::is_valid(**status)).count() as u64;
+        Ok(())
+    }
+}
+
+/// The first frame sets the size; every other one must have it.
+fn check_size(first: &mut Option<(usize, usize)>, size: (usize, usize), index: usize) -> Result<()> {
+    let (width, height) = *first.get_or_insert(size);
+    if size == (width, height) {
+        return Ok(());
+    }
+    let got = format!("{} x {} in frame {index}", size.0, size.1);
+    Err(Error::argument("frames", format!("one size, {width} x {height} as in the first frame"), got))
+}

@@ -1,0 +1,61 @@
+//! One file for every field and format.
+
+use super::{Ending, Sink, Step};
+use crate::error::Result;
+use crate::io::Element;
+use crate::math::Real;
+use crate::pipeline::output::{OutputPlan, Place, too_many};
+use crate::types::FlowField;
+use std::path::PathBuf;
+
+/// Writes each field in the formats of a plan.
+///
+/// Where one file was named, nothing is written before it is certain that there is one field only.
+#[derive(Debug)]
+pub struct Fields<T> {
+    plan: OutputPlan,
+    options: String,
+    waiting: Option<FlowField<T>>,
+    written: usize,
+    latest: Option<PathBuf>,
+}
+
+impl<T: Real + Element> Fields<T> {
+    /// A writer for the formats of `plan`; `options` says (in JSON) how the fields were made, for formats with room for it.
+    pub fn new(plan: OutputPlan, options: String) -> Self {
+        Self { plan, options, waiting: None, written: 0, latest: None }
+    }
+
+    fn write(&mut self, field: &FlowField<T>) -> Result<()> {
+        for format in &self.plan.formats {
+            if let Some(path) = self.plan.field_path(field.layout.frame_index, *format) {
+                format.write(&path, field, &self.options)?;
+                self.written += 1;
+                self.latest = Some(path);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real + Element> Sink<T> for Fields<T> {
+    fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
+        let Place::Single(stem) = &self.plan.place else { return self.write(step.field) };
+        if self.waiting.is_some() {
+            return Err(too_many(stem, "several"));
+        }
+        self.waiting = Some(step.field.clone());
+        Ok(())
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        match self.waiting.take() {
+            Some(field) if ending == Ending::Complete => self.write(&field),
+            _ => Ok(()),
+        }
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        (self.written, self.latest.clone())
+    }
+}

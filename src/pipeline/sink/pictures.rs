@@ -1,0 +1,159 @@
+//! Pictures of every field.
+
+use super::{Ending, Sink, Step};
+use crate::error::Result;
+use crate::flow::derived::{Quantity, plane};
+use crate::image::picture::{FlowColours, Picture, Quiver, SignedMap, arrows_on_grid, grey_picture};
+use crate::io::write_picture;
+use crate::math::Real;
+use crate::pipeline::output::{OutputPlan, PictureKind, Place, too_many};
+use crate::types::{AnyFrame, FlowField, Frame, Sites};
+use std::path::PathBuf;
+
+/// Pixels between arrows.
+const ARROW_SPACING: usize = 16;
+
+/// Ranges of the pictures of a run; `None`: from the first field with an estimate, then kept, so that the frames of a run can be compared.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PictureRanges {
+    /// Speed of the full colour, in the field's unit; also sets the arrows' scale.
+    pub speed: Option<f64>,
+    /// Divergence or curl of the strongest red and blue, 1/frame.
+    pub rate: Option<f64>,
+}
+
+/// Draws the pictures of a plan.
+///
+/// Results on a coarse grid are drawn as blocks, so that pictures have about the frame's size.
+#[derive(Debug)]
+pub struct Pictures {
+    plan: OutputPlan,
+    ranges: PictureRanges,
+    arrow_scale: Option<f64>,
+    divergence: Option<f64>,
+    curl: Option<f64>,
+    waiting: Vec<(PathBuf, Picture)>,
+    seen: usize,
+    written: usize,
+    latest: Option<PathBuf>,
+}
+
+impl Pictures {
+    /// Pictures as `plan` says.
+    pub fn new(plan: OutputPlan, ranges: PictureRanges) -> Self {
+        Self {
+            plan,
+            ranges,
+            arrow_scale: None,
+            divergence: ranges.rate,
+            curl: ranges.rate,
+            waiting: Vec::new(),
+            seen: 0,
+            written: 0,
+            latest: None,
+        }
+    }
+
+    fn draw<T: Real>(&mut self, kind: PictureKind, field: &FlowField<T>, frame: &Frame<T>) -> Result<Picture> {
+        match kind {
+            PictureKind::Colour => self.colour(field),
+            PictureKind::Quiver => self.quiver(field, frame),
+            PictureKind::Divergence => signed(field, Quantity::Divergence, &mut self.divergence),
+            PictureKind::Curl => signed(field, Quantity::Curl, &mut self.curl),
+        }
+    }
+
+    fn colour<T: Real>(&mut self, field: &FlowField<T>) -> Result<Picture> {
+        let (u, v) = flow_planes(field);
+        let colours = FlowColours::new(self.ranges.speed);
+        if self.ranges.speed.is_none() && is_known(u) {
+            self.ranges.speed = Some(colours.range(u, v));
+        }
+        let picture = FlowColours::new(self.ranges.speed).picture(u, v, field.width, field.height)?;
+        Ok(picture.enlarged(stride(field)))
+    }
+
+    fn quiver<T: Real>(&mut self, field: &FlowField<T>, frame: &Frame<T>) -> Result<Picture> {
+        let (u, v) = flow_planes(field);
+        let stride = stride(field);
+        let (x, y) = field.layout.sites.pixel(0, 0);
+        let spacing = (ARROW_SPACING / stride).max(1);
+        let size = (field.width, field.height);
+        let mut arrows = arrows_on_grid(u, v, size, spacing, (x as f64, y as f64), stride as f64)?;
+        let (dx, dy) = field.layout.pixel_pitch;
+        for arrow in &mut arrows {
+            arrow.u /= dx;
+            arrow.v /= dy;
+        }
+        if self.arrow_scale.is_none() && is_known(u) {
+            self.arrow_scale = Some(match self.ranges.speed {
+                Some(speed) => Quiver::default().longest * dx / speed,
+                None => Quiver::default().resolve_scale(&arrows),
+            });
+        }
+        let mut picture = grey_picture(&AnyFrame::F64(frame.map(|value| value.to_f64())));
+        Quiver::new(self.arrow_scale).draw(&mut picture, &arrows);
+        Ok(picture)
+    }
+
+    fn write(&mut self, path: PathBuf, picture: &Picture) -> Result<()> {
+        write_picture(&path, picture)?;
+        self.written += 1;
+        self.latest = Some(path);
+        Ok(())
+    }
+}
+
+fn flow_planes<T: Real>(field: &FlowField<T>) -> (&[T], &[T]) {
+    let n = field.len();
+    (&field.motion[..n], &field.motion[n..2 * n])
+}
+
+fn is_known<T: Real>(plane: &[T]) -> bool {
+    plane.iter().any(|value| value.finite())
+}
+
+fn stride<T>(field: &FlowField<T>) -> usize {
+    match field.layout.sites {
+        Sites::Grid { stride, .. } => stride,
+        Sites::Points(_) => 1,
+    }
+}
+
+/// A diverging map of a quantity; the first known plane sets the range of the run.
+fn signed<T: Real>(field: &FlowField<T>, quantity: Quantity, range: &mut Option<f64>) -> Result<Picture> {
+    let values = plane(field, quantity)?;
+    if range.is_none() && is_known(&values) {
+        *range = Some(SignedMap::default().resolve_range(&values));
+    }
+    Ok(SignedMap::new(*range).picture(&values, field.width, field.height)?.enlarged(stride(field)))
+}
+
+impl<T: Real> Sink<T> for Pictures {
+    fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
+        self.seen += 1;
+        for kind in self.plan.pictures.clone() {
+            let picture = self.draw(kind, step.field, step.frame)?;
+            let Some(path) = self.plan.picture_path(step.field.layout.frame_index, kind) else { continue };
+            match &self.plan.place {
+                Place::Single(stem) if self.seen > 1 => return Err(too_many(stem, "several")),
+                Place::Single(_) => self.waiting.push((path, picture)),
+                _ => self.write(path, &picture)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        for (path, picture) in std::mem::take(&mut self.waiting) {
+            if ending == Ending::Complete {
+                self.write(path, &picture)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        (self.written, self.latest.clone())
+    }
+}

@@ -1,0 +1,180 @@
+//! Rows of CSV tables that grow while a run lasts.
+//!
+//! A file gets its name only when the run is complete. The rows of a run that was stopped are kept beside it, as `name.partial.csv`: nothing is
+//! lost, and nothing half is taken for whole. Standard output gets the rows of each frame at once.
+
+use super::{Ending, Sink, Step};
+use crate::error::Result;
+use crate::io::{FieldTable, TableWriter};
+use crate::math::Real;
+use std::path::{Path, PathBuf};
+
+/// Where a table of rows goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TableTarget {
+    /// Standard output.
+    StandardOutput,
+    /// A file.
+    File(PathBuf),
+}
+
+impl TableTarget {
+    /// As a writer of tables takes it.
+    fn path(&self) -> &Path {
+        match self {
+            Self::StandardOutput => Path::new("-"),
+            Self::File(path) => path,
+        }
+    }
+
+    /// The name for the rows of a run that was stopped: `points.csv` becomes `points.partial.csv`.
+    fn partial(&self) -> PathBuf {
+        self.path().with_extension("partial.csv")
+    }
+}
+
+/// A table that ends as a run ends.
+#[derive(Debug)]
+pub struct Table {
+    target: TableTarget,
+    writer: Option<TableWriter>,
+    rows: usize,
+    kept: Option<PathBuf>,
+}
+
+impl Table {
+    /// Begins the table.
+    ///
+    /// # Errors
+    /// As [`TableWriter::create`].
+    pub fn create(target: &TableTarget, header: &[&str]) -> Result<Self> {
+        let writer = TableWriter::create(target.path(), header)?;
+        Ok(Self { target: target.clone(), writer: Some(writer), rows: 0, kept: None })
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// As [`TableWriter::row`].
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) -> Result<()> {
+        self.rows += 1;
+        self.writer.as_mut().map_or(Ok(()), |writer| writer.row(cells))
+    }
+
+    /// Shows the rows so far to a reader of standard output.
+    ///
+    /// # Errors
+    /// As [`TableWriter::flush`].
+    pub fn flush(&mut self) -> Result<()> {
+        match (&self.target, &mut self.writer) {
+            (TableTarget::StandardOutput, Some(writer)) => writer.flush(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Gives the table its name, or what there is of it the partial one.
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn finish(&mut self, ending: Ending) -> Result<()> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        self.kept = end(&self.target, ending, self.rows > 0, |name| match name {
+            Some(name) => writer.finish_as(name),
+            None => writer.finish(),
+        })?;
+        Ok(())
+    }
+
+    /// As [`Sink::files`].
+    pub fn files(&self) -> (usize, Option<PathBuf>) {
+        (usize::from(self.kept.is_some()), self.kept.clone())
+    }
+}
+
+/// Ends a table by `finish(None)` under its own name, by `finish(Some(name))` under the partial one, or, without rows, by dropping it. The file that is in place then.
+fn end(
+    target: &TableTarget,
+    ending: Ending,
+    any: bool,
+    finish: impl FnOnce(Option<&Path>) -> Result<()>,
+) -> Result<Option<PathBuf>> {
+    match (target, ending) {
+        (TableTarget::StandardOutput, _) => finish(None).map(|()| None),
+        (TableTarget::File(path), Ending::Complete) => finish(None).map(|()| Some(path.clone())),
+        (TableTarget::File(_), Ending::Partial) if any => {
+            let partial = target.partial();
+            finish(Some(&partial)).map(|()| Some(partial))
+        }
+        (TableTarget::File(_), Ending::Partial) => Ok(None),
+    }
+}
+
+/// One row for every site and frame: see [`FieldTable`] for the columns.
+#[derive(Debug)]
+pub struct Rows {
+    target: TableTarget,
+    table: Option<FieldTable>,
+    kept: Option<PathBuf>,
+}
+
+impl Rows {
+    /// Rows to `target`; the table begins with the first field.
+    pub fn new(target: TableTarget) -> Self {
+        Self { target, table: None, kept: None }
+    }
+}
+
+impl<T: Real> Sink<T> for Rows {
+    fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
+        let field = step.field;
+        let table = match &mut self.table {
+            Some(table) => table,
+            empty => empty.insert(FieldTable::create(self.target.path(), &field.layout, field.covariance.is_some())?),
+        };
+        table.write(field)?;
+        if self.target == TableTarget::StandardOutput { table.flush() } else { Ok(()) }
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        let Some(table) = self.table.take() else { return Ok(()) };
+        self.kept = end(&self.target, ending, true, |name| match name {
+            Some(name) => table.finish_as(name),
+            None => table.finish(),
+        })?;
+        Ok(())
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        (usize::from(self.kept.is_some()), self.kept.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        folder.read_dir().unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_table_has_its_name_only_when_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = TableTarget::File(folder.path().join("t.csv"));
+        let mut whole = Table::create(&target, &["a"]).unwrap();
+        whole.row(["1".to_string()]).unwrap();
+        assert!(!folder.path().join("t.csv").exists());
+        whole.finish(Ending::Complete).unwrap();
+        assert_eq!(names(folder.path()), ["t.csv"]);
+
+        let mut half = Table::create(&target, &["a"]).unwrap();
+        half.row(["3".to_string()]).unwrap();
+        half.finish(Ending::Partial).unwrap();
+        assert_eq!(std::fs::read_to_string(folder.path().join("t.csv")).unwrap(), "a\n1\n");
+        assert_eq!(std::fs::read_to_string(folder.path().join("t.partial.csv")).unwrap(), "a\n3\n");
+
+        std::fs::remove_file(folder.path().join("t.partial.csv")).unwrap();
+        Table::create(&target, &["a"]).unwrap().finish(Ending::Partial).unwrap();
+        assert_eq!(names(folder.path()), ["t.csv"]);
+    }
+}
