@@ -14,9 +14,10 @@ use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
 use rayon::prelude::*;
 use std::marker::PhantomData;
 
-/// Blocks of one task: fixed, so that results do not depend on the number of threads. Small enough for a task's states to stay in the
-/// second-level cache between its three passes.
-const TASK_BLOCKS: usize = 8;
+/// Blocks of one task: fixed, so that results do not depend on the number of threads.
+const TASK_BLOCKS: usize = 32;
+/// Blocks that go through the three passes together: few, so that their states stay in the first-level cache.
+const PASS_BLOCKS: usize = 2;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
 ///
@@ -121,57 +122,58 @@ impl<T: SimdReal> FlowFilter<T> {
                 text(frame.size()),
             ));
         }
+        let rows = self.rows();
         let filters = self.store.pixels.len();
         let mut marks = vec![Mark::default(); filters / BLOCK];
-        let mut residual = vec![T::nan(); if self.options.residual { filters } else { 0 }];
+        let mut results = vec![T::from_f64(0.0); filters * rows.count];
         let threads = self.options.threads;
-        threads.install(|| self.run(frame, &mut marks, &mut residual));
+        threads.install(|| self.run(frame, &mut marks, &mut results));
         self.frames += 1;
         let live = self.store.sites.len();
         self.repairs += marks.iter().flat_map(|m| m.repaired).take(live).map(u64::from).sum::<u64>();
-        threads.install(|| self.field(&marks, &residual))
+        threads.install(|| self.field(&marks, &results))
     }
 
-    /// The three passes over every task.
-    fn run(&mut self, frame: &Frame<T>, marks: &mut [Mark], residual: &mut [T]) {
+    /// Which rows a block's results have.
+    fn rows(&self) -> Rows {
+        let covariance = if self.options.covariance { 21 } else { 0 };
+        let residual = self.options.residual.then_some(6 + covariance);
+        Rows { covariance, residual, count: 6 + covariance + usize::from(residual.is_some()) }
+    }
+
+    /// Every block through its three passes; results are copied out while they are near.
+    fn run(&mut self, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
+        let rows = self.rows();
         let Self { options, store, constants, decorrelation, fit, .. } = self;
         let level = options.simd.unwrap_or_else(Level::detect);
-        let scale = T::from_f64(255.0 / options.full_scale);
-        let (form, transition) = (options.form, options.transition);
-        let want_residual = !residual.is_empty();
-        let size = TASK_BLOCKS * BLOCK;
-        let task = |blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], residual: Option<&mut [T]>| {
-            let mut measured = [T::from_f64(0.0); TASK_BLOCKS * MEASURED * BLOCK];
-            let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
-            let mut repaired = [0u8; TASK_BLOCKS * BLOCK];
-            let repaired = &mut repaired[..pixels.len()];
-            dispatch(level, Measure { frame, pixels, fit, scale, measured, residual });
-            match transition {
-                Transition::Rk4 => predict::<T, Rk4>(level, form, blocks, repaired, constants),
-                Transition::Exact => predict::<T, Exact>(level, form, blocks, repaired, constants),
-            }
-            dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
-            for (b, mark) in marks.iter_mut().enumerate() {
-                mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
-                for k in 0..BLOCK {
-                    mark.missing[k] = u8::from(measured[(b * MEASURED + 6) * BLOCK + k].to_f64() == 0.0);
-                }
-            }
+        let pass = Pass {
+            frame,
+            fit,
+            constants,
+            decorrelation,
+            rows,
+            level,
+            form: options.form,
+            transition: options.transition,
+            scale: T::from_f64(255.0 / options.full_scale),
         };
-        let tasks = store
-            .blocks
-            .par_chunks_mut(PLANES * size)
-            .zip(store.pixels.par_chunks(size))
-            .zip(marks.par_chunks_mut(TASK_BLOCKS));
-        if want_residual {
-            tasks.zip(residual.par_chunks_mut(size)).for_each(|(((b, p), m), r)| task(b, p, m, Some(r)));
-        } else {
-            tasks.for_each(|((b, p), m)| task(b, p, m, None));
-        }
+        let states = store.blocks.par_chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
+        let pixels = store.pixels.par_chunks(BLOCK * TASK_BLOCKS);
+        let marks = marks.par_chunks_mut(TASK_BLOCKS);
+        let results = results.par_chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
+        states.zip(pixels).zip(marks).zip(results).for_each(|(((states, pixels), marks), results)| {
+            let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
+            let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);
+            let marks = marks.chunks_mut(PASS_BLOCKS);
+            let results = results.chunks_mut(rows.count * BLOCK * PASS_BLOCKS);
+            for (((states, pixels), marks), results) in states.zip(pixels).zip(marks).zip(results) {
+                pass.run(states, pixels, marks, results);
+            }
+        });
     }
 
     /// The result after a frame.
-    fn field(&self, marks: &[Mark], residual: &[T]) -> Result<FlowField<T>> {
+    fn field(&self, marks: &[Mark], results: &[T]) -> Result<FlowField<T>> {
         let options = &self.options;
         let layout = FieldLayout {
             frame_size: self.frame_size,
@@ -184,6 +186,8 @@ impl<T: SimdReal> FlowFilter<T> {
         };
         let mut field = FlowField::<T>::empty(layout, options.covariance)?;
         let n = field.len();
+        let rows = self.rows();
+        field.residual = rows.residual.map(|_| vec![T::nan(); n]);
         field.status.copy_from_slice(&self.store.fixed);
         let flags = marks.iter().flat_map(|m| m.missing.iter().zip(&m.repaired));
         for (&site, (&missing, &repaired)) in self.store.sites.iter().zip(flags) {
@@ -196,32 +200,102 @@ impl<T: SimdReal> FlowFilter<T> {
         if n == 0 {
             return Ok(field);
         }
-        // Flow in units of the pixel pitch: u dx, v dy, u_x, v_x dy/dx, u_y dx/dy, v_y.
-        let (dx, dy) = options.pixel_pitch;
-        let units = [dx, dy, 1.0, dy / dx, dx / dy, 1.0];
-        let fill = |plane: &mut [T], source: usize, unit: f64| {
+        let fill = |plane: &mut [T], row: usize, unit: f64| {
             let unit = T::from_f64(unit);
-            for (&site, value) in self.store.sites.iter().zip(self.store.plane(source)) {
-                if field.status[site] != Status::NonFinite {
-                    plane[site] = value * unit;
+            let blocks = results.chunks_exact(rows.count * BLOCK);
+            for ((block, mark), sites) in blocks.zip(marks).zip(self.store.sites.chunks(BLOCK)) {
+                let values = &block[row * BLOCK..(row + 1) * BLOCK];
+                for ((&value, &missing), &site) in values.iter().zip(&mark.missing).zip(sites) {
+                    plane[site] = if missing == 0 { value * unit } else { T::nan() };
                 }
             }
         };
-        field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, 6 + k, units[k]));
+        // Flow in units of the pixel pitch: u dx, v dy, u_x, v_x dy/dx, u_y dx/dy, v_y.
+        let (dx, dy) = options.pixel_pitch;
+        let units = [dx, dy, 1.0, dy / dx, dx / dy, 1.0];
+        field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, k, units[k]));
         if let Some(covariance) = &mut field.covariance {
-            let pairs: Vec<_> = (0..6).flat_map(|a| (a..6).map(move |b| (a, b))).collect();
-            covariance.par_chunks_exact_mut(n).zip(&pairs).for_each(|(plane, &(a, b))| {
-                fill(plane, N + packed(6 + a, 6 + b), units[a] * units[b]);
+            covariance.par_chunks_exact_mut(n).zip(&PAIRS[..]).enumerate().for_each(|(k, (plane, &(a, b)))| {
+                fill(plane, 6 + k, units[a] * units[b]);
             });
         }
-        if !residual.is_empty() {
-            let mut plane = vec![T::nan(); n];
-            for (&site, &value) in self.store.sites.iter().zip(residual) {
-                plane[site] = value;
-            }
-            field.residual = Some(plane);
+        if let Some((plane, row)) = field.residual.as_mut().zip(rows.residual) {
+            fill(plane, row, 1.0);
         }
         Ok(field)
+    }
+}
+
+/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are wanted.
+#[derive(Debug, Clone, Copy)]
+struct Rows {
+    covariance: usize,
+    residual: Option<usize>,
+    count: usize,
+}
+
+/// The upper triangle of the motion's covariance, row by row.
+const PAIRS: [(usize, usize); 21] = {
+    let mut pairs = [(0, 0); 21];
+    let (mut k, mut a) = (0, 0);
+    while a < 6 {
+        let mut b = a;
+        while b < 6 {
+            pairs[k] = (a, b);
+            k += 1;
+            b += 1;
+        }
+        a += 1;
+    }
+    pairs
+};
+
+/// What the blocks of a frame have in common.
+struct Pass<'a, T> {
+    frame: &'a Frame<T>,
+    fit: &'a Fit<T>,
+    constants: &'a Constants<T>,
+    decorrelation: &'a Decorrelation<T>,
+    rows: Rows,
+    level: Level,
+    form: FilterForm,
+    transition: Transition,
+    scale: T,
+}
+
+impl<T: SimdReal> Pass<'_, T> {
+    /// Measurement, prediction, update of a few blocks.
+    fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
+        let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
+        let zero = T::from_f64(0.0);
+        let (mut measured, mut residual) = ([zero; PASS_BLOCKS * MEASURED * BLOCK], [zero; PASS_BLOCKS * BLOCK]);
+        let mut repaired = [0u8; PASS_BLOCKS * BLOCK];
+        let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
+        let repaired = &mut repaired[..pixels.len()];
+        let wanted = rows.residual.map(|_| &mut residual[..pixels.len()]);
+        dispatch(level, Measure { frame, pixels, fit, scale, measured, residual: wanted });
+        match self.transition {
+            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, repaired, constants),
+            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, repaired, constants),
+        }
+        dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
+        for (b, mark) in marks.iter_mut().enumerate() {
+            mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
+            let present = &measured[(b * MEASURED + 6) * BLOCK..][..BLOCK];
+            for k in 0..BLOCK {
+                mark.missing[k] = u8::from(present[k] == zero);
+            }
+            let block = &blocks[b * PLANES * BLOCK..];
+            let out = &mut results[b * rows.count * BLOCK..(b + 1) * rows.count * BLOCK];
+            out[..6 * BLOCK].copy_from_slice(&block[6 * BLOCK..N * BLOCK]);
+            for (row, &(i, j)) in out[6 * BLOCK..].chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
+                let plane = N + packed(6 + i, 6 + j);
+                row.copy_from_slice(&block[plane * BLOCK..(plane + 1) * BLOCK]);
+            }
+            if let Some(row) = rows.residual {
+                out[row * BLOCK..].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
+            }
+        }
     }
 }
 

@@ -66,15 +66,6 @@ impl<T: SimdReal> Store<T> {
         Ok(Self { pixels, sites, fixed, blocks })
     }
 
-    /// The numbers of plane `plane`, one for each filter.
-    pub(super) fn plane(&self, plane: usize) -> impl Iterator<Item = T> + '_ {
-        self.blocks
-            .chunks_exact(PLANES * BLOCK)
-            .flat_map(move |block| &block[plane * BLOCK..(plane + 1) * BLOCK])
-            .copied()
-            .take(self.sites.len())
-    }
-
     /// Mean and full covariance of filter `index`.
     pub(super) fn state(&self, index: usize) -> ([f64; N], [[f64; N]; N]) {
         let block = &self.blocks[index / BLOCK * PLANES * BLOCK..][..PLANES * BLOCK];

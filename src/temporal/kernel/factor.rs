@@ -23,7 +23,10 @@ pub(super) fn factor<V: Lanes>(cov: &[V; PACKED], order: &[usize; N]) -> (Column
 
 #[inline(always)]
 fn column<V: Lanes, const J: usize>(cov: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>, ok: &mut V) {
-    let mut rest: [V; N] = std::array::from_fn(|i| if i < J { V::zero() } else { cov[packed(order[i], order[J])] });
+    let mut rest = [V::zero(); N];
+    for i in J..N {
+        rest[i] = cov[packed(order[i], order[J])];
+    }
     for k in 0..J {
         let factor = columns[k][order[J]];
         for i in J..N {

@@ -9,6 +9,7 @@ mod noise;
 pub(super) mod predict;
 pub(super) mod transition;
 pub(super) mod update;
+mod vector;
 
 use super::options::FlowFilterOptions;
 use crate::math::Real;
@@ -65,15 +66,26 @@ impl<V: Lanes> Lane<V> {
     /// Reads the pixels `at ..` of a block.
     #[inline(always)]
     pub(super) fn load(block: &[V::Scalar], at: usize) -> Self {
-        let row = |plane: usize| V::load(&block[plane * BLOCK + at..]);
-        Self { mean: std::array::from_fn(row), cov: std::array::from_fn(|k| row(N + k)) }
+        let mut lane = Self { mean: [V::zero(); N], cov: [V::zero(); PACKED] };
+        let rows = &block[..PLANES * BLOCK];
+        for k in 0..N {
+            lane.mean[k] = V::load(&rows[k * BLOCK + at..]);
+        }
+        for k in 0..PACKED {
+            lane.cov[k] = V::load(&rows[(N + k) * BLOCK + at..]);
+        }
+        lane
     }
 
     /// Writes them back.
     #[inline(always)]
     pub(super) fn store(&self, block: &mut [V::Scalar], at: usize) {
-        for (plane, value) in self.mean.iter().chain(&self.cov).enumerate() {
-            value.store(&mut block[plane * BLOCK + at..]);
+        let rows = &mut block[..PLANES * BLOCK];
+        for k in 0..N {
+            self.mean[k].store(&mut rows[k * BLOCK + at..]);
+        }
+        for k in 0..PACKED {
+            self.cov[k].store(&mut rows[(N + k) * BLOCK + at..]);
         }
     }
 }
@@ -83,5 +95,9 @@ impl<V: Lanes> Lane<V> {
 pub(super) fn failed<V: Lanes>(ok: V) -> u32 {
     let mut lanes = [V::Scalar::from_f64(1.0); BLOCK];
     ok.store(&mut lanes);
-    lanes.iter().enumerate().map(|(k, v)| u32::from(v.to_f64() != 1.0) << k).sum()
+    let mut bits = 0;
+    for k in 0..V::LANES {
+        bits |= u32::from(lanes[k] != V::Scalar::from_f64(1.0)) << k;
+    }
+    bits
 }

@@ -6,6 +6,7 @@
 //! covariance with component `j`. The numbers are those of the 49 points.
 
 use super::transition::{Generator, direction};
+use super::vector::{plus_times, times};
 use super::{Constants, PACKED, packed};
 use crate::simd::Lanes;
 
@@ -23,17 +24,15 @@ pub(super) struct NoisePairs<V> {
     pub shift: [V; 6],
 }
 
-#[inline(always)]
-fn sum<V: Lanes>(a: &[V; 6], factor: V, b: &[V; 6]) -> [V; 6] {
-    std::array::from_fn(|k| b[k].mul_add(factor, a[k]))
-}
-
 /// The contributions at mean brightness `i` (with `I` left out) and generator `a` of the mean motion.
 #[inline(always)]
 pub(super) fn noise_pairs<V: Lanes>(i: &[V; 6], a: &Generator<V>, constants: &Constants<V::Scalar>) -> NoisePairs<V> {
     let zero = V::zero();
     let (half, quarter, sixth) = (V::constant(0.5), V::constant(0.25), V::constant(1.0 / 6.0));
-    let q: [V; 12] = constants.q.map(V::splat);
+    let mut q = [zero; 12];
+    for k in 0..12 {
+        q[k] = V::splat(constants.q[k]);
+    }
     let spread = V::splat(constants.spread);
     let mut out = NoisePairs {
         full: [[zero; 6]; 11],
@@ -47,50 +46,53 @@ pub(super) fn noise_pairs<V: Lanes>(i: &[V; 6], a: &Generator<V>, constants: &Co
     for k in 1..6 {
         let mut unit = [zero; 6];
         unit[k] = q[k].sqrt() * V::constant(1.0 / 24.0);
-        let times = |factor: f64| unit.map(|v| v * V::constant(factor));
+        let (four, twelve, whole) =
+            (times(&unit, V::constant(4.0)), times(&unit, V::constant(12.0)), times(&unit, V::constant(24.0)));
         if k < 3 {
-            let y = a.add_slope([unit[1], unit[2]], [times(4.0)[1], times(4.0)[2]]);
-            let y = a.add_slope(y, [times(12.0)[1], times(12.0)[2]]);
-            let [gx, gy] = a.add_slope(y, [times(24.0)[1], times(24.0)[2]]);
+            let y = a.add_slope([unit[1], unit[2]], [four[1], four[2]]);
+            let y = a.add_slope(y, [twelve[1], twelve[2]]);
+            let [gx, gy] = a.add_slope(y, [whole[1], whole[2]]);
             out.slope[k - 1] = [a.brightness(y, zero), gx, gy];
         } else {
-            let y = a.add_slopes(&unit, &times(4.0));
-            let y = a.add_slopes(&y, &times(12.0));
-            out.full[k - 3] = a.add(&y, &times(24.0));
+            let y = a.add_slopes(&unit, &four);
+            let y = a.add_slopes(&y, &twelve);
+            out.full[k - 3] = a.add(&y, &whole);
         }
     }
 
     // The stages of the undisturbed step, which every direction shares: y2, y3, y4 are where slopes 2, 3 and 4 are taken.
-    let y2 = sum(i, half, &a.apply(i));
-    let y3 = sum(i, half, &a.apply(&y2));
-    let y4 = sum(i, V::constant(1.0), &a.apply(&y3));
+    let y2 = plus_times(i, half, &a.apply(i));
+    let y3 = plus_times(i, half, &a.apply(&y2));
+    let y4 = plus_times(i, V::constant(1.0), &a.apply(&y3));
     for j in 0..6 {
         let sigma = spread * q[6 + j].sqrt();
         let third = sixth + sixth;
         // Slopes 2, 3, 4: coefficients of sigma (k2, k3, k4) and of its square (s3, s4); the cube of slope 4 joins the odd part.
         let along = direction(&y2, j);
-        let k2 = along.map(|v| v * half);
-        let y3_odd = along.map(|v| v * quarter);
-        let k3 = a.add(&y3_odd, &direction(&y3, j).map(|v| v * half));
-        let s3 = direction(&y3_odd, j).map(|v| v * half);
+        let k2 = times(&along, half);
+        let y3_odd = times(&along, quarter);
+        let k3 = a.add(&y3_odd, &times(&direction(&y3, j), half));
+        let s3 = times(&direction(&y3_odd, j), half);
         let k4 = a.add(&k3, &direction(&y4, j));
         let s4 = a.add(&s3, &direction(&k3, j));
         let cube = direction(&s3, j);
-        let odd: [V; 6] =
-            std::array::from_fn(|k| (k2[k] + k3[k]).mul_add(third, (sigma * sigma).mul_add(cube[k], k4[k]) * sixth));
-        let even: [V; 6] = std::array::from_fn(|k| s3[k].mul_add(third, s4[k] * sixth));
+        let (mut odd, mut even) = ([zero; 6], [zero; 6]);
+        for k in 0..6 {
+            odd[k] = (k2[k] + k3[k]).mul_add(third, (sigma * sigma).mul_add(cube[k], k4[k]) * sixth);
+            even[k] = s3[k].mul_add(third, s4[k] * sixth);
+        }
         let root = q[6 + j].sqrt();
         let weight = spread * q[6 + j];
         out.odd[j] = odd;
-        out.shift = sum(&out.shift, q[6 + j], &even);
+        out.shift = plus_times(&out.shift, q[6 + j], &even);
         if j < 2 {
             // A translation has no effect on curvature, and its even part only on I.
             out.slope[2 + j] = [odd[0] * root, odd[1] * root, odd[2] * root];
             let value = weight * even[0];
             out.brightness = value.mul_add(value, out.brightness);
         } else {
-            out.full[3 + 2 * (j - 2)] = odd.map(|v| v * root);
-            out.full[4 + 2 * (j - 2)] = even.map(|v| v * weight);
+            out.full[3 + 2 * (j - 2)] = times(&odd, root);
+            out.full[4 + 2 * (j - 2)] = times(&even, weight);
         }
     }
     out

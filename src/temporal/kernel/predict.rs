@@ -4,6 +4,7 @@ use super::factor::{Columns, factor, repair};
 use super::moments::{cross, outer};
 use super::noise::noise_pairs;
 use super::transition::{Generator, Step};
+use super::vector::{minus, plus, six, times};
 use super::{BLOCK, Constants, Lane, N, PLANES, failed, packed};
 use crate::simd::{Kernel, Lanes, SimdReal};
 use crate::temporal::FilterForm;
@@ -39,21 +40,18 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
         for (block, repaired) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.repaired.chunks_exact_mut(BLOCK))
         {
             for at in (0..BLOCK).step_by(V::LANES) {
-                let mut lane = Lane::<V>::load(block, at);
-                let (mut columns, ok) = factor(&lane.cov, order);
-                let mut bad = failed(ok);
-                while bad != 0 {
-                    for k in 0..V::LANES {
-                        if bad >> k & 1 == 1 {
-                            repair(block, at + k, self.constants);
-                            repaired[at + k] = 1;
-                        }
+                let (mut lane, columns) = loop {
+                    let lane = Lane::<V>::load(block, at);
+                    let (columns, ok) = factor(&lane.cov, order);
+                    let bad = failed(ok);
+                    if bad == 0 {
+                        break (lane, columns);
                     }
-                    lane = Lane::load(block, at);
-                    let again = factor(&lane.cov, order);
-                    columns = again.0;
-                    bad = failed(again.1);
-                }
+                    for k in (0..V::LANES).filter(|k| bad >> k & 1 == 1) {
+                        repair(block, at + k, self.constants);
+                        repaired[at + k] = 1;
+                    }
+                };
                 predict::<V, S, FORM>(&mut lane, &columns, self.constants);
                 lane.store(block, at);
             }
@@ -69,8 +67,9 @@ fn predict<V: Lanes, S: Step, const FORM: u8>(
 ) {
     // Nothing depends on I: moving it without its value keeps the digits of what is added to it.
     let brightness = lane.mean[0];
-    let i: [V; 6] = std::array::from_fn(|k| if k == 0 { V::zero() } else { lane.mean[k] });
-    let m: [V; 6] = std::array::from_fn(|k| lane.mean[6 + k]);
+    let mut i = six(&lane.mean, 0);
+    i[0] = V::zero();
+    let m = six(&lane.mean, 6);
     let map = S::map(&m);
     let centre = S::apply(&map, &i);
 
@@ -119,26 +118,24 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
     let mut differences = [[V::zero(); 6]; PAIRS];
     let mut sums = [V::zero(); 6];
     for k in 0..PAIRS {
-        let step: [V; N] = columns[k].map(|v| v * spread);
-        let plus = S::advance(&std::array::from_fn(|j| i[j] + step[j]), &std::array::from_fn(|j| m[j] + step[6 + j]));
-        let minus = S::advance(&std::array::from_fn(|j| i[j] - step[j]), &std::array::from_fn(|j| m[j] - step[6 + j]));
-        for j in 0..6 {
-            let (a, b) = (plus[j] - centre[j], minus[j] - centre[j]);
-            images[2 * k][j] = a;
-            images[2 * k + 1][j] = b;
-            differences[k][j] = a - b;
-            sums[j] = sums[j] + (a + b);
-        }
+        let step = times(&columns[k], spread);
+        let (di, dm) = (six(&step, 0), six(&step, 6));
+        let a = minus(&S::advance(&plus(i, &di), &plus(m, &dm)), centre);
+        let b = minus(&S::advance(&minus(i, &di), &minus(m, &dm)), centre);
+        images[2 * k] = a;
+        images[2 * k + 1] = b;
+        differences[k] = minus(&a, &b);
+        sums = plus(&sums, &plus(&a, &b));
     }
     let inverse = one / spread;
     let scale = half * inverse * inverse;
-    let mut shift = sums.map(|v| v * scale);
+    let mut shift = times(&sums, scale);
     // Vectors of weight one undo the scale that all share.
     let whole = spread * V::constant(std::f64::consts::SQRT_2);
     if FORM == AUGMENTED && S::NOISE_INSIDE {
         let noise = noise_pairs(i, &Generator::new(m), constants);
         for k in 0..noise.full.len() {
-            images[POINTS + k] = noise.full[k].map(|v| v * whole);
+            images[POINTS + k] = times(&noise.full[k], whole);
         }
         outer(&images, scale, &mut lane.cov);
         cross(&differences, columns, half * inverse, &mut lane.cov);
@@ -168,8 +165,7 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
 fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, out: &mut [[V; 6]]) {
     let map = S::map(m);
     for k in 6..9 {
-        let c = &columns[k];
-        out[k - 6] = S::apply(&map, &[c[0], c[1], c[2], c[3], c[4], c[5]]).map(|v| v * whole);
+        out[k - 6] = times(&S::apply(&map, &six(&columns[k], 0)), whole);
     }
     for k in 9..12 {
         let [value, gx, gy] = S::apply_slope(&map, &[columns[k][0], columns[k][1], columns[k][2]]);
@@ -182,7 +178,7 @@ fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, ou
 fn linearised<V: Lanes, S: Step>(lane: &mut Lane<V>, columns: &Columns<V>, i: &[V; 6], m: &[V; 6], map: &S::Map<V>) {
     let mut moved = [[V::zero(); 6]; N];
     for k in 0..N {
-        moved[k] = S::apply(map, &std::array::from_fn(|j| columns[k][j]));
+        moved[k] = S::apply(map, &six(&columns[k], 0));
     }
     for direction in 0..6 {
         let tangent = S::tangent(i, m, direction);

@@ -2,6 +2,7 @@
 //!
 //! `A(m)` is block triangular: the Hessian feeds the gradient, the gradient feeds `I`, and `I` feeds nothing.
 
+use super::vector::{plus, times};
 use crate::simd::Lanes;
 
 /// A step over one frame.
@@ -93,7 +94,7 @@ impl<V: Lanes> Generator<V> {
 #[inline(always)]
 pub(in crate::temporal) fn direction<V: Lanes>(y: &[V; 6], direction: usize) -> [V; 6] {
     let o = V::zero();
-    let [_, gx, gy, xx, xy, yy] = y.map(|v| -v);
+    let [gx, gy, xx, xy, yy] = [-y[1], -y[2], -y[3], -y[4], -y[5]];
     match direction {
         0 => [gx, xx, xy, o, o, o],
         1 => [gy, xy, yy, o, o, o],
@@ -105,9 +106,8 @@ pub(in crate::temporal) fn direction<V: Lanes>(y: &[V; 6], direction: usize) -> 
 }
 
 #[inline(always)]
-fn scaled<V: Lanes>(y: &[V; 6], factor: f64) -> [V; 6] {
-    let factor = V::constant(factor);
-    y.map(|v| v * factor)
+fn scaled<V: Lanes, const K: usize>(y: &[V; K], factor: f64) -> [V; K] {
+    times(y, V::constant(factor))
 }
 
 /// One classical Runge-Kutta step. For constant `m` it is the Taylor polynomial `1 + A + A^2/2 + A^3/6 + A^4/24`.
@@ -139,7 +139,7 @@ impl Step for Rk4 {
             let multiple = V::constant(multiple);
             y = a.add_slope(y, [i[1] * multiple, i[2] * multiple]);
         }
-        let y = y.map(|v| v * V::constant(1.0 / 24.0));
+        let y = scaled(&y, 1.0 / 24.0);
         let [gx, gy] = a.add_slope(y, [i[1], i[2]]);
         [a.brightness(y, i[0]), gx, gy]
     }
@@ -152,7 +152,7 @@ impl Step for Rk4 {
             let slope = scaled(&a.add(&t, &direction(&y, k)), 1.0 / order);
             let step = scaled(&a.apply(&y), 1.0 / order);
             t = slope;
-            y = std::array::from_fn(|j| i[j] + step[j]);
+            y = plus(i, &step);
         }
         t
     }
@@ -205,19 +205,19 @@ fn backward_map<V: Lanes, const TANGENT: bool>(m: &[V; 6], k: usize) -> (Affine<
         let inverse = 1.0 / order as f64;
         if TANGENT {
             let (p, q) = (linear_product(&linear_part(&dx), &d), linear_product(&linear_part(&x), &t));
-            t = scaled(&std::array::from_fn(|j| dx[j] + (p[j] + q[j])), inverse);
+            t = scaled(&plus(&dx, &plus(&p, &q)), inverse);
         }
         let p = linear_product(&linear_part(&x), &d);
-        d = scaled(&std::array::from_fn(|j| x[j] + p[j]), inverse);
+        d = scaled(&plus(&x, &p), inverse);
     }
     // (1 + D)^2 = 1 + (2 D + D^2).
     for _ in 0..SQUARINGS {
         if TANGENT {
             let (p, q) = (linear_product(&linear_part(&t), &d), linear_product(&linear_part(&d), &t));
-            t = std::array::from_fn(|j| t[j] + t[j] + (p[j] + q[j]));
+            t = plus(&plus(&t, &t), &plus(&p, &q));
         }
         let p = linear_product(&linear_part(&d), &d);
-        d = std::array::from_fn(|j| d[j] + d[j] + p[j]);
+        d = plus(&plus(&d, &d), &p);
     }
     (d, t)
 }

@@ -18,7 +18,6 @@ pub(in crate::temporal) struct Decorrelation<T> {
 impl<T: SimdReal> Decorrelation<T> {
     /// From the jet's covariance, by its `L D L^T` factors with `I` taken last.
     pub(in crate::temporal) fn new(covariance: &[[f64; 6]; 6]) -> Self {
-        const ORDER: [usize; 6] = [1, 2, 3, 4, 5, 0];
         let mut rest = *covariance;
         let (mut variances, mut steps) = ([0.0; 6], Vec::new());
         for (place, &j) in ORDER.iter().enumerate() {
@@ -89,19 +88,69 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
     }
 }
 
+/// The update of one vector of pixels.
+///
+/// Only the brightness block has to be worked through component by component; what that does to one column of the other blocks is the same six
+/// elimination steps, done with the column in registers, and the motion block takes all six at once.
 #[inline(always)]
 fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelation: &Decorrelation<V::Scalar>) {
-    for &(row, source, factor) in &decorrelation.steps {
-        let factor = V::splat(factor);
-        jet[row] = jet[source].mul_add(factor, jet[row]);
-        combine(lane, row, source, factor);
+    let steps = &decorrelation.steps;
+    // The two steps of a rectangle are known beforehand; written out they cost no address arithmetic.
+    let rectangle = match steps[..] {
+        [(0, 3, x), (0, 5, y)] => Some((V::splat(x), V::splat(y))),
+        _ => None,
+    };
+    if let Some((x, y)) = rectangle {
+        jet[0] = jet[3].mul_add(x, jet[5].mul_add(y, jet[0]));
+        combine(lane, 0, 3, x);
+        combine(lane, 0, 5, y);
+    } else {
+        for &(row, source, factor) in steps {
+            let factor = V::splat(factor);
+            jet[row] = jet[source].mul_add(factor, jet[row]);
+            combine(lane, row, source, factor);
+        }
     }
-    macro_rules! each {
-        ($($j:literal)*) => { $(take_in::<V, $j>(lane, jet, present, V::splat(decorrelation.variances[$j]));)* };
+    let elimination = brightness_block(lane, jet, present, &decorrelation.variances);
+    let (mut rows, mut gains) = ([[V::zero(); 6]; 6], [[V::zero(); 6]; 6]);
+    for m in 0..6 {
+        let mut column = [V::zero(); 6];
+        for j in 0..6 {
+            column[j] = lane.cov[packed(6 + m, j)];
+        }
+        elimination.run(&mut column, &mut rows[m]);
+        let mut mean = lane.mean[6 + m];
+        for j in 0..6 {
+            lane.cov[packed(6 + m, j)] = column[j];
+            gains[m][j] = rows[m][j] * elimination.inverse[j];
+            mean = gains[m][j].mul_add(elimination.innovation[j], mean);
+        }
+        lane.mean[6 + m] = mean;
     }
-    each!(1 2 3 4 5 0);
-    for &(row, source, factor) in decorrelation.steps.iter().rev() {
-        combine(lane, row, source, -V::splat(factor));
+    macro_rules! motion_rows {
+        ($($a:literal)*) => { $(motion_row::<V, $a>(&mut lane.cov, &rows, &gains[$a]);)* };
+    }
+    motion_rows!(0 1 2 3 4 5);
+    if let Some((x, y)) = rectangle {
+        combine(lane, 0, 5, -y);
+        combine(lane, 0, 3, -x);
+    } else {
+        for &(row, source, factor) in steps.iter().rev() {
+            combine(lane, row, source, -V::splat(factor));
+        }
+    }
+}
+
+/// `P_ab - sum_j K_aj P_jb` for one row of the motion block.
+#[inline(always)]
+fn motion_row<V: Lanes, const A: usize>(cov: &mut [V; PACKED], rows: &[[V; 6]; 6], gain: &[V; 6]) {
+    for b in 0..=A {
+        let at = packed(6 + A, 6 + b);
+        let mut sum = cov[at];
+        for j in 0..6 {
+            sum = gain[j].neg_mul_add(rows[b][j], sum);
+        }
+        cov[at] = sum;
     }
 }
 
@@ -120,38 +169,76 @@ fn combine<V: Lanes>(lane: &mut Lane<V>, row: usize, source: usize, factor: V) {
     lane.cov[at] = (before + lane.cov[packed(row, source)]).mul_add(factor, lane.cov[at]);
 }
 
-/// Takes in component `J` of the jet, measured with variance `r`.
-///
-/// The component's own row is multiplied by `r / s`, exactly what subtraction would leave, without the cancellation.
-#[inline(always)]
-fn take_in<V: Lanes, const J: usize>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: V) {
-    let one = V::constant(1.0);
-    let inverse = present / (lane.cov[packed(J, J)] + r);
-    let keep = r.mul_add(inverse, one - present);
-    let innovation = jet[J] - lane.mean[J];
-    let (mut row, mut gain) = ([V::zero(); N], [V::zero(); N]);
-    for k in 0..N {
-        row[k] = lane.cov[packed(J, k)];
-        gain[k] = row[k] * inverse;
-        lane.mean[k] = gain[k].mul_add(innovation, lane.mean[k]);
-    }
-    subtract::<V, J>(&mut lane.cov, &row, &gain);
-    for k in 0..N {
-        lane.cov[packed(J, k)] = row[k] * keep;
+/// The six scalar updates, as they act on any column.
+struct Elimination<V> {
+    /// `gain[j][k]`: what component `k` gains for each unit of innovation `j`; unused for `k = j`.
+    gain: [[V; 6]; 6],
+    /// `r_j / s_j`: what is left of component `j`'s own row.
+    keep: [V; 6],
+    /// `1 / s_j`.
+    inverse: [V; 6],
+    /// The innovations.
+    innovation: [V; 6],
+}
+
+/// The order of the updates: `I`, which the others make independent, comes last.
+const ORDER: [usize; 6] = [1, 2, 3, 4, 5, 0];
+
+impl<V: Lanes> Elimination<V> {
+    /// Takes one column through all updates; `rows[j]` receives its component `j` as update `j` met it.
+    #[inline(always)]
+    fn run(&self, column: &mut [V; 6], rows: &mut [V; 6]) {
+        for j in ORDER {
+            let own = column[j];
+            rows[j] = own;
+            for k in 0..6 {
+                if k != j {
+                    column[k] = self.gain[j][k].neg_mul_add(own, column[k]);
+                }
+            }
+            column[j] = own * self.keep[j];
+        }
     }
 }
 
+/// Updates mean and covariance of the brightness with six components of variances `r`.
+///
+/// A component's own row is multiplied by `r / s`, exactly what subtraction would leave, without the cancellation.
 #[inline(always)]
-fn subtract<V: Lanes, const J: usize>(cov: &mut [V; PACKED], row: &[V; N], gain: &[V; N]) {
-    for a in 0..N {
-        if a != J {
-            for b in 0..=a {
-                if b != J {
-                    let at = packed(a, b);
-                    cov[at] = gain[a].neg_mul_add(row[b], cov[at]);
-                }
+fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V::Scalar; 6]) -> Elimination<V> {
+    let (zero, missing) = (V::zero(), V::constant(1.0) - present);
+    let mut all = Elimination { gain: [[zero; 6]; 6], keep: [zero; 6], inverse: [zero; 6], innovation: [zero; 6] };
+    macro_rules! each {
+        ($($j:literal)*) => {$({
+            let r = V::splat(r[$j]);
+            all.inverse[$j] = present / (lane.cov[packed($j, $j)] + r);
+            all.keep[$j] = r.mul_add(all.inverse[$j], missing);
+            all.innovation[$j] = jet[$j] - lane.mean[$j];
+            take_in::<V, $j>(lane, &mut all);
+        })*};
+    }
+    each!(1 2 3 4 5 0);
+    all
+}
+
+#[inline(always)]
+fn take_in<V: Lanes, const J: usize>(lane: &mut Lane<V>, all: &mut Elimination<V>) {
+    let mut row = [V::zero(); 6];
+    for k in 0..6 {
+        row[k] = lane.cov[packed(J, k)];
+        all.gain[J][k] = row[k] * all.inverse[J];
+        lane.mean[k] = all.gain[J][k].mul_add(all.innovation[J], lane.mean[k]);
+    }
+    for a in 0..6 {
+        for b in 0..6 {
+            if b <= a && a != J && b != J {
+                let at = packed(a, b);
+                lane.cov[at] = all.gain[J][a].neg_mul_add(row[b], lane.cov[at]);
             }
         }
+    }
+    for k in 0..6 {
+        lane.cov[packed(J, k)] = row[k] * all.keep[J];
     }
 }
 

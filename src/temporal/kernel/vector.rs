@@ -1,0 +1,54 @@
+//! Short vectors of lanes. Plain loops, because closures and the standard library's array methods do not inherit target features: where one of
+//! them is not inlined, every operation inside becomes a function call.
+
+use crate::simd::Lanes;
+
+/// `y factor`.
+#[inline(always)]
+pub(super) fn times<V: Lanes, const K: usize>(y: &[V; K], factor: V) -> [V; K] {
+    let mut out = *y;
+    for v in &mut out {
+        *v = *v * factor;
+    }
+    out
+}
+
+/// `a + b`.
+#[inline(always)]
+pub(super) fn plus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] {
+    let mut out = *a;
+    for k in 0..K {
+        out[k] = out[k] + b[k];
+    }
+    out
+}
+
+/// `a - b`.
+#[inline(always)]
+pub(super) fn minus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] {
+    let mut out = *a;
+    for k in 0..K {
+        out[k] = out[k] - b[k];
+    }
+    out
+}
+
+/// `a + factor b`.
+#[inline(always)]
+pub(super) fn plus_times<V: Lanes, const K: usize>(a: &[V; K], factor: V, b: &[V; K]) -> [V; K] {
+    let mut out = *a;
+    for k in 0..K {
+        out[k] = b[k].mul_add(factor, out[k]);
+    }
+    out
+}
+
+/// Entries `from .. from + 6`.
+#[inline(always)]
+pub(super) fn six<V: Lanes, const K: usize>(all: &[V; K], from: usize) -> [V; 6] {
+    let mut out = [V::zero(); 6];
+    for k in 0..6 {
+        out[k] = all[from + k];
+    }
+    out
+}
