@@ -19,6 +19,15 @@ pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pn
 pub(crate) const MAX_SIDE: usize = 65_536;
 /// Most memory one decoded picture may take, bytes.
 const MAX_BYTES: u64 = 2 << 30;
+/// Bytes of picture that one byte of file can stand for in the densest of the codings (long runs in LZW), with room to spare.
+const MAX_EXPANSION: u64 = 4096;
+/// Memory that any file may ask for: decoders keep buffers of their own.
+const FREE_BYTES: u64 = 16 << 20;
+
+/// Memory that decoding `file` may take: what its own length can justify.
+fn memory_limit(file: &File) -> std::io::Result<u64> {
+    Ok(file.metadata()?.len().saturating_mul(MAX_EXPANSION).saturating_add(FREE_BYTES).min(MAX_BYTES))
+}
 
 /// Refuses sizes that no frame has, before memory is taken for them.
 pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<()> {
@@ -62,13 +71,14 @@ pub(crate) fn is_tiff(path: &Path) -> Result<bool> {
 
 fn guessing_reader(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    let memory = memory_limit(&file).map_err(|e| Error::io(path, e))?;
     let mut reader = ImageReader::new(BufReader::with_capacity(1 << 16, file))
         .with_guessed_format()
         .map_err(|e| Error::io(path, e))?;
     let mut limits = ::image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE as u32);
     limits.max_image_height = Some(MAX_SIDE as u32);
-    limits.max_alloc = Some(MAX_BYTES);
+    limits.max_alloc = Some(memory);
     reader.limits(limits);
     Ok(reader)
 }
@@ -175,8 +185,9 @@ pub(crate) struct TiffPages {
 impl TiffPages {
     pub(crate) fn open(path: &Path, colour: Colour) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        let memory = memory_limit(&file).map_err(|e| Error::io(path, e))?;
         let mut limits = tiff::decoder::Limits::default();
-        limits.decoding_buffer_size = MAX_BYTES as usize;
+        limits.decoding_buffer_size = memory as usize;
         let decoder = Decoder::new(BufReader::with_capacity(1 << 16, file)).map_err(|e| tiff_error(path, e))?;
         Ok(Self { path: path.to_path_buf(), colour, decoder: Some(decoder.with_limits(limits)), page: 0 })
     }

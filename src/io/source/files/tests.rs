@@ -138,6 +138,11 @@ fn damaged_files_are_format_errors_with_their_path() {
     let huge = folder.path().join("huge.pgm");
     fs::write(&huge, "P5 60000 60000 255\nx").unwrap();
     assert!(matches!(read_image(&huge, Colour::Error), Err(Error::Format { .. })));
+    fs::write(&huge, "P5 20000 20000 255\nx").unwrap();
+    assert!(
+        read_image(&huge, Colour::Error).unwrap_err().to_string().contains("too large"),
+        "a few bytes cannot hold 400 megapixels"
+    );
     fs::write(&huge, "P5 4000000000 4000000000 255\nx").unwrap();
     assert!(matches!(read_image(&huge, Colour::Error), Err(Error::Format { .. })));
 }
