@@ -6,7 +6,7 @@ use super::model::{ModelKind, Parameter};
 use super::options::{Common, Method};
 use super::windowed::Windowed;
 use crate::error::{Error, Result};
-use crate::simd::SimdReal;
+use crate::simd::{SimdReal, same, same_mut};
 use crate::types::{FieldLayout, FlowField, Frame};
 
 /// A method made ready: options checked, stencils and kernels computed.
@@ -162,7 +162,28 @@ impl Estimator {
         Ok(())
     }
 
+    /// Hands over to the instance for the precision at hand. Both are compiled here, once, and not again in every crate that calls this door.
     fn fill<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
+        if let Some(field) = same_mut::<_, FlowField<f32>>(field) {
+            self.fill_single(&frames.iter().filter_map(|f| same(*f)).collect::<Vec<_>>(), field)
+        } else if let Some(field) = same_mut::<_, FlowField<f64>>(field) {
+            self.fill_double(&frames.iter().filter_map(|f| same(*f)).collect::<Vec<_>>(), field)
+        } else {
+            Err(Error::argument("frames", "float32 or float64 precision", std::any::type_name::<T>()))
+        }
+    }
+
+    #[inline(never)]
+    fn fill_single(&self, frames: &[&Frame<f32>], field: &mut FlowField<f32>) -> Result<()> {
+        self.fill_with(frames, field)
+    }
+
+    #[inline(never)]
+    fn fill_double(&self, frames: &[&Frame<f64>], field: &mut FlowField<f64>) -> Result<()> {
+        self.fill_with(frames, field)
+    }
+
+    fn fill_with<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
         let n = field.len();
         if self.common.diagnostics {
             field.residual.get_or_insert_default().resize(n, T::nan());

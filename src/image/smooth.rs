@@ -3,7 +3,7 @@
 use super::Border;
 use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
-use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};
 use crate::types::Frame;
 
 /// Taps on one side beyond which smoothing is refused: far wider than any picture.
@@ -85,9 +85,27 @@ impl GaussianSmoother {
     pub fn apply_at<T: SimdReal>(&self, level: Level, frame: &Frame<T>) -> Frame<T> {
         let (width, height) = frame.size();
         let mut out = Frame::filled(width, height, T::from_f64(0.0));
-        let kernel = SeparableKernel::symmetric(&self.half_kernel(), self.border);
-        convolve_separable(level, &kernel, frame.data(), width, out.data_mut());
+        if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+            self.apply_single(level, frame, out);
+        } else if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+            self.apply_double(level, frame, out);
+        }
         out
+    }
+
+    #[inline(never)]
+    fn apply_single(&self, level: Level, frame: &Frame<f32>, out: &mut Frame<f32>) {
+        self.apply_with(level, frame, out);
+    }
+
+    #[inline(never)]
+    fn apply_double(&self, level: Level, frame: &Frame<f64>, out: &mut Frame<f64>) {
+        self.apply_with(level, frame, out);
+    }
+
+    fn apply_with<T: SimdReal>(&self, level: Level, frame: &Frame<T>, out: &mut Frame<T>) {
+        let kernel = SeparableKernel::symmetric(&self.half_kernel(), self.border);
+        convolve_separable(level, &kernel, frame.data(), frame.width(), out.data_mut());
     }
 }
 

@@ -4,7 +4,7 @@ use super::rows::JetRows;
 use super::stencil::JetStencil;
 use crate::math::Real;
 use crate::parallel::{BAND_ROWS, Threads};
-use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};
 use crate::types::Frame;
 use rayon::prelude::*;
 
@@ -16,6 +16,11 @@ pub struct JetPlanes<T> {
 }
 
 impl<T: Real> JetPlanes<T> {
+    /// Planes of NaN.
+    fn empty((width, height): (usize, usize)) -> Self {
+        Self { planes: std::array::from_fn(|_| Frame::filled(width, height, T::nan())) }
+    }
+
     /// The jet at pixel `(x, y)`.
     #[inline]
     pub fn get(&self, x: usize, y: usize) -> [T; 6] {
@@ -67,8 +72,23 @@ impl JetStencil {
 
     /// As [`JetStencil::planes`], at a given instruction set.
     pub fn planes_with<T: SimdReal>(&self, frame: &Frame<T>, threads: Threads, level: Level) -> JetPlanes<T> {
-        let rows = JetRows::new(self);
-        planes_of(&rows, self, frame, threads, level)
+        let mut out = JetPlanes::empty(frame.size());
+        if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+            self.planes_single(frame, threads, level, out);
+        } else if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+            self.planes_double(frame, threads, level, out);
+        }
+        out
+    }
+
+    #[inline(never)]
+    fn planes_single(&self, frame: &Frame<f32>, threads: Threads, level: Level, out: &mut JetPlanes<f32>) {
+        planes_of(&JetRows::new(self), self, frame, threads, level, out);
+    }
+
+    #[inline(never)]
+    fn planes_double(&self, frame: &Frame<f64>, threads: Threads, level: Level, out: &mut JetPlanes<f64>) {
+        planes_of(&JetRows::new(self), self, frame, threads, level, out);
     }
 }
 
@@ -78,9 +98,9 @@ fn planes_of<T: SimdReal>(
     frame: &Frame<T>,
     threads: Threads,
     level: Level,
-) -> JetPlanes<T> {
+    JetPlanes { planes }: &mut JetPlanes<T>,
+) {
     let (width, height) = frame.size();
-    let mut planes: [Frame<T>; 6] = std::array::from_fn(|_| Frame::filled(width, height, T::nan()));
     if width > 0 {
         let mut chunks = planes.each_mut().map(|p| p.data_mut().chunks_mut(BAND_ROWS * width));
         let bands: Vec<Band<'_, T>> = (0..height.div_ceil(BAND_ROWS))
@@ -93,7 +113,6 @@ fn planes_of<T: SimdReal>(
             });
         });
     }
-    JetPlanes { planes }
 }
 
 #[cfg(test)]
@@ -154,7 +173,8 @@ mod tests {
         for shape in shapes() {
             let stencil = JetStencil::new(&shape, (1.0, 1.0)).unwrap();
             let direct = JetRows::new_direct(&stencil);
-            let want = planes_of(&direct, &stencil, &frame, Threads::default(), Level::SCALAR);
+            let mut want = JetPlanes::empty(frame.size());
+            planes_of(&direct, &stencil, &frame, Threads::default(), Level::SCALAR, &mut want);
             let got = stencil.planes_with(&frame, Threads::default(), Level::SCALAR);
             for (g, w) in got.planes.iter().zip(&want.planes) {
                 assert!(g.data().iter().zip(w.data()).all(|(g, w)| close(*g, *w, 1e-11)), "{shape:?}");

@@ -8,10 +8,12 @@
 //! `#[inline(always)]` on `run` and on everything hot that it calls.
 
 mod lanes;
+mod precision;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub(crate) use lanes::{Lanes, SimdReal};
+pub(crate) use precision::{same, same_mut};
 
 use crate::error::{Error, Result};
 use std::sync::OnceLock;
