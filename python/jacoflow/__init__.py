@@ -10,7 +10,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 (1, 64, 96)
 """
 
-from . import filters, scenes
+from . import filters, io, scenes
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -47,6 +47,7 @@ __all__ = [
     "classify",
     "estimate",
     "filters",
+    "io",
     "luminance",
     "observability",
     "quantise",

@@ -64,7 +64,7 @@ class ObservabilityMap:
     @property
     def observable(self) -> NDArray[np.bool_]:
         """Where all six unknowns are determined, bool array (H, W)."""
-        return self.known & (self.rank == 6)
+        return np.logical_and(self.known, self.rank == 6)
 
 
 def observability(

@@ -18,7 +18,6 @@ from ._jacoflow import FormatError, MissingDependencyError
 
 __all__ = ["Video", "frames"]
 
-Grey = Literal["luma", "bt601"]
 
 
 def frames(
@@ -27,7 +26,7 @@ def frames(
     start: int = 0,
     stop: int | None = None,
     step: int = 1,
-    grey: Grey | None = "luma",
+    grey: Literal["luma", "bt601"] | None = "luma",
 ) -> Iterator[NDArray[np.uint8]]:
     """The frames of a video one by one, as grey uint8 arrays (H, W); memory stays bounded whatever the length, and the file is closed when the loop ends or is left.
 
@@ -75,7 +74,7 @@ class Video:
         start: int = 0,
         stop: int | None = None,
         step: int = 1,
-        grey: Grey | None = "luma",
+        grey: Literal["luma", "bt601"] | None = "luma",
     ) -> None:
         """Opens the file and reads its header; shapes and units as in `frames`."""
         if start < 0:

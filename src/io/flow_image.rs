@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Sites};
+use crate::types::{FieldLayout, FlowField, Sites, Status};
 
 /// Flow `(u, v)` of every pixel of a grid, px/frame; NaN where it is unknown.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +51,28 @@ impl FlowImage {
         Self::new(field.width, field.height, plane(0, dx), plane(1, dy))
     }
 
+    /// As a field of the translational model: every pixel a site, status `Unobservable` where the flow is unknown.
+    ///
+    /// # Errors
+    /// None for a well-formed image; passes on what [`FlowField::empty`] reports.
+    pub fn to_field(&self) -> Result<FlowField<f32>> {
+        let layout = FieldLayout {
+            frame_size: (self.width, self.height),
+            sites: Sites::default(),
+            model: "translational".into(),
+            parameters: vec!["u".into(), "v".into()],
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 0,
+        };
+        let mut field = FlowField::empty(layout, false)?;
+        field.motion = [self.u.as_slice(), &self.v].concat();
+        for (status, (u, v)) in field.status.iter_mut().zip(self.u.iter().zip(&self.v)) {
+            *status = if u.is_finite() && v.is_finite() { Status::Ok } else { Status::Unobservable };
+        }
+        Ok(field)
+    }
+
     /// Columns.
     pub fn width(&self) -> usize {
         self.width
@@ -77,7 +99,6 @@ impl FlowImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::FieldLayout;
 
     fn field(sites: Sites) -> FlowField<f64> {
         let layout = FieldLayout {
@@ -99,6 +120,15 @@ mod tests {
         let image = FlowImage::from_field(&field).unwrap();
         assert_eq!((image.u()[0], image.v()[0]), (2.0, 4.0));
         assert!(image.u()[1].is_nan() && image.valid_share() == 0.5);
+    }
+
+    #[test]
+    fn an_image_becomes_a_field_and_comes_back() {
+        let image = FlowImage::new(2, 1, vec![1.0, f32::NAN], vec![2.0, f32::NAN]).unwrap();
+        let field = image.to_field().unwrap();
+        assert_eq!(field.status, [Status::Ok, Status::Unobservable]);
+        let back = FlowImage::from_field(&field).unwrap();
+        assert_eq!((back.u()[0], back.v()[0], back.u()[1].is_nan()), (1.0, 2.0, true));
     }
 
     #[test]

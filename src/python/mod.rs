@@ -11,6 +11,7 @@ mod field;
 mod filters;
 mod flow_filter;
 mod image;
+mod io;
 mod observability;
 mod options;
 mod progress;
@@ -39,6 +40,10 @@ mod _jacoflow {
     use super::flow_filter::FlowFilter;
     #[pymodule_export]
     use super::image::{luminance, quantise, smooth};
+    #[pymodule_export]
+    use super::io::{
+        FrameReader, open_frames, read_float_map, read_flow, read_one_image, write_float_map, write_flow, write_frames,
+    };
     #[pymodule_export]
     use super::observability::{classify, observability};
     #[pymodule_export]

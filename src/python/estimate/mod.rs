@@ -78,9 +78,76 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
     fields.finish()
 }
 
-/// Flow, its Jacobian and their covariance from two or three frames, or from a stack.
+/// Flow, its Jacobian and their covariance, from two or three frames or from a stack.
 ///
-/// See the stub and the reference for the options; all of them are keywords.
+/// A list or tuple of exactly as many frames (H, W) as the method needs (three; two for a baseline with time_scheme="pair") gives one FlowField (H, W), more
+/// give a stack (T - 2, H, W); an array (T, H, W) always gives a stack. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
+/// gain does not change the flow. float64 is computed in float64, everything else in float32. Inputs are never modified.
+///
+/// Parameters
+/// ----------
+/// frames : array (T, H, W), or list of arrays (H, W)
+///     Oldest first, one size, at least 3 x 3 px.
+/// method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
+///     "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
+///     nearly noise-free images. The others are baselines.
+/// model : "affine", "translational" or "accelerating"
+///     Motion model of "instantaneous".
+/// time_scheme : "central" (default), "backward" or, for baselines, "pair"
+///     How time derivatives are taken, and so to which frame the field belongs: the middle or the newest one.
+/// neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
+///     Pixels that the local quadratic is fitted to; default 3 x 3.
+/// neighbourhood_sigma : float, px
+///     Weighs them by a Gaussian; default equal weights.
+/// window_sigma : float, px
+///     Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
+/// rows : "brightness", "gradient", "jet" or "all"
+///     Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel.
+/// smoothness : float, grey levels per px
+///     Weight of "horn_schunck"; default the root mean square gradient.
+/// iterations : int
+///     Most iterations of "horn_schunck".
+/// rank_deficient : "nan" or "min_norm"
+///     What "instantaneous" reports where the equations do not determine every unknown.
+/// smooth : float, px
+///     Standard deviation of a Gaussian that smooths each frame first; default none.
+/// quantise : float, grey levels
+///     Rounds samples down to multiples of it before smoothing; default none.
+/// colour : "error" (default) or "luminance"
+///     What to do with frames (H, W, 3 or 4).
+/// points : array (N, 2) of int, px
+///     Pixels (x, y) to estimate at, nothing else is computed; arrays of the result are (..., N) instead of (..., H, W).
+/// region : (x, y, width, height), px
+///     Rectangle to estimate in.
+/// stride : int, px
+///     Estimate at every stride-th column and row.
+/// mask : bool array (H, W)
+///     True where pixels may be used.
+/// fps, frame_period : float, frames/s or s
+///     For quantities per second; give one of them.
+/// pixel_pitch : float or (dx, dy), any length unit
+///     Size of a pixel; flow then comes in that unit per frame.
+/// covariance : bool
+///     Whether to compute the covariance of the parameters.
+/// diagnostics : bool
+///     Whether to report residual, rank and condition number.
+/// noise : float, grey levels
+///     Standard deviation of the pixel noise for the covariance; default from the residual.
+/// precision : "float32" or "float64"
+///     Default: that of the frames.
+/// threads : int
+///     Default: environment variable JACOFLOW_THREADS, else every processor. Results do not depend on it.
+/// simd : "scalar", "avx2" or "avx512"
+///     Default: environment variable JACOFLOW_SIMD, else the best of the processor.
+/// progress : None, True or function (done, total)
+///     True draws a line on standard error; a function is called after each frame. Ctrl-C stops between frames.
+///
+/// Raises
+/// ------
+/// ValueError
+///     For fewer than three frames, frames under 3 x 3 px or of different sizes, colour, and options out of range; each message names the argument.
+/// TypeError
+///     For another dtype.
 #[pyfunction]
 #[pyo3(signature = (
     frames, *, method="windowed", model="affine", time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, window_sigma=None,

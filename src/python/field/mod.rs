@@ -53,6 +53,10 @@ impl Stored for f64 {
     }
 }
 
+/// Flow with its Jacobian, covariance and status: the result of every estimator.
+///
+/// Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field of a stack. Flow in px/frame, derivatives in
+/// 1/frame (or in units of `pixel_pitch`). NaN where `status` says why. Most arrays are read-only views that share memory.
 #[pyclass(name = "FlowField", module = "jacoflow", frozen)]
 pub struct FlowField {
     store: Store,
@@ -168,6 +172,21 @@ impl FlowField {
         };
         let array = array.map_err(|e| Error::Numerical(e.to_string()))?;
         Ok(numpy::PyArrayDyn::from_owned_array(slf.py(), array).into_any())
+    }
+
+    /// Number of fields, and whether there is a time axis.
+    pub fn count(&self) -> (usize, bool) {
+        (self.count, self.stack)
+    }
+
+    /// The planes, with those of neighbouring fields.
+    pub fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// Frame index of the first field.
+    pub fn first_frame(&self) -> usize {
+        self.layout().frame_index + self.start
     }
 
     /// Field `index` of those shown, as the core takes it.

@@ -1,11 +1,12 @@
 //! What Python sees of a `FlowField`.
 
 use super::{FlowField, Slice, Store, derived, each, state};
-use crate::python::arrays;
+use crate::python::{arrays, io};
 use crate::types::{Sites, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use std::path::PathBuf;
 
 #[pymethods]
 impl FlowField {
@@ -244,7 +245,7 @@ impl FlowField {
     /// Index of the frame the estimate belongs to, counted from 0; of the first one for a stack.
     #[getter]
     fn frame_index(&self) -> usize {
-        self.layout().frame_index + self.start
+        self.first_frame()
     }
 
     /// Size (width, height) of the frames, px.
@@ -282,6 +283,21 @@ impl FlowField {
     #[pyo3(name = "shape")]
     fn python_shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, self.shape())
+    }
+
+    /// Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo, .png (KITTI) or .pfm (flow in px/frame only).
+    ///
+    /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options` is free text kept in .npz.
+    /// OSError when the file cannot be written, ValueError for another extension.
+    #[pyo3(signature = (path, *, options=""))]
+    fn save(&self, py: Python<'_>, path: PathBuf, options: &str) -> PyResult<()> {
+        io::save_field(py, self, &path, options)
+    }
+
+    /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError for a damaged file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        io::load_field(py, &path)
     }
 
     /// Number of fields of a stack. TypeError for a single field.
@@ -324,7 +340,7 @@ impl FlowField {
         format!(
             "FlowField(shape=({shape}), model={:?}, dtype={dtype}, frame_index={}, valid={share:.1}%)",
             layout.model,
-            self.frame_index()
+            self.first_frame()
         )
     }
 

@@ -1,0 +1,789 @@
+"""The compiled part of jacoflow. Import `jacoflow` instead."""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Literal, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
+
+__all__ = [
+    "_run_command_line",
+    "FormatError",
+    "JacoflowError",
+    "MissingDependencyError",
+    "NotObservableError",
+    "NumericalError",
+    "FlowEstimator",
+    "estimate",
+    "_restore_estimator",
+    "FlowField",
+    "quantities",
+    "_restore_field",
+    "ExtendedKalmanFilter",
+    "GaussianFilter",
+    "KalmanFilter",
+    "MerweScaledSigmaPoints",
+    "UnscentedKalmanFilter",
+    "_restore_extended",
+    "_restore_kalman",
+    "_restore_unscented",
+    "FlowFilter",
+    "luminance",
+    "quantise",
+    "smooth",
+    "FrameReader",
+    "_open_frames",
+    "_read_pfm",
+    "_read_flow",
+    "_read_image",
+    "_write_pfm",
+    "_write_flow",
+    "_write_frames",
+    "_classify",
+    "_observability",
+    "Scene",
+    "Sensor",
+    "_scene_carriers",
+    "_scene_names",
+    "_scene_parameters",
+    "__version__",
+]
+
+__version__: str
+
+_Floats: TypeAlias = NDArray[np.floating[Any]]
+_Path: TypeAlias = str | os.PathLike[str]
+_Frame: TypeAlias = NDArray[Any]
+_Frames: TypeAlias = NDArray[Any] | Sequence[NDArray[Any]]
+_Rectangle: TypeAlias = tuple[int, int, int, int]
+_Method: TypeAlias = Literal["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]
+_Model: TypeAlias = Literal["affine", "translational", "accelerating"]
+_Scheme: TypeAlias = Literal["central", "backward", "pair"]
+_Rows: TypeAlias = Literal["brightness", "gradient", "jet", "all"]
+_Rank: TypeAlias = Literal["nan", "min_norm"]
+_Colour: TypeAlias = Literal["error", "luminance"]
+_Precision: TypeAlias = Literal["float32", "float64"]
+_Simd: TypeAlias = Literal["scalar", "avx2", "avx512"]
+_Progress: TypeAlias = bool | Callable[[int, int], object]
+_Callback: TypeAlias = Callable[..., ArrayLike]
+
+class JacoflowError(Exception):
+    """Base class of the errors that are jacoflow's own (bad arguments are ValueError or TypeError, files OSError)."""
+
+class FormatError(JacoflowError):
+    """A file's content is not what its format demands."""
+
+class NotObservableError(JacoflowError):
+    """The combination asked for cannot be determined from brightness, whatever the frames show."""
+
+class NumericalError(JacoflowError):
+    """A computation lost its numerical footing."""
+
+class MissingDependencyError(JacoflowError):
+    """A program or optional package that the request needs is not installed."""
+
+@final
+class FlowField:
+    """Flow with its Jacobian, covariance and status: the result of every estimator.
+
+    Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field of a stack. Flow in px/frame, derivatives in
+    1/frame (or in units of `pixel_pitch`). NaN where `status` says why. Most arrays are read-only views that share memory.
+    """
+    @property
+    def flow(self) -> _Floats:
+        """Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of `pixel_pitch` per frame.
+
+        NaN where `status` says why. A read-only view.
+        """
+    @property
+    def jacobian(self) -> _Floats:
+        """Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame: [[u_x, u_y], [v_x, v_y]].
+
+        A read-only view; zeros where the model assumes no derivatives.
+        """
+    @property
+    def u(self) -> _Floats:
+        """Flow along x (right), array (..., H, W), px/frame."""
+    @property
+    def v(self) -> _Floats:
+        """Flow along y (down), array (..., H, W), px/frame."""
+    @property
+    def u_x(self) -> _Floats:
+        """du/dx, array (..., H, W), 1/frame."""
+    @property
+    def v_x(self) -> _Floats:
+        """dv/dx, array (..., H, W), 1/frame."""
+    @property
+    def u_y(self) -> _Floats:
+        """du/dy, array (..., H, W), 1/frame."""
+    @property
+    def v_y(self) -> _Floats:
+        """dv/dy, array (..., H, W), 1/frame."""
+    @property
+    def covariance(self) -> _Floats | None:
+        """Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None if it was not asked for.
+
+        Rows and columns of parameters that the model lacks are zero. A new array at every access.
+        """
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """Status code of each site, uint8 array (..., H, W), see `Status`."""
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Where the estimate is unique and complete, bool array (..., H, W)."""
+    @property
+    def residual(self) -> _Floats | None:
+        """Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has none."""
+    @property
+    def rank(self) -> NDArray[np.uint8] | None:
+        """Rank of the equations, uint8 array (..., H, W); None if the method has none."""
+    @property
+    def condition(self) -> _Floats | None:
+        """Condition number of the equations (largest over smallest singular value), array (..., H, W); None if the method has none."""
+    @property
+    def divergence(self) -> NDArray[np.float64]:
+        """Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+    @property
+    def curl(self) -> NDArray[np.float64]:
+        """Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns clockwise on the screen."""
+    @property
+    def shear_magnitude(self) -> NDArray[np.float64]:
+        """Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+    @property
+    def shear_axis(self) -> NDArray[np.float64]:
+        """Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in (-pi/2, pi/2], from x towards y."""
+    @property
+    def angular_velocity(self) -> NDArray[np.float64]:
+        """Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period."""
+    @property
+    def rpm(self) -> NDArray[np.float64]:
+        """Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or frame_period."""
+    @property
+    def rotation_centre(self) -> NDArray[np.float64]:
+        """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
+
+        It need not be in the picture. NaN where there is none.
+        """
+    @property
+    def centre_distance(self) -> NDArray[np.float64]:
+        """Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch."""
+    @property
+    def time_to_contact(self) -> NDArray[np.float64]:
+        """Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W), frames, or s with a frame period; negative while it recedes."""
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period."""
+    def value(self, /, name: str) -> NDArray[np.float64]:
+        """The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)` tells.
+
+        Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm without a frame period.
+        """
+    def std(self, /, name: str) -> NDArray[np.float64]:
+        """Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its unit: sqrt(g^T Cov g) with its gradient g.
+
+        ValueError for another name and for a field without covariance.
+        """
+    def region_mean(
+        self,
+        /,
+        name: str,
+        region: _Rectangle | None = None,
+        aggregate: Literal["inverse_variance", "median"] | None = None,
+    ) -> tuple[float, float, int]:
+        """One number for a region: (value, standard deviation, number of sites) of the derived quantity `name`, in its unit.
+
+        `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
+        A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        """
+    def unit(self, /, name: str) -> str:
+        """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name."""
+    @property
+    def points(self) -> NDArray[np.int64]:
+        """Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2)."""
+    @property
+    def frame_index(self) -> int:
+        """Index of the frame the estimate belongs to, counted from 0; of the first one for a stack."""
+    @property
+    def frame_size(self) -> tuple[int, int]:
+        """Size (width, height) of the frames, px."""
+    @property
+    def frame_period(self) -> float | None:
+        """Seconds between frames, or None."""
+    @property
+    def pixel_pitch(self) -> tuple[float, float]:
+        """Physical size (dx, dy) of a pixel."""
+    @property
+    def model(self) -> str:
+        """Name of the motion model."""
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the model's parameters."""
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack."""
+    def save(self, /, path: _Path, *, options: str = "") -> None:
+        """Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo, .png (KITTI) or .pfm (flow in px/frame only).
+
+        A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options` is free text kept in .npz.
+        OSError when the file cannot be written, ValueError for another extension.
+        """
+    @staticmethod
+    def load(path: _Path) -> FlowField:
+        """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError for a damaged file."""
+    def __len__(self, /) -> int: ...
+    def __getitem__(self, index: int, /) -> FlowField: ...
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+def estimate(
+    frames: _Frames,
+    *,
+    method: _Method = "windowed",
+    model: _Model = "affine",
+    time_scheme: _Scheme | None = None,
+    neighbourhood: tuple[int, int] | ArrayLike | None = None,
+    neighbourhood_sigma: float | None = None,
+    window_sigma: float | None = None,
+    rows: _Rows | None = None,
+    smoothness: float | None = None,
+    iterations: int | None = None,
+    rank_deficient: _Rank = "nan",
+    smooth: float | None = None,
+    quantise: float | None = None,
+    colour: _Colour | None = None,
+    points: ArrayLike | None = None,
+    region: _Rectangle | None = None,
+    stride: int | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    fps: float | None = None,
+    frame_period: float | None = None,
+    pixel_pitch: float | tuple[float, float] | None = None,
+    covariance: bool = True,
+    diagnostics: bool = False,
+    noise: float | None = None,
+    precision: _Precision | None = None,
+    threads: int | None = None,
+    simd: _Simd | None = None,
+    progress: _Progress | None = None,
+) -> FlowField:
+    """Flow, its Jacobian and their covariance, from two or three frames or from a stack.
+
+    A list or tuple of exactly as many frames (H, W) as the method needs (three; two for a baseline with time_scheme="pair") gives one FlowField (H, W), more
+    give a stack (T - 2, H, W); an array (T, H, W) always gives a stack. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
+    gain does not change the flow. float64 is computed in float64, everything else in float32. Inputs are never modified.
+
+    Parameters
+    ----------
+    frames : array (T, H, W), or list of arrays (H, W)
+        Oldest first, one size, at least 3 x 3 px.
+    method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
+        "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
+        nearly noise-free images. The others are baselines.
+    model : "affine", "translational" or "accelerating"
+        Motion model of "instantaneous".
+    time_scheme : "central" (default), "backward" or, for baselines, "pair"
+        How time derivatives are taken, and so to which frame the field belongs: the middle or the newest one.
+    neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
+        Pixels that the local quadratic is fitted to; default 3 x 3.
+    neighbourhood_sigma : float, px
+        Weighs them by a Gaussian; default equal weights.
+    window_sigma : float, px
+        Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
+    rows : "brightness", "gradient", "jet" or "all"
+        Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel.
+    smoothness : float, grey levels per px
+        Weight of "horn_schunck"; default the root mean square gradient.
+    iterations : int
+        Most iterations of "horn_schunck".
+    rank_deficient : "nan" or "min_norm"
+        What "instantaneous" reports where the equations do not determine every unknown.
+    smooth : float, px
+        Standard deviation of a Gaussian that smooths each frame first; default none.
+    quantise : float, grey levels
+        Rounds samples down to multiples of it before smoothing; default none.
+    colour : "error" (default) or "luminance"
+        What to do with frames (H, W, 3 or 4).
+    points : array (N, 2) of int, px
+        Pixels (x, y) to estimate at, nothing else is computed; arrays of the result are (..., N) instead of (..., H, W).
+    region : (x, y, width, height), px
+        Rectangle to estimate in.
+    stride : int, px
+        Estimate at every stride-th column and row.
+    mask : bool array (H, W)
+        True where pixels may be used.
+    fps, frame_period : float, frames/s or s
+        For quantities per second; give one of them.
+    pixel_pitch : float or (dx, dy), any length unit
+        Size of a pixel; flow then comes in that unit per frame.
+    covariance : bool
+        Whether to compute the covariance of the parameters.
+    diagnostics : bool
+        Whether to report residual, rank and condition number.
+    noise : float, grey levels
+        Standard deviation of the pixel noise for the covariance; default from the residual.
+    precision : "float32" or "float64"
+        Default: that of the frames.
+    threads : int
+        Default: environment variable JACOFLOW_THREADS, else every processor. Results do not depend on it.
+    simd : "scalar", "avx2" or "avx512"
+        Default: environment variable JACOFLOW_SIMD, else the best of the processor.
+    progress : None, True or function (done, total)
+        True draws a line on standard error; a function is called after each frame. Ctrl-C stops between frames.
+
+    Raises
+    ------
+    ValueError
+        For fewer than three frames, frames under 3 x 3 px or of different sizes, colour, and options out of range; each message names the argument.
+    TypeError
+        For another dtype.
+    """
+
+@final
+class FlowEstimator:
+    """Flow from a stream: frames are pushed one by one, memory stays bounded.
+
+    The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
+    (two for baselines with time_scheme="pair"). Pickles in mid-stream.
+    """
+    def __new__(
+        cls,
+        *,
+        method: _Method = "windowed",
+        model: _Model = "affine",
+        time_scheme: _Scheme | None = None,
+        neighbourhood: tuple[int, int] | ArrayLike | None = None,
+        neighbourhood_sigma: float | None = None,
+        window_sigma: float | None = None,
+        rows: _Rows | None = None,
+        smoothness: float | None = None,
+        iterations: int | None = None,
+        rank_deficient: _Rank = "nan",
+        smooth: float | None = None,
+        quantise: float | None = None,
+        colour: _Colour | None = None,
+        points: ArrayLike | None = None,
+        region: _Rectangle | None = None,
+        stride: int | None = None,
+        mask: NDArray[np.bool_] | None = None,
+        fps: float | None = None,
+        frame_period: float | None = None,
+        pixel_pitch: float | tuple[float, float] | None = None,
+        covariance: bool = True,
+        diagnostics: bool = False,
+        noise: float | None = None,
+        precision: _Precision | None = None,
+        threads: int | None = None,
+        simd: _Simd | None = None,
+    ) -> FlowEstimator: ...
+    def push(self, /, frame: _Frame) -> FlowField | None:
+        """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have come, before that None.
+
+        A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
+        """
+    def reset(self, /) -> None:
+        """Forgets every frame (H, W); the next one begins a new sequence, frame index 0."""
+    @property
+    def frames_needed(self) -> int:
+        """Frames that must come before the first field (a count, no unit)."""
+    @property
+    def frames_pushed(self) -> int:
+        """How many frames have been pushed since the start or the last reset (a count, no unit)."""
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options as a dictionary, in the units of `estimate`."""
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+@final
+class FlowFilter:
+    """Flow and Jacobian filtered in time: one small Kalman filter at each site, WO2010/098160 (44)-(55).
+
+    Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
+    v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
+    frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
+    """
+    def __new__(
+        cls,
+        *,
+        profile: Literal["patent", "measured"] = "patent",
+        form: Literal["augmented", "non_augmented", "fast", "extended"] | None = None,
+        transition: Literal["rk4", "exact"] | None = None,
+        neighbourhood: tuple[int, int] | ArrayLike | None = None,
+        neighbourhood_sigma: float | None = None,
+        Q: ArrayLike | None = None,
+        R: float | None = None,
+        x0: ArrayLike | None = None,
+        P0: ArrayLike | None = None,
+        alpha: float | None = None,
+        beta: float | None = None,
+        kappa: float | None = None,
+        full_scale: float | None = None,
+        smooth: float | None = None,
+        quantise: float | None = None,
+        colour: _Colour | None = None,
+        points: ArrayLike | None = None,
+        region: _Rectangle | None = None,
+        stride: int | None = None,
+        mask: NDArray[np.bool_] | None = None,
+        fps: float | None = None,
+        frame_period: float | None = None,
+        pixel_pitch: float | tuple[float, float] | None = None,
+        covariance: bool = True,
+        precision: _Precision | None = None,
+        threads: int | None = None,
+        simd: _Simd | None = None,
+    ) -> FlowFilter: ...
+    def push(self, /, frame: _Frame) -> FlowField:
+        """Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
+
+        Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status NON_FINITE. ValueError for a frame of another
+        size, TypeError for another dtype; the filter is then unchanged.
+        """
+    def reset(self, /) -> None:
+        """Forgets every frame (H, W): the next one starts new filters."""
+    @property
+    def state(self) -> NDArray[np.float64] | None:
+        """Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN where there is no filter (border, mask).
+
+        None before the first frame.
+        """
+    @property
+    def state_covariance(self) -> NDArray[np.float64] | None:
+        """Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where there is no filter. None before the first frame."""
+    @property
+    def frames_pushed(self) -> int:
+        """How many frames have been taken in (a count, no unit)."""
+    @property
+    def repairs(self) -> int:
+        """How often a site's covariance had lost its positive definiteness and was mended (a count, no unit)."""
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options as a dictionary, in the units of the constructor."""
+
+def quantities() -> dict[str, tuple[str, str]]:
+    """Derived quantities with their units (per frame, with a frame period), as a dictionary."""
+
+def smooth(
+    frame: _Frame, sigma: float, *, truncate: float | None = None, threads: int | None = None
+) -> _Floats:
+    """`frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard deviations, reflecting borders.
+
+    Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only the pixels whose kernel reaches
+    it. ValueError for a negative or infinite `sigma`.
+    """
+
+def quantise(frame: _Frame, step: float | None = None) -> _Floats:
+    """`frame` (H, W) rounded down to multiples of `step` grey levels: floor(x / step) * step.
+
+    Returns a new array (H, W), float64 for float64, else float32. ValueError unless `step` is positive.
+    """
+
+def luminance(frame: _Frame) -> NDArray[Any]:
+    """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green, blue; alpha is left out.
+
+    Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is copied.
+    """
+
+@disjoint_base
+class GaussianFilter:
+    """Mean, covariance and noise of a batch of filters, as float64 arrays.
+
+    Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B` they are
+    (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or changed in place; a number given
+    for P, Q or R means that multiple of the identity. Units are the state's and the measurement's own.
+    """
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Mean, array (n,) or (B, n), in the state's units."""
+    @x.setter
+    def x(self, value: ArrayLike, /) -> None: ...
+    @property
+    def P(self) -> NDArray[np.float64]:
+        """Covariance, array (n, n) or (B, n, n), in the state's units squared."""
+    @P.setter
+    def P(self, value: ArrayLike, /) -> None: ...
+    @property
+    def Q(self) -> NDArray[np.float64]:
+        """Process noise covariance, array (n, n) or (B, n, n), in the state's units squared per step."""
+    @Q.setter
+    def Q(self, value: ArrayLike, /) -> None: ...
+    @property
+    def R(self) -> NDArray[np.float64]:
+        """Measurement noise covariance, array (m, m) or (B, m, m), in the measurement's units squared."""
+    @R.setter
+    def R(self, value: ArrayLike, /) -> None: ...
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the measurement was missing."""
+    @property
+    def S(self) -> NDArray[np.float64]:
+        """Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared."""
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit."""
+    @property
+    def log_likelihood(self) -> NDArray[np.float64]:
+        """Logarithm of the last measurement's likelihood, array () or (B,), no unit."""
+    @property
+    def repairs(self) -> int:
+        """How often a covariance had lost its positive definiteness and was mended (a count, no unit)."""
+    @property
+    def dim_x(self) -> int:
+        """Dimensions n of the state (a count, no unit)."""
+    @property
+    def dim_z(self) -> int:
+        """Dimensions m of the measurement (a count, no unit)."""
+    @property
+    def batch(self) -> int | None:
+        """Number B of independent filters, or None where arrays have no leading axis (a count, no unit)."""
+
+@final
+class KalmanFilter(GaussianFilter):
+    """Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
+
+    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
+    """
+    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> KalmanFilter: ...
+    @property
+    def F(self) -> NDArray[np.float64]:
+        """Transition matrix, array (n, n) or (B, n, n), in the state's units; identity at first."""
+    @F.setter
+    def F(self, value: ArrayLike, /) -> None: ...
+    @property
+    def H(self) -> NDArray[np.float64]:
+        """Measurement matrix, array (m, n) or (B, m, n), measurement units per state unit; zero at first."""
+    @H.setter
+    def H(self, value: ArrayLike, /) -> None: ...
+    def predict(self, /, *, F: ArrayLike | None = None, Q: ArrayLike | None = None) -> None:
+        """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this step."""
+    def update(self, /, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None) -> None:
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+
+        `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not positive definite.
+        """
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+@final
+class ExtendedKalmanFilter(GaussianFilter):
+    """Extended Kalman filter x' = f(x) + w, z = h(x) + v, linearised at the mean.
+
+    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
+    Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n) and (..., m); `FJacobian` and `HJacobian` map the means
+    (n,) or (B, n) to (n, n) or (B, n, n) and (m, n) or (B, m, n). Without a Jacobian central differences are taken.
+    """
+    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> ExtendedKalmanFilter: ...
+    def predict(self, /, fx: _Callback, FJacobian: _Callback | None = None) -> None:
+        """x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B, ...), in the state's units.
+
+        Exceptions of the functions leave x and P as they were.
+        """
+    def update(
+        self, /, z: ArrayLike | None, HJacobian: _Callback | None, Hx: _Callback, R: ArrayLike | None = None
+    ) -> None:
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+
+        `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step. Exceptions of the functions leave x
+        and P as they were.
+        """
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+@final
+class MerweScaledSigmaPoints:
+    """Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.
+
+    `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared spread of the points is
+    alpha^2 (n + kappa).
+    """
+    def __new__(
+        cls, n: int, alpha: float | None = None, beta: float | None = None, kappa: float | None = None
+    ) -> MerweScaledSigmaPoints: ...
+    @property
+    def n(self) -> int:
+        """Dimensions of the state (a count, no unit)."""
+    @property
+    def alpha(self) -> float:
+        """Spread of the points (no unit)."""
+    @property
+    def beta(self) -> float:
+        """Weight of prior knowledge in the centre's covariance weight (no unit)."""
+    @property
+    def kappa(self) -> float:
+        """Secondary spread (no unit)."""
+    @property
+    def Wm(self) -> NDArray[np.float64]:
+        """Weights of the mean, array (2 n + 1,), centre first (no unit)."""
+    @property
+    def Wc(self) -> NDArray[np.float64]:
+        """Weights of the covariance, array (2 n + 1,), centre first (no unit)."""
+    def num_sigmas(self, /) -> int:
+        """Number of points, 2 n + 1 (a count, no unit)."""
+    def sigma_points(self, /, x: ArrayLike, P: ArrayLike) -> NDArray[np.float64]:
+        """The points, array (2 n + 1, n), of mean `x` (n,) and covariance `P` (n, n), in the state's units.
+
+        NumericalError where `P` is not positive definite.
+        """
+    def __getnewargs__(self, /) -> tuple[int, float, float, float]: ...
+
+@final
+class UnscentedKalmanFilter(GaussianFilter):
+    """Unscented Kalman filter x' = f(x) + w, z = h(x) + v (Julier and Uhlmann 1997, van der Merwe 2004).
+
+    `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1, n), or (B, 2 n + 1, n) with
+    `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is, in whatever unit `fx` wants. `points` is a
+    MerweScaledSigmaPoints. With `augmented=True` the noise is part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each.
+    With `redraw=True` new points are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out of
+    the innovation covariance.
+    """
+    def __new__(
+        cls,
+        dim_x: int,
+        dim_z: int,
+        dt: float,
+        hx: _Callback,
+        fx: _Callback,
+        points: MerweScaledSigmaPoints,
+        *,
+        batch: int | None = None,
+        augmented: bool = False,
+        redraw: bool = True,
+    ) -> UnscentedKalmanFilter: ...
+    @property
+    def fx(self) -> _Callback:
+        """Transition function (points, dt) -> points, on arrays (..., n) in the state's units."""
+    @fx.setter
+    def fx(self, value: _Callback, /) -> None: ...
+    @property
+    def hx(self) -> _Callback:
+        """Measurement function points (..., n) -> (..., m), from state to measurement units."""
+    @hx.setter
+    def hx(self, value: _Callback, /) -> None: ...
+    @property
+    def points_fn(self) -> MerweScaledSigmaPoints:
+        """The sigma points in use (constants have no unit)."""
+    @property
+    def dt(self) -> float:
+        """Step handed to `fx`, in whatever unit it wants."""
+    @property
+    def augmented(self) -> bool:
+        """Whether the noise is part of the sigma points (no unit)."""
+    @property
+    def redraw(self) -> bool:
+        """Whether new points are drawn for the measurement (no unit)."""
+    def predict(self, /, dt: float | None = None, fx: _Callback | None = None, **fx_args: Any) -> None:
+        """Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit); keywords are handed to `fx`.
+
+        Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no positive-definite repair.
+        """
+    def update(
+        self, /, z: ArrayLike | None, R: ArrayLike | None = None, hx: _Callback | None = None, **hx_args: Any
+    ) -> None:
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+
+        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx` leave x and P as they were.
+        """
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+@final
+class Scene:
+    """A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
+
+    `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `seed`
+    makes everything random; `carrier` (one of `scenes.carriers()`) is what the motion moves; `parameters` are those of
+    `scenes.parameters(name)`, each in the unit told there. Time t is in frames, brightness in grey levels of an 8-bit scale.
+    """
+    def __new__(
+        cls,
+        name: str,
+        *,
+        width: int | None = None,
+        height: int | None = None,
+        origin: tuple[float, float] | None = None,
+        seed: int | None = None,
+        carrier: str | None = None,
+        **parameters: float,
+    ) -> Scene: ...
+    @property
+    def name(self) -> str:
+        """Name of the scene (no unit)."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """Size (width, height) of the frames, px."""
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Scene point (x, y) of pixel (0, 0), px."""
+    def frame(self, /, t: float) -> NDArray[np.float64]:
+        """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped."""
+    def frames(self, /, count: int, start: float = 0.0) -> NDArray[np.float64]:
+        """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale."""
+    def truth(self, /, t: float) -> FlowField:
+        """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
+
+        Status MASKED and NaN where the scene has no single truth.
+        """
+    def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
+        """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth."""
+    def __getnewargs_ex__(self, /) -> tuple[tuple[str], dict[str, Any]]: ...
+
+@final
+class Sensor:
+    """What a camera does to a frame: white noise, rounding, clipping.
+
+    `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or "nearest"; `saturate` clips to 0 ... 255;
+    `seed` of the noise. Without arguments it changes nothing.
+    """
+    def __new__(
+        cls,
+        *,
+        noise: float | None = None,
+        rounding: Literal["none", "floor", "nearest"] | None = None,
+        saturate: bool | None = None,
+        seed: int | None = None,
+    ) -> Sensor: ...
+    def apply(self, /, frame: _Frame, index: int = 0) -> NDArray[np.float64]:
+        """`frame` (H, W) as the camera delivers it, a new float64 array (H, W) in grey levels.
+
+        The noise depends on the seed, `index` (which frame it is) and the pixel, on nothing else.
+        """
+    def apply_u8(self, /, frame: _Frame, index: int = 0) -> NDArray[np.uint8]:
+        """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255 clipped."""
+    def __getnewargs_ex__(self, /) -> tuple[tuple[()], dict[str, Any]]: ...
+
+@final
+class FrameReader:
+    """Reads frames (H, W) one by one from whatever `jacoflow.io.frames` was given; memory stays bounded. Samples keep the file's dtype and grey levels."""
+    def __iter__(self, /) -> FrameReader: ...
+    def __next__(self, /) -> NDArray[Any]: ...
+    def __length_hint__(self, /) -> int: ...
+    @property
+    def frame_rate(self) -> float | None:
+        """Frames per second, where the source says so, else None."""
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
+def _observability(
+    frames: _Frames,
+    *,
+    time_scheme: Literal["central", "backward"] | None = None,
+    neighbourhood: tuple[int, int] | ArrayLike | None = None,
+    neighbourhood_sigma: float | None = None,
+    smooth: float | None = None,
+    quantise: float | None = None,
+    colour: _Colour | None = None,
+    threads: int | None = None,
+) -> dict[str, NDArray[Any]]: ...
+def _open_frames(spec: _Path, colour: _Colour | None, first: int, limit: int | None, step: int) -> FrameReader: ...
+def _read_flow(path: _Path, format: Literal["flo", "kitti"]) -> NDArray[np.float32]: ...
+def _read_image(path: _Path, colour: _Colour | None) -> NDArray[Any]: ...
+def _read_pfm(path: _Path) -> NDArray[np.float32]: ...
+def _write_flow(path: _Path, flow: ArrayLike, format: Literal["flo", "kitti"]) -> None: ...
+def _write_frames(path: _Path, frames: Iterable[NDArray[Any]], frame_rate: float) -> int: ...
+def _write_pfm(path: _Path, values: ArrayLike) -> None: ...
+def _restore_estimator(options: dict[str, Any], memory: dict[str, Any]) -> FlowEstimator: ...
+def _restore_extended(state: dict[str, Any]) -> ExtendedKalmanFilter: ...
+def _restore_field(state: dict[str, Any]) -> FlowField: ...
+def _restore_kalman(state: dict[str, Any]) -> KalmanFilter: ...
+def _restore_unscented(state: dict[str, Any]) -> UnscentedKalmanFilter: ...
+def _run_command_line(arguments: list[str]) -> int: ...
+def _scene_carriers() -> dict[str, str]: ...
+def _scene_names() -> dict[str, str]: ...
+def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...

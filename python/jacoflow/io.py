@@ -1,0 +1,115 @@
+"""Frames in, frames and flow out.
+
+Frames are arrays (H, W) in the file's dtype and grey levels; flow is (H, W, 2) in px/frame. Every file is written under a temporary name and renamed when it is
+whole. Files that cannot be opened raise OSError, damaged ones `jacoflow.FormatError`, each with the path.
+"""
+
+import os
+from collections.abc import Iterable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._jacoflow import (
+    FlowField,
+    FrameReader,
+    _open_frames,
+    _read_flow,
+    _read_image,
+    _read_pfm,
+    _write_flow,
+    _write_frames,
+    _write_pfm,
+)
+
+__all__ = [
+    "FrameReader",
+    "frames",
+    "read_flo",
+    "read_image",
+    "read_kitti",
+    "read_npz",
+    "read_pfm",
+    "write_flo",
+    "write_frames",
+    "write_kitti",
+    "write_npz",
+    "write_pfm",
+]
+
+_Path = str | os.PathLike[str]
+
+
+def frames(
+    source: _Path, *, colour: Literal["error", "luminance"] | None = None, first: int = 0, limit: int | None = None, step: int = 1
+) -> FrameReader:
+    """Iterates over the frames (H, W) of a source, in their own dtype and grey levels; memory stays bounded whatever its length.
+
+    `source`: a folder of PNG, TIFF, BMP, PGM and JPEG files (natural order), a pattern such as "frames/*.png", one image, a .txt list of images, a
+    .y4m file, "-" (Y4M on standard input), a .npy stack (T, H, W), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`).
+    Frames `first`, `first + step`, ... at most `limit` of them (counts, no unit). _Colour is refused unless `colour="luminance"`.
+
+    >>> import tempfile, numpy as np
+    >>> from jacoflow import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     io.write_frames(f"{folder}/stack.npy", np.zeros((4, 8, 10), np.uint8))
+    ...     [frame.shape for frame in io.frames(f"{folder}/stack.npy", step=2)]
+    4
+    [(8, 10), (8, 10)]
+    """
+    return _open_frames(source, colour, first, limit, step)
+
+
+def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
+    """Writes frames (H, W) of one size and dtype, in their grey levels; returns how many.
+
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16). `frame_rate` in frames/s is noted where the format has
+    room for it.
+    """
+    return _write_frames(path, frames, frame_rate)
+
+
+def read_image(path: _Path, *, colour: Literal["error", "luminance"] | None = None) -> NDArray[Any]:
+    """Reads an image (PNG, TIFF, BMP, PGM, JPEG) as an array (H, W) of grey levels; colour is refused unless `colour="luminance"`."""
+    return _read_image(path, colour)
+
+
+def read_flo(path: _Path) -> NDArray[np.float32]:
+    """Reads a Middlebury .flo file: float32 array (H, W, 2), px/frame, NaN where unknown."""
+    return _read_flow(path, "flo")
+
+
+def write_flo(path: _Path, flow: ArrayLike) -> None:
+    """Writes flow (H, W, 2), px/frame, as a Middlebury .flo file; NaN as unknown (1e10)."""
+    _write_flow(path, flow, "flo")
+
+
+def read_kitti(path: _Path) -> NDArray[np.float32]:
+    """Reads a KITTI flow PNG: float32 array (H, W, 2), px/frame, NaN where invalid."""
+    return _read_flow(path, "kitti")
+
+
+def write_kitti(path: _Path, flow: ArrayLike) -> None:
+    """Writes flow (H, W, 2), px/frame, as a KITTI PNG in steps of 1/64 px; NaN and what the format cannot hold become invalid."""
+    _write_flow(path, flow, "kitti")
+
+
+def read_pfm(path: _Path) -> NDArray[np.float32]:
+    """Reads a .pfm file: float32 array (H, W) or (H, W, 3), in whatever unit it was written."""
+    return _read_pfm(path)
+
+
+def write_pfm(path: _Path, values: ArrayLike) -> None:
+    """Writes an array (H, W) or (H, W, 3), in whatever unit, as float32 .pfm."""
+    _write_pfm(path, values)
+
+
+def read_npz(path: _Path) -> FlowField:
+    """Reads a field (H, W) with all its planes, in the units it was written in."""
+    return FlowField.load(path)
+
+
+def write_npz(path: _Path, field: FlowField, *, options: str = "") -> None:
+    """Writes a field (H, W) with all its planes and units, and `options` (free text on how it was made)."""
+    field.save(path, options=options)

@@ -1,0 +1,276 @@
+//! `jacoflow.io`: frames in, frames and flow out.
+
+use super::arrays::{self, ColourRule};
+use super::field::{FlowField, Store};
+use super::options;
+use crate::error::Error;
+use crate::io::{
+    Colour, FieldFormat, FloatMap, FlowImage, FrameSource, NumberedFiles, OpenOptions, npz::NpzReader, open, open_sink,
+    read_flo, read_image, read_kitti, read_npz_from, read_pfm, write_flo, write_kitti, write_pfm,
+};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+fn colour(rule: ColourRule) -> Colour {
+    match rule {
+        ColourRule::Refuse => Colour::Error,
+        ColourRule::Luminance => Colour::Luminance,
+    }
+}
+
+/// Reads frames (H, W) one by one from whatever `jacoflow.io.frames` was given; memory stays bounded. Samples keep the file's dtype and grey levels.
+#[pyclass(module = "jacoflow.io", frozen)]
+pub struct FrameReader {
+    spec: String,
+    colour: ColourRule,
+    options: OpenOptions,
+    place: Mutex<Place>,
+}
+
+struct Place {
+    source: Box<dyn FrameSource>,
+    delivered: usize,
+}
+
+#[pymethods]
+impl FrameReader {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        py.check_signals()?;
+        let frame = py.detach(|| {
+            let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
+            let frame = place.source.next_frame()?;
+            place.delivered += usize::from(frame.is_some());
+            crate::Result::Ok(frame)
+        })?;
+        frame.map(|frame| arrays::from_any_frame(py, frame)).transpose()
+    }
+
+    /// Frames left (a count, no unit), where that is known without reading them, else 0.
+    fn __length_hint__(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.len_hint().unwrap_or(0))
+    }
+
+    /// Frames per second, where the source says so, else None.
+    #[getter]
+    fn frame_rate(&self, py: Python<'_>) -> Option<f64> {
+        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.frame_rate())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("FrameReader({:?})", self.spec)
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Option<&str>, usize, Option<usize>, usize))> {
+        if self.spec == "-" {
+            return Err(PyTypeError::new_err("standard input cannot be pickled"));
+        }
+        let delivered = py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).delivered);
+        let OpenOptions { first, limit, step, .. } = self.options;
+        let rule = (self.colour == ColourRule::Luminance).then_some("luminance");
+        let limit = limit.map(|limit| limit.saturating_sub(delivered));
+        let reopen = py.import("jacoflow._jacoflow")?.getattr("_open_frames")?;
+        Ok((reopen, (self.spec.clone(), rule, first + delivered * step, limit, step)))
+    }
+}
+
+/// Opens a frame source.
+#[pyfunction(name = "_open_frames")]
+#[pyo3(signature = (spec, colour, first, limit, step))]
+pub fn open_frames(
+    py: Python<'_>,
+    spec: PathBuf,
+    colour: Option<&str>,
+    first: i64,
+    limit: Option<i64>,
+    step: i64,
+) -> PyResult<FrameReader> {
+    let not_negative = |name: &'static str, value: i64| {
+        usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))
+    };
+    let rule = ColourRule::parse(colour)?;
+    let mut options = OpenOptions::default();
+    options.colour = self::colour(rule);
+    options.first = not_negative("first", first)?;
+    options.limit = limit.map(|n| not_negative("limit", n)).transpose()?;
+    options.step = options::count("step", step)?;
+    let spec = spec.to_string_lossy().into_owned();
+    let source = py.detach(|| open(&spec, &options))?;
+    Ok(FrameReader { spec, colour: rule, options, place: Mutex::new(Place { source, delivered: 0 }) })
+}
+
+/// Writes frames to a sink.
+#[pyfunction(name = "_write_frames")]
+pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, frame_rate: f64) -> PyResult<usize> {
+    let spec = path.to_string_lossy().into_owned();
+    let mut sink = py.detach(|| open_sink(&spec, frame_rate))?;
+    let mut count = 0;
+    for item in frames.try_iter()? {
+        py.check_signals()?;
+        let frame = arrays::frame("frames", &item?, ColourRule::Refuse)?;
+        py.detach(|| sink.write(&frame))?;
+        count += 1;
+    }
+    py.detach(|| sink.finish())?;
+    Ok(count)
+}
+
+/// Reads an image file.
+#[pyfunction(name = "_read_image")]
+#[pyo3(signature = (path, colour))]
+pub fn read_one_image<'py>(py: Python<'py>, path: PathBuf, colour: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
+    let colour = self::colour(ColourRule::parse(colour)?);
+    arrays::from_any_frame(py, py.detach(|| read_image(&path, colour))?)
+}
+
+/// A flow array `(H, W, 2)` as a flow image.
+fn flow_image(flow: &Bound<'_, PyAny>) -> PyResult<FlowImage> {
+    let (shape, values) = arrays::doubles("flow", flow)?;
+    let [height, width, 2] = shape[..] else {
+        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {shape:?}")).into());
+    };
+    let plane = |k: usize| values.iter().skip(k).step_by(2).map(|&v| v as f32).collect();
+    Ok(FlowImage::new(width, height, plane(0), plane(1))?)
+}
+
+fn from_flow_image<'py>(py: Python<'py>, flow: &FlowImage) -> PyResult<Bound<'py, PyAny>> {
+    let values = flow.u().iter().zip(flow.v()).flat_map(|(&u, &v)| [u, v]).collect();
+    Ok(arrays::owned(py, &[flow.height(), flow.width(), 2], values)?.into_any())
+}
+
+/// Reads flow in one of the exchange formats.
+#[pyfunction(name = "_read_flow")]
+pub fn read_flow<'py>(py: Python<'py>, path: PathBuf, format: &str) -> PyResult<Bound<'py, PyAny>> {
+    let flow = py.detach(|| match format {
+        "kitti" => read_kitti(&path),
+        _ => read_flo(&path),
+    })?;
+    from_flow_image(py, &flow)
+}
+
+/// Writes flow in one of the exchange formats.
+#[pyfunction(name = "_write_flow")]
+pub fn write_flow(py: Python<'_>, path: PathBuf, flow: &Bound<'_, PyAny>, format: &str) -> PyResult<()> {
+    let flow = flow_image(flow)?;
+    Ok(py.detach(|| match format {
+        "kitti" => write_kitti(&path, &flow),
+        _ => write_flo(&path, &flow),
+    })?)
+}
+
+/// Reads a float map.
+#[pyfunction(name = "_read_pfm")]
+pub fn read_float_map(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
+    let map = py.detach(|| read_pfm(&path))?;
+    let mut planes = map.planes;
+    if planes.len() == 1 {
+        return Ok(arrays::owned(py, &[map.height, map.width], planes.remove(0))?.into_any());
+    }
+    let pixels = (0..map.height * map.width).flat_map(|i| planes.iter().map(move |plane| plane[i]));
+    Ok(arrays::owned(py, &[map.height, map.width, 3], pixels.collect())?.into_any())
+}
+
+/// Writes a float map.
+#[pyfunction(name = "_write_pfm")]
+pub fn write_float_map(py: Python<'_>, path: PathBuf, values: &Bound<'_, PyAny>) -> PyResult<()> {
+    let (shape, values) = arrays::doubles("values", values)?;
+    let (height, width, count) = match shape[..] {
+        [height, width] => (height, width, 1),
+        [height, width, 3] => (height, width, 3),
+        _ => {
+            return Err(Error::argument("values", "shape (H, W) or (H, W, 3)", format!("shape {shape:?}")).into());
+        }
+    };
+    let plane = |k: usize| values.iter().skip(k).step_by(count).map(|&v| v as f32).collect();
+    let map = FloatMap { width, height, planes: (0..count).map(plane).collect() };
+    Ok(py.detach(|| write_pfm(&path, &map))?)
+}
+
+/// The format that a file name asks for; `None`: no extension, a folder.
+fn format_of(path: &Path) -> crate::Result<Option<FieldFormat>> {
+    let Some(extension) = path.extension().and_then(|e| e.to_str()) else { return Ok(None) };
+    let known = FieldFormat::ALL.into_iter().find(|f| f.extension().eq_ignore_ascii_case(extension));
+    known.map(Some).ok_or_else(|| {
+        let names: Vec<_> = FieldFormat::ALL.iter().map(|f| format!(".{}", f.extension())).collect();
+        Error::argument("path", format!("one of the extensions {}", names.join(", ")), path.display())
+    })
+}
+
+/// Writes a field, or the fields of a stack into a folder.
+pub fn save_field(py: Python<'_>, field: &FlowField, path: &Path, options: &str) -> PyResult<()> {
+    let format = format_of(path)?;
+    let (count, stack) = field.count();
+    match (format, stack) {
+        (Some(format), false) => write_one(py, field, 0, format, path, options),
+        (None, true) => {
+            let names = NumberedFiles::create(path, "flow", FieldFormat::Npz.extension())?;
+            for index in 0..count {
+                py.check_signals()?;
+                let name = names.path(field.first_frame() + index);
+                write_one(py, field, index, FieldFormat::Npz, &name, options)?;
+            }
+            Ok(())
+        }
+        (Some(_), true) => {
+            let expected = "a folder name without extension, for a stack of fields (or save field[t])";
+            Err(Error::argument("path", expected, path.display()).into())
+        }
+        (None, false) => Err(Error::argument("path", "a file name with extension", path.display()).into()),
+    }
+}
+
+fn write_one(
+    py: Python<'_>,
+    field: &FlowField,
+    index: usize,
+    format: FieldFormat,
+    path: &Path,
+    options: &str,
+) -> PyResult<()> {
+    match field.store() {
+        Store::Single(packed) => {
+            let field = field.core(packed, index);
+            py.detach(|| format.write(path, &field, options))?;
+        }
+        Store::Double(packed) => {
+            let field = field.core(packed, index);
+            py.detach(|| format.write(path, &field, options))?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads a field.
+pub fn load_field(py: Python<'_>, path: &Path) -> PyResult<FlowField> {
+    let format =
+        format_of(path)?.ok_or_else(|| Error::argument("path", "a file name with extension", path.display()))?;
+    let image = |flow: crate::Result<FlowImage>| flow.and_then(|flow| flow.to_field());
+    let flat = match format {
+        FieldFormat::Npz => return load_npz(py, path),
+        FieldFormat::Flo => py.detach(|| image(read_flo(path)))?,
+        FieldFormat::Kitti => py.detach(|| image(read_kitti(path)))?,
+        FieldFormat::Pfm => py.detach(|| {
+            let map = read_pfm(path)?;
+            let [u, v, _] = <[Vec<f32>; 3]>::try_from(map.planes)
+                .map_err(|_| Error::format(path, "expected three planes (u, v, 0), got one"))?;
+            image(FlowImage::new(map.width, map.height, u, v))
+        })?,
+    };
+    Ok(FlowField::single(flat))
+}
+
+fn load_npz(py: Python<'_>, path: &Path) -> PyResult<FlowField> {
+    let mut npz = NpzReader::open(path)?;
+    if npz.array::<f64>("motion").is_ok() {
+        return Ok(FlowField::single(py.detach(|| read_npz_from::<f64, _>(&mut npz))?.field));
+    }
+    Ok(FlowField::single(py.detach(|| read_npz_from::<f32, _>(&mut npz))?.field))
+}
