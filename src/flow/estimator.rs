@@ -65,7 +65,8 @@ impl Estimator {
     /// Frames that one field is estimated from: 3, or 2 for a baseline that differences a pair.
     pub fn frames_needed(&self) -> usize {
         match &self.engine {
-            Engine::Instantaneous(_) | Engine::Windowed(_) => 3,
+            Engine::Instantaneous(_) => 3,
+            Engine::Windowed(e) => e.frames_needed(),
             Engine::LucasKanade(e) => e.frames_needed(),
             Engine::HornSchunck(e) => e.frames_needed(),
         }

@@ -1,0 +1,153 @@
+//! What the windowed estimator may be told.
+
+use crate::error::{Error, Result};
+use crate::flow::RankPolicy;
+use crate::jet::{Neighbourhood, TimeScheme};
+
+/// Which of the twelve equations (31)/(34) of WO2010/098160 a window sums. All rows weigh the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum RowSet {
+    /// Row 1: brightness constancy alone. The cheapest; biased by the stencils' different smoothing on fine texture.
+    Brightness,
+    /// Rows 1-3: brightness and gradient constancy.
+    #[default]
+    Gradient,
+    /// Rows 1-6: `J(i) m = i'`, the whole 2-jet once.
+    Jet,
+    /// All twelve rows, `J(i) m = i'` and `J(i') m = i''`; needs three frames.
+    All,
+}
+
+impl RowSet {
+    /// Every row set, fewest rows first.
+    pub const EVERY: [Self; 4] = [Self::Brightness, Self::Gradient, Self::Jet, Self::All];
+
+    /// The name used in options: `brightness`, `gradient`, `jet`, `all`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brightness => "brightness",
+            Self::Gradient => "gradient",
+            Self::Jet => "jet",
+            Self::All => "all",
+        }
+    }
+
+    /// The row set called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `rows` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::EVERY
+            .into_iter()
+            .find(|set| set.name() == name)
+            .ok_or_else(|| Error::argument("rows", "brightness, gradient, jet or all", name))
+    }
+
+    /// Number of equations a pixel contributes: 1, 3, 6 or 12.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Brightness => 1,
+            Self::Gradient => 3,
+            Self::Jet => 6,
+            Self::All => 12,
+        }
+    }
+
+    /// Fewest frames that give these rows.
+    pub fn frames_needed(self) -> usize {
+        if self == Self::All { 3 } else { 2 }
+    }
+}
+
+/// Options of the windowed estimate with transport.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowedOptions {
+    /// Standard deviation of the Gaussian window, px. Default 4; 2 to 6 are usual.
+    pub sigma: f64,
+    /// Where the window ends, in standard deviations. Default 3.
+    pub truncate: f64,
+    /// Which equations are summed. Default [`RowSet::Gradient`].
+    pub rows: RowSet,
+    /// Frames of one estimate: 3 (default), or 2 for a pair, which [`RowSet::All`] does not allow. A pair's flow belongs to the moment between its frames.
+    pub frames: usize,
+    /// How time derivatives are taken from three frames. Default central. A pair always takes the difference, and its mean as coefficients.
+    pub scheme: TimeScheme,
+    /// Pixels that each jet is fitted to. Default 3x3.
+    pub neighbourhood: Neighbourhood,
+    /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance knows of it. Default `None`.
+    /// Frames smoothed beforehand should be declared by [`WindowedOptions::already_smoothed`] instead.
+    pub presmooth: Option<f64>,
+    /// The frames come already smoothed by a Gaussian of this standard deviation, px: nothing is smoothed, but the covariance
+    /// takes their noise for correlated accordingly. Default `None`.
+    pub already_smoothed: Option<f64>,
+    /// What to report where the window does not determine every unknown. Default: NaN.
+    pub rank_deficient: RankPolicy,
+    /// An unknown counts as undetermined when less than this share of its (squared) column is independent of the other columns. Default 1e-5.
+    pub rank_tolerance: f64,
+    /// Least share of the window's weight that usable pixels must hold. Default 0.1.
+    pub min_weight: f64,
+}
+
+impl Default for WindowedOptions {
+    fn default() -> Self {
+        Self {
+            sigma: 4.0,
+            truncate: 3.0,
+            rows: RowSet::default(),
+            frames: 3,
+            scheme: TimeScheme::default(),
+            neighbourhood: Neighbourhood::default(),
+            presmooth: None,
+            already_smoothed: None,
+            rank_deficient: RankPolicy::default(),
+            rank_tolerance: 1e-5,
+            min_weight: 0.1,
+        }
+    }
+}
+
+/// Largest window radius, px.
+const LARGEST_RADIUS: f64 = 256.0;
+
+impl WindowedOptions {
+    /// Refuses values that no window can have.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        let positive = |name: &'static str, value: f64| {
+            if value.is_finite() && value > 0.0 {
+                Ok(())
+            } else {
+                Err(Error::argument(name, "a positive, finite number", value))
+            }
+        };
+        positive("sigma", self.sigma)?;
+        positive("truncate", self.truncate)?;
+        positive("rank_tolerance", self.rank_tolerance)?;
+        for (name, value) in [("presmooth", self.presmooth), ("already_smoothed", self.already_smoothed)] {
+            if let Some(value) = value {
+                positive(name, value)?;
+            }
+        }
+        if self.sigma < 0.5 || self.sigma * self.truncate > LARGEST_RADIUS || self.sigma * self.truncate < 1.0 {
+            let want = format!("at least 0.5 px, and with truncate a radius of 1 to {LARGEST_RADIUS} px");
+            return Err(Error::argument("sigma", want, format!("{} (truncate {})", self.sigma, self.truncate)));
+        }
+        if !(2..=3).contains(&self.frames) {
+            return Err(Error::argument("frames", "2 or 3 for a windowed estimate", self.frames));
+        }
+        if self.frames < self.rows.frames_needed() {
+            return Err(Error::argument("rows", "brightness, gradient or jet for a pair of frames", self.rows.name()));
+        }
+        if !(0.0..=1.0).contains(&self.min_weight) {
+            return Err(Error::argument("min_weight", "a share from 0 to 1", self.min_weight));
+        }
+        Ok(())
+    }
+
+    /// Radius of the window, px: `truncate * sigma`, rounded.
+    pub fn radius(&self) -> usize {
+        (self.truncate * self.sigma + 0.5) as usize
+    }
+}

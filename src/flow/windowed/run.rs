@@ -1,0 +1,341 @@
+//! From frames and options to a filled field: cropping, smoothing, strips, sites.
+
+use super::combine::Combination;
+use super::covariance::NoiseSetting;
+use super::estimate::{Setting, Strip};
+use super::noise::{PixelNoise, smoothing_weights};
+use super::options::WindowedOptions;
+use super::support::Support;
+use super::tile::Source;
+use super::window::Window;
+use crate::error::Result;
+use crate::flow::options::Common;
+use crate::flow::site::{FieldBand, bands};
+use crate::image::GaussianSmoother;
+use crate::jet::{JetRows, JetStencil};
+use crate::math::Real;
+use crate::parallel::BAND_ROWS;
+use crate::simd::SimdReal;
+use crate::types::{FlowField, Frame, Rect, Sites};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Site rows whose results are held at a time; a multiple of [`BAND_ROWS`].
+const STRIP_ROWS: usize = 16 * BAND_ROWS;
+/// A cropped frame is at least this wide where the frame is, so that every crop runs the same vector code.
+const LEAST_CROP: usize = 64;
+
+/// The estimator behind the options.
+#[derive(Debug)]
+pub(in crate::flow) struct Windowed {
+    options: WindowedOptions,
+    stencil: JetStencil,
+    smoother: Option<GaussianSmoother>,
+}
+
+impl Windowed {
+    /// Checks the options.
+    pub fn new(options: &WindowedOptions, _common: &Common) -> Result<Self> {
+        options.check()?;
+        let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
+        let smoother = options.presmooth.map(GaussianSmoother::new).transpose()?;
+        Ok(Self { options: options.clone(), stencil, smoother })
+    }
+
+    /// Frames of one estimate, 2 or 3.
+    pub fn frames_needed(&self) -> usize {
+        self.options.frames
+    }
+
+    /// Which of the frames the estimate belongs to. That of a pair lies between the two and is counted with the first.
+    pub fn frame(&self) -> usize {
+        if self.options.frames == 2 { 0 } else { self.options.scheme.frame() }
+    }
+
+    /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
+    pub fn estimate_into<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        common: &Common,
+        field: &mut FlowField<T>,
+    ) -> Result<()> {
+        let sites = field.layout.sites.clone();
+        let size = frames[0].size();
+        common.threads.install(|| match &sites {
+            Sites::Grid { region, stride } => {
+                let whole = Rect { x: 0, y: 0, width: size.0, height: size.1 };
+                let job = Job::new(self, frames, common, region.unwrap_or(whole));
+                let last = (field.width.saturating_sub(1)) * stride;
+                let columns = job.local_x(region.map_or(0, |r| r.x));
+                let columns = columns..columns + last + 1;
+                let top = job.local_y(region.map_or(0, |r| r.y));
+                let rows: Vec<usize> = (0..field.height).map(|r| top + r * stride).collect();
+                let mut field_bands = bands(field);
+                for (rows, bands) in rows.chunks(STRIP_ROWS).zip(field_bands.chunks_mut(STRIP_ROWS / BAND_ROWS)) {
+                    job.strip(rows, columns.clone()).write(&job, &sites, bands);
+                }
+            }
+            Sites::Points(points) => self.points(frames, common, points, field),
+        });
+        Ok(())
+    }
+
+    fn points<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        common: &Common,
+        points: &[(usize, usize)],
+        field: &mut FlowField<T>,
+    ) {
+        let Some(&(x, y)) = points.first() else { return };
+        let bounds = points.iter().fold((x, y, x, y), |b, &(x, y)| (b.0.min(x), b.1.min(y), b.2.max(x), b.3.max(y)));
+        let box_ = Rect { x: bounds.0, y: bounds.1, width: bounds.2 - bounds.0 + 1, height: bounds.3 - bounds.1 + 1 };
+        let sites = field.layout.sites.clone();
+        // One window at a time while that is less work than everything around the points.
+        let each = (2 * self.margin(common) + 1).pow(2);
+        if points.len().saturating_mul(each) < box_.width.saturating_mul(box_.height) {
+            bands(field).into_par_iter().for_each(|mut band| {
+                for index in band.sites.clone() {
+                    let (x, y) = points[index];
+                    let job = Job::new(self, frames, common, Rect { x, y, width: 1, height: 1 });
+                    let column = job.local_x(x);
+                    let results = job.strip(&[job.local_y(y)], column..column + 1);
+                    results.write_site(&job, (x, y), index - band.sites.start, &mut band);
+                }
+            });
+        } else {
+            let job = Job::new(self, frames, common, box_);
+            let (left, top) = (job.local_x(box_.x), job.local_y(box_.y));
+            let rows: Vec<usize> = (top..top + box_.height).collect();
+            let mut field_bands = bands(field);
+            for rows in rows.chunks(STRIP_ROWS) {
+                job.strip(rows, left..left + box_.width).write(&job, &sites, &mut field_bands);
+            }
+        }
+    }
+
+    /// How far from a site samples have any influence, px.
+    fn margin(&self, common: &Common) -> usize {
+        let reach = self.stencil.reach();
+        let stencil = reach.left.max(reach.right).max(reach.up).max(reach.down);
+        let smoothing = self.smoother.as_ref().map_or(0, GaussianSmoother::radius);
+        let window = self.options.radius() + stencil + smoothing;
+        if common.covariance { 2 * window } else { window }
+    }
+}
+
+/// One rectangle of sites with the part of the frames that matters to it.
+struct Job<'a, T: Clone> {
+    owner: &'a Windowed,
+    frames: Vec<Cow<'a, Frame<T>>>,
+    support: Support,
+    /// Size of the uncropped frames.
+    whole: (usize, usize),
+    /// Frame coordinates of the crop's corner.
+    origin: (usize, usize),
+    setting: Setting<T>,
+    noise: Option<NoiseSetting<T>>,
+}
+
+impl<'a, T: SimdReal> Job<'a, T> {
+    fn new(owner: &'a Windowed, frames: &[&'a Frame<T>], common: &'a Common, sites: Rect) -> Self {
+        let options = &owner.options;
+        let whole = frames[0].size();
+        let crop = crop(sites, whole, owner.margin(common));
+        let origin = (crop.x, crop.y);
+        let frames: Vec<Cow<'a, Frame<T>>> = frames.iter().map(|f| cut(f, crop)).collect();
+        let mask = common.mask.as_ref().map(|m| cut(m, crop));
+        let plain: Vec<&Frame<T>> = frames.iter().map(AsRef::as_ref).collect();
+        let spread = owner.smoother.as_ref().map_or(0, GaussianSmoother::radius);
+        let support = Support::new(&plain, mask.as_deref(), owner.stencil.reach(), spread);
+        let frames = match &owner.smoother {
+            Some(s) => frames.iter().map(|f| Cow::Owned(s.apply_at(common.level(), f))).collect(),
+            None => frames,
+        };
+        let window = Window::gaussian(options.sigma, options.radius());
+        let setting = Setting {
+            window: window.clone(),
+            scale: 1.0 / options.sigma,
+            rows: options.rows.count(),
+            policy: options.rank_deficient,
+            tolerance: options.rank_tolerance,
+            min_weight: options.min_weight,
+            floor: rounding_floor(&frames),
+            level: common.level(),
+            inverse: common.covariance,
+            diagnostics: common.diagnostics,
+        };
+        let noise = common.covariance.then(|| owner.noise(common, window, frames.len()));
+        Self { owner, frames, support, whole, origin, setting, noise }
+    }
+
+    fn local_x(&self, x: usize) -> usize {
+        x - self.origin.0
+    }
+    fn local_y(&self, y: usize) -> usize {
+        y - self.origin.1
+    }
+
+    /// Everything at these rows and columns of the crop.
+    fn strip(&self, rows: &[usize], columns: Range<usize>) -> Results<T> {
+        let source = Source {
+            frames: self.frames.iter().map(AsRef::as_ref).collect(),
+            combination: Combination::of(self.frames.len(), self.owner.options.scheme),
+            jets: JetRows::new(&self.owner.stencil),
+            reach: self.owner.stencil.reach(),
+            support: &self.support,
+            second: self.setting.rows == 12,
+        };
+        let Some(noise) = &self.noise else {
+            let strip = Strip::new(&source, &self.setting, rows.to_vec(), columns);
+            return Results { strip, covariance: None };
+        };
+        // The covariance needs the motion of the neighbours too.
+        let (width, height) = self.frames[0].size();
+        let margin = noise.margin();
+        let (top, bottom) = (rows.first().copied().unwrap_or(0), rows.last().copied().unwrap_or(0));
+        let wide = columns.start.saturating_sub(margin)..(columns.end + margin).min(width);
+        let high = top.saturating_sub(margin)..(bottom + 1 + margin).min(height);
+        let strip = Strip::new(&source, &self.setting, high.collect(), wide);
+        let planes = noise.covariance(&source, &strip, rows, &columns);
+        Results { strip, covariance: Some(Covariance { planes, rows: rows.to_vec(), columns }) }
+    }
+}
+
+impl Windowed {
+    fn noise<T: SimdReal>(&self, common: &Common, window: Window<T>, frames: usize) -> NoiseSetting<T> {
+        let options = &self.options;
+        let combination = Combination::of(frames, options.scheme);
+        let smooth = match (options.presmooth, options.already_smoothed) {
+            (Some(a), Some(b)) => Some(a.hypot(b)),
+            (a, b) => a.or(b),
+        };
+        let reach = self.stencil.reach();
+        NoiseSetting {
+            pixel: PixelNoise::new(&self.stencil, combination, options.rows.count(), smooth, options.sigma),
+            taps: NoiseSetting::taps(&self.stencil),
+            reach: reach.left.max(reach.right).max(reach.up).max(reach.down),
+            smoothing: Window::smoothing(&smooth.map_or_else(|| vec![1.0], smoothing_weights)),
+            squared: Window::squared(options.sigma, options.radius(), spread(&self.stencil, smooth)),
+            window,
+            scale: 1.0 / options.sigma,
+            rows: options.rows.count(),
+            variance: common.noise.map(|n| n * n),
+            level: common.level(),
+        }
+    }
+}
+
+/// Variance, px^2, of the kernel that carries a sample's noise into the window's sums: half that of smoothing and stencil together.
+///
+/// Where the image varies slowly the kernel smooths the window in full, where it varies fast not at all; a half is what calibrates textures.
+fn spread(stencil: &JetStencil, smooth: Option<f64>) -> f64 {
+    let offsets = stencil.offsets();
+    let squares: f64 = offsets.iter().map(|(x, y)| f64::from(x * x + y * y) / 2.0).sum();
+    0.5 * (squares / offsets.len() as f64 + smooth.map_or(0.0, |s| s * s))
+}
+
+/// Estimates and, where asked for, covariances of a part of the sites.
+struct Results<T> {
+    strip: Strip<T>,
+    covariance: Option<Covariance<T>>,
+}
+
+/// 21 planes at these rows and columns.
+struct Covariance<T> {
+    planes: Vec<T>,
+    rows: Vec<usize>,
+    columns: Range<usize>,
+}
+
+impl<T: SimdReal> Results<T> {
+    /// Copies the sites that lie in the strip to their bands.
+    fn write(&self, job: &Job<'_, T>, sites: &Sites, bands: &mut [FieldBand<'_, T>]) {
+        let width = match sites {
+            Sites::Grid { region, stride } => region.map_or(job.whole.0, |r| r.width).div_ceil(*stride),
+            Sites::Points(points) => points.len(),
+        };
+        bands.par_iter_mut().for_each(|band| {
+            for index in band.sites.clone() {
+                let at = sites.pixel(index % width, index / width);
+                self.write_site(job, at, index - band.sites.start, band);
+            }
+        });
+    }
+
+    /// Copies the results at the frame's pixel `(x, y)`, if they are here, to place `to` of the band.
+    fn write_site(&self, job: &Job<'_, T>, (x, y): (usize, usize), to: usize, band: &mut FieldBand<'_, T>) {
+        let (x, y) = (job.local_x(x), job.local_y(y));
+        let strip = &self.strip;
+        let wanted = self.covariance.as_ref().map_or(&strip.rows, |c| &c.rows);
+        if wanted.first().is_none_or(|first| y < *first) || wanted.last().is_none_or(|last| y > *last) {
+            return;
+        }
+        let from = place(&strip.rows, &strip.columns, (x, y));
+        let n = strip.rows.len() * strip.columns.len();
+        band.status[to] = strip.status[from];
+        for (k, plane) in band.motion.iter_mut().enumerate() {
+            let unit = if k < 2 { 1.0 } else { job.setting.scale };
+            plane[to] = strip.motion[k * n + from] * T::from_f64(unit);
+        }
+        if let Some(covariance) = &self.covariance {
+            let from = place(&covariance.rows, &covariance.columns, (x, y));
+            let n = covariance.rows.len() * covariance.columns.len();
+            for (k, plane) in band.covariance.iter_mut().enumerate() {
+                plane[to] = covariance.planes[k * n + from];
+            }
+        }
+        if let Some(plane) = &mut band.residual {
+            let count = T::from_f64(job.setting.rows as f64) * strip.weight[from];
+            plane[to] = crate::simd::Lanes::sqrt(strip.residual[from] / count);
+        }
+        if let Some(plane) = &mut band.rank {
+            plane[to] = strip.rank[from];
+        }
+        if let Some(plane) = &mut band.condition {
+            plane[to] = strip.condition[from];
+        }
+    }
+}
+
+/// Place of pixel `(x, y)` in planes of these evenly spaced rows and these columns.
+fn place(rows: &[usize], columns: &Range<usize>, (x, y): (usize, usize)) -> usize {
+    let spacing = rows.get(1).map_or(1, |second| second - rows[0]);
+    (y - rows[0]) / spacing * columns.len() + x - columns.start
+}
+
+/// The rectangle with a margin, inside the frame; the whole frame where little would be saved.
+fn crop(sites: Rect, (width, height): (usize, usize), margin: usize) -> Rect {
+    let span = |at: usize, len: usize, size: usize| {
+        let from = at.saturating_sub(margin);
+        let to = (at + len + margin).min(size);
+        let from = from.min(to.saturating_sub(LEAST_CROP));
+        (from, to.max(from + LEAST_CROP).min(size))
+    };
+    let (x0, x1) = span(sites.x, sites.width, width);
+    let (y0, y1) = span(sites.y, sites.height, height);
+    if 4 * (x1 - x0) * (y1 - y0) > 3 * width * height {
+        return Rect { x: 0, y: 0, width, height };
+    }
+    Rect { x: x0, y: y0, width: x1 - x0, height: y1 - y0 }
+}
+
+/// The part of an image inside a rectangle; nothing is copied where that is all of it.
+fn cut<'a, S: Copy>(frame: &'a Frame<S>, part: Rect) -> Cow<'a, Frame<S>> {
+    if (part.width, part.height) == frame.size() {
+        return Cow::Borrowed(frame);
+    }
+    Cow::Owned(Frame::from_fn(part.width, part.height, |x, y| frame.get(part.x + x, part.y + y)))
+}
+
+/// Sums of squared gradients below this are what rounding alone leaves of a constant image.
+fn rounding_floor<T: Real>(frames: &[Cow<'_, Frame<T>>]) -> f64
+where
+    T: Clone,
+{
+    let epsilon = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let largest =
+        frames.iter().flat_map(|f| f.data()).map(|v| v.to_f64().abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
+    (8.0 * epsilon * largest).powi(2)
+}
