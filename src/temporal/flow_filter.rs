@@ -9,6 +9,7 @@ use super::options::{FilterForm, FlowFilterOptions, Transition};
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
+use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
 use rayon::prelude::*;
@@ -91,6 +92,11 @@ impl<T: SimdReal> FlowFilter<T> {
     /// How often a site's covariance had lost its positive definiteness and was mended.
     pub fn repairs(&self) -> u64 {
         self.repairs
+    }
+    /// The same filter on another number of threads; results do not depend on it.
+    pub fn with_threads(mut self, threads: Threads) -> Self {
+        self.options.threads = threads;
+        self
     }
     /// Number of result sites.
     pub fn len(&self) -> usize {

@@ -1,1 +1,258 @@
-//! Saving and resuming.
+//! Saving the filter's state and going on from it, bit for bit.
+//!
+//! One format, `.npz`: a text `header` (JSON: version, precision, sizes, options), `status` of every site (0 where there
+//! is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `covariance` `(filters, 78)` (lower triangles, row by row) and, where there is one,
+//! `mask` `(height, width)`. numpy can read it.
+
+use super::flow_filter::FlowFilter;
+use super::kernel::{N, PACKED};
+use super::options::{FilterForm, FlowFilterOptions, Transition};
+use crate::error::{Error, Result};
+use crate::filter::SigmaPoints;
+use crate::io::Element;
+use crate::io::npz::{NpzReader, NpzWriter};
+use crate::jet::Neighbourhood;
+use crate::parallel::Threads;
+use crate::simd::{Level, SimdReal};
+use crate::types::{Frame, Rect, Sites, Status};
+use serde::{Deserialize, Serialize};
+use std::io::{Cursor, Read, Seek, Write};
+use std::path::Path;
+
+/// Rises when the meaning of a file changes.
+const VERSION: u32 = 1;
+const FORMAT: &str = "jacoflow flow filter";
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    version: u32,
+    precision: String,
+    frame_size: (usize, usize),
+    frames: usize,
+    repairs: u64,
+    options: SavedOptions,
+}
+
+/// The options in words and numbers; threads belong to the run, not to the state.
+#[derive(Serialize, Deserialize)]
+struct SavedOptions {
+    neighbourhood: SavedNeighbourhood,
+    form: FilterForm,
+    transition: Transition,
+    process_noise: [f64; N],
+    measurement_noise: f64,
+    initial_mean: [f64; N],
+    initial_covariance: [f64; N],
+    sigma_points: SigmaPoints,
+    full_scale: f64,
+    sites: SavedSites,
+    mask: bool,
+    covariance: bool,
+    residual: bool,
+    pixel_pitch: (f64, f64),
+    frame_period: Option<f64>,
+    simd: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum SavedNeighbourhood {
+    Rectangle { width: usize, height: usize, sigma: Option<f64> },
+    Points { offsets: Vec<(i32, i32)>, sigma: Option<f64> },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum SavedSites {
+    /// Region as `x, y, width, height`.
+    Grid {
+        region: Option<[usize; 4]>,
+        stride: usize,
+    },
+    Points(Vec<(usize, usize)>),
+}
+
+impl SavedOptions {
+    fn new(options: &FlowFilterOptions) -> Self {
+        let neighbourhood = match options.neighbourhood.clone() {
+            Neighbourhood::Rectangle { width, height, sigma } => SavedNeighbourhood::Rectangle { width, height, sigma },
+            Neighbourhood::Points { offsets, sigma } => SavedNeighbourhood::Points { offsets, sigma },
+        };
+        let sites = match options.sites.clone() {
+            Sites::Grid { region, stride } => {
+                SavedSites::Grid { region: region.map(|r| [r.x, r.y, r.width, r.height]), stride }
+            }
+            Sites::Points(points) => SavedSites::Points(points),
+        };
+        Self {
+            neighbourhood,
+            form: options.form,
+            transition: options.transition,
+            process_noise: options.process_noise,
+            measurement_noise: options.measurement_noise,
+            initial_mean: options.initial_mean,
+            initial_covariance: options.initial_covariance,
+            sigma_points: options.sigma_points,
+            full_scale: options.full_scale,
+            sites,
+            mask: options.mask.is_some(),
+            covariance: options.covariance,
+            residual: options.residual,
+            pixel_pitch: options.pixel_pitch,
+            frame_period: options.frame_period,
+            simd: options.simd.map(|level| level.name().to_string()),
+        }
+    }
+
+    fn restore(self, mask: Option<Frame<bool>>) -> FlowFilterOptions {
+        let neighbourhood = match self.neighbourhood {
+            SavedNeighbourhood::Rectangle { width, height, sigma } => Neighbourhood::Rectangle { width, height, sigma },
+            SavedNeighbourhood::Points { offsets, sigma } => Neighbourhood::Points { offsets, sigma },
+        };
+        let sites = match self.sites {
+            SavedSites::Grid { region, stride } => {
+                Sites::Grid { region: region.map(|[x, y, width, height]| Rect { x, y, width, height }), stride }
+            }
+            SavedSites::Points(points) => Sites::Points(points),
+        };
+        FlowFilterOptions {
+            neighbourhood,
+            form: self.form,
+            transition: self.transition,
+            process_noise: self.process_noise,
+            measurement_noise: self.measurement_noise,
+            initial_mean: self.initial_mean,
+            initial_covariance: self.initial_covariance,
+            sigma_points: self.sigma_points,
+            full_scale: self.full_scale,
+            sites,
+            mask,
+            covariance: self.covariance,
+            residual: self.residual,
+            pixel_pitch: self.pixel_pitch,
+            frame_period: self.frame_period,
+            threads: Threads::default(),
+            // A level that this processor lacks gives way to its best one.
+            simd: self.simd.and_then(|name| Level::parse(&name).ok()),
+        }
+    }
+}
+
+impl<T: SimdReal + Element> FlowFilter<T> {
+    /// The whole filter as the bytes of an `.npz` archive: options, counts and states. Threads are left out.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] or [`Error::Io`] when it cannot be put together, which does not happen in memory.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let writer = NpzWriter::new(Cursor::new(Vec::new()), "filter state");
+        Ok(self.write_to(writer)?.into_inner()?.into_inner())
+    }
+
+    /// The filter that [`to_bytes`](Self::to_bytes) put down: on the same instruction set it goes on bit for bit.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for bytes that are no filter state, of another version or of another precision than `T`.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        Self::read_from(NpzReader::new(Cursor::new(bytes), "filter state")?)
+    }
+
+    /// Writes the filter into an `.npz` file, which appears only when it is complete.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        self.write_to(NpzWriter::create(path)?)?.finish()
+    }
+
+    /// Reads a filter that [`save`](Self::save) wrote.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be read, and those of [`from_bytes`](Self::from_bytes).
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        Self::read_from(NpzReader::open(path)?)
+    }
+
+    fn write_to<W: Write + Seek>(&self, mut writer: NpzWriter<W>) -> Result<NpzWriter<W>> {
+        let header = Header {
+            format: FORMAT.into(),
+            version: VERSION,
+            precision: precision::<T>().into(),
+            frame_size: self.frame_size,
+            frames: self.frames,
+            repairs: self.repairs,
+            options: SavedOptions::new(&self.options),
+        };
+        let text = serde_json::to_string(&header).map_err(|e| Error::Numerical(format!("state header: {e}")))?;
+        writer.text("header", &text)?;
+        let filters = self.store.sites.len();
+        writer.array("mean", &[filters, N], &self.store.gather(0, N))?;
+        writer.array("covariance", &[filters, PACKED], &self.store.gather(N, PACKED))?;
+        let status: Vec<u8> = self.store.fixed.iter().map(|&status| status as u8).collect();
+        let (width, height) = self.options.sites.shape(self.frame_size)?;
+        writer.array("status", &[height, width], &status)?;
+        if let Some(mask) = &self.options.mask {
+            let bytes: Vec<u8> = mask.data().iter().map(|&used| u8::from(used)).collect();
+            writer.array("mask", &[mask.height(), mask.width()], &bytes)?;
+        }
+        Ok(writer)
+    }
+
+    fn read_from<R: Read + Seek>(mut reader: NpzReader<R>) -> Result<Self> {
+        let path = reader.path().to_path_buf();
+        let wrong = |message: String| Error::format(&path, message);
+        let text = reader.text("header")?;
+        // The version is looked at before the rest, which another version may have changed.
+        let value: serde_json::Value =
+            serde_json::from_str(&text).map_err(|e| wrong(format!("the header is damaged: {e}")))?;
+        if value["format"] != FORMAT {
+            return Err(wrong(format!("expected a file of the kind '{FORMAT}', got {}", value["format"])));
+        }
+        if value["version"] != VERSION {
+            return Err(wrong(format!("expected version {VERSION} of the state, got {}", value["version"])));
+        }
+        let header: Header = serde_json::from_value(value).map_err(|e| wrong(format!("the header is damaged: {e}")))?;
+        if header.precision != precision::<T>() {
+            return Err(wrong(format!("expected a state in {}, got {}", precision::<T>(), header.precision)));
+        }
+        let (width, height) = header.frame_size;
+        let mask = if header.options.mask {
+            let array = reader.array::<u8>("mask")?;
+            if array.shape != [height, width] {
+                return Err(wrong(format!("expected a mask of shape [{height}, {width}], got {:?}", array.shape)));
+            }
+            Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?)
+        } else {
+            None
+        };
+        let mean = reader.array::<T>("mean")?;
+        let covariance = reader.array::<T>("covariance")?;
+        let options = header.options.restore(mask);
+        // Nothing of the claimed size is allocated before the file has shown that it holds as much.
+        let status = reader.array::<u8>("status")?;
+        let (columns, rows) = options.sites.shape(header.frame_size).map_err(|e| wrong(e.to_string()))?;
+        if status.shape != [rows, columns] {
+            return Err(wrong(format!("expected a status of shape [{rows}, {columns}], got {:?}", status.shape)));
+        }
+        let filters = status.values.iter().filter(|&&code| code == Status::Ok as u8).count();
+        for (name, array, columns) in [("mean", &mean, N), ("covariance", &covariance, PACKED)] {
+            if array.shape != [filters, columns] {
+                return Err(wrong(format!("expected {name} of shape [{filters}, {columns}], got {:?}", array.shape)));
+            }
+        }
+        let mut filter = Self::new(header.frame_size, options).map_err(|e| wrong(e.to_string()))?;
+        if filter.store.fixed.iter().zip(&status.values).any(|(&fixed, &code)| fixed as u8 != code) {
+            return Err(wrong("the status does not fit the options".into()));
+        }
+        filter.store.scatter(0, N, &mean.values);
+        filter.store.scatter(N, PACKED, &covariance.values);
+        filter.frames = header.frames;
+        filter.repairs = header.repairs;
+        Ok(filter)
+    }
+}
+
+/// numpy's name of the working precision.
+fn precision<T>() -> &'static str {
+    if size_of::<T>() == 4 { "float32" } else { "float64" }
+}

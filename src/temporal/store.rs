@@ -66,6 +66,28 @@ impl<T: SimdReal> Store<T> {
         Ok(Self { pixels, sites, fixed, blocks })
     }
 
+    /// Planes `from .. from + count` of every filter, one row a filter.
+    pub(super) fn gather(&self, from: usize, count: usize) -> Vec<T> {
+        let mut out = Vec::with_capacity(self.sites.len() * count);
+        for index in 0..self.sites.len() {
+            let block = &self.blocks[index / BLOCK * PLANES * BLOCK..];
+            out.extend((from..from + count).map(|plane| block[plane * BLOCK + index % BLOCK]));
+        }
+        out
+    }
+
+    /// The reverse of [`Store::gather`]; the padding of the last block repeats the last filter.
+    pub(super) fn scatter(&mut self, from: usize, count: usize, values: &[T]) {
+        let last = self.sites.len().saturating_sub(1);
+        for index in 0..self.pixels.len() {
+            let row = &values[index.min(last) * count..];
+            let block = &mut self.blocks[index / BLOCK * PLANES * BLOCK..];
+            for k in 0..count {
+                block[(from + k) * BLOCK + index % BLOCK] = row[k];
+            }
+        }
+    }
+
     /// Mean and full covariance of filter `index`.
     pub(super) fn state(&self, index: usize) -> ([f64; N], [[f64; N]; N]) {
         let block = &self.blocks[index / BLOCK * PLANES * BLOCK..][..PLANES * BLOCK];
