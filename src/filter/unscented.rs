@@ -102,7 +102,7 @@ impl UnscentedFilter {
         let sigmas = if self.redraw || self.sigmas.is_empty() {
             self.draw_from(&factors)
         } else {
-            std::mem::take(&mut self.sigmas)
+            self.sigmas.clone()
         };
         let rows = sigmas.len() / (batch * n);
         let mut measured = vec![0.0; batch * rows * m];
