@@ -31,7 +31,7 @@ pub struct Estimator {
 
 #[derive(Debug)]
 enum Engine {
-    Instantaneous(Instantaneous),
+    Instantaneous(Box<Instantaneous>),
     Windowed(Windowed),
     LucasKanade(LucasKanade),
     HornSchunck(HornSchunck),
@@ -45,7 +45,7 @@ impl Estimator {
     pub fn new(method: Method, common: Common) -> Result<Self> {
         common.check()?;
         let engine = match &method {
-            Method::Instantaneous(o) => Engine::Instantaneous(Instantaneous::new(o, &common)?),
+            Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &common)?)),
             Method::Windowed(o) => Engine::Windowed(Windowed::new(o, &common)?),
             Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &common)?),
             Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &common)?),
@@ -194,7 +194,7 @@ impl Estimator {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
         match (&self.engine, frames) {
-            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field)?,
+            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field),
             (Engine::Instantaneous(_), _) => {}
             (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field)?,
             (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.common, field)?,
@@ -216,7 +216,9 @@ fn to_pitch<T: SimdReal>(field: &mut FlowField<T>, parameters: &[Parameter], pit
     let scale: Vec<f64> = parameters.iter().map(|p| p.scale(pitch)).collect();
     let by = |plane: &mut [T], factor: f64| {
         if factor != 1.0 {
-            plane.iter_mut().for_each(|v| *v *= T::from_f64(factor));
+            for v in plane {
+                *v *= T::from_f64(factor);
+            }
         }
     };
     for (plane, &factor) in field.motion.chunks_mut(n).zip(&scale) {

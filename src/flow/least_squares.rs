@@ -45,7 +45,9 @@ pub(super) fn solve<const N: usize, const P: usize>(a: &[[f64; P]; N], b: &[f64;
     let inverse = if rank == P {
         let mut inverse = factors.pseudo_inverse(rank);
         for k in 0..P {
-            inverse[k].iter_mut().for_each(|v| *v /= scale[k]);
+            for v in &mut inverse[k] {
+                *v /= scale[k];
+            }
         }
         inverse
     } else {

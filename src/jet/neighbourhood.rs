@@ -81,8 +81,8 @@ impl Neighbourhood {
                 }
                 let mut sorted = offsets.clone();
                 sorted.sort_unstable();
-                if let Some(pair) = sorted.windows(2).find(|p| p[0] == p[1]) {
-                    return Err(Error::argument("neighbourhood", "different offsets", format!("{:?} twice", pair[0])));
+                if let Some([twice, ..]) = sorted.windows(2).find(|p| p[0] == p[1]) {
+                    return Err(Error::argument("neighbourhood", "different offsets", format!("{twice:?} twice")));
                 }
             }
         }

@@ -187,7 +187,7 @@ mod tests {
         let frame = noise(33, 70);
         let stencil = JetStencil::new(&rectangle(5, 5, Some(1.0)), (1.0, 1.0)).unwrap();
         let run = |n| stencil.planes(&frame, Threads::new(Some(n)).unwrap());
-        let bits = |p: &JetPlanes<f64>| p.planes.iter().flat_map(|f| f.data()).map(|v| v.to_bits()).collect::<Vec<_>>();
+        let bits = |p: &JetPlanes<f64>| p.planes.iter().flat_map(Frame::data).map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&run(1)), bits(&run(2)));
     }
 

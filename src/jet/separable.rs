@@ -9,8 +9,6 @@ use super::neighbourhood::{side_offsets, weight};
 /// The filters of one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    /// First offset, px.
-    pub first: i32,
     /// `filters[i][k]`: weight of the k-th sample in the coefficient of `p_i`.
     pub filters: [Vec<f64>; 3],
     /// `p1 = x - a`.
@@ -46,7 +44,7 @@ impl Axis {
             return None;
         }
         let filter = |p: &dyn Fn(f64) -> f64, n: f64| x.iter().zip(&w).map(|(&x, w)| w * p(x) / n).collect();
-        Some(Self { first: x[0] as i32, filters: [filter(&one, n0), filter(&p1, n1), filter(&p2, n2)], a, b, c })
+        Some(Self { filters: [filter(&one, n0), filter(&p1, n1), filter(&p2, n2)], a, b, c })
     }
 
     /// Offsets are symmetric about the site, so that `a = b = 0`.

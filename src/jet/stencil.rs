@@ -121,7 +121,9 @@ impl JetStencil {
         let (x, y) = self.axes.as_ref()?;
         let mut map = taylor(x, y);
         for (row, s) in map.iter_mut().zip(scales(self.pitch)) {
-            row.iter_mut().for_each(|m| *m *= s);
+            for m in row {
+                *m *= s;
+            }
         }
         Some((x, y, map))
     }

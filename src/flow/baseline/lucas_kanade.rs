@@ -1,10 +1,15 @@
 //! Lucas and Kanade (1981): flow constant in a window, least squares.
 
-use super::pair::Differences;
+use super::pair::{Crop, Differences, Gradients};
 use crate::error::{Error, Result};
 use crate::flow::options::Common;
+use crate::flow::site::{FieldBand, MaskCounts, bands};
+use crate::jet::Reach;
+use crate::math::Real;
+use crate::parallel::Threads;
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame};
+use crate::types::{FlowField, Frame, Rect, Sites, Status};
+use rayon::prelude::*;
 
 /// The weights of the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,16 +35,39 @@ impl Default for LucasKanadeOptions {
     }
 }
 
+/// Smallest eigenvalue of the window's gradient matrix, relative to its largest, that counts as two-dimensional structure.
+const RANK_TOLERANCE: f64 = 1e-9;
+
 /// The estimator behind the options.
 #[derive(Debug)]
 pub(in crate::flow) struct LucasKanade {
     options: LucasKanadeOptions,
+    /// One-dimensional window weights; the window is their product.
+    kernel: Vec<f64>,
+}
+
+/// Weighted sums over one window.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    /// `w Ix^2, w Ix Iy, w Iy^2, w Ix It, w Iy It, w It^2`, then the first three with squared weights, and the sum of the weights' squares apart.
+    values: [f64; 9],
 }
 
 impl LucasKanade {
     /// Checks the options.
     pub fn new(options: &LucasKanadeOptions, _common: &Common) -> Result<Self> {
-        Ok(Self { options: *options })
+        let kernel = match options.window {
+            Window::Gaussian(sigma) if sigma > 0.0 && sigma <= 100.0 => {
+                let radius = (3.0 * sigma + 0.5) as i32;
+                (-radius..=radius).map(|e| (-0.5 * (f64::from(e) / sigma).powi(2)).exp()).collect()
+            }
+            Window::Box(side) if side % 2 == 1 && (3..=601).contains(&side) => vec![1.0; side],
+            Window::Gaussian(sigma) => {
+                return Err(Error::argument("window", "a Gaussian of more than 0 and at most 100 px", sigma));
+            }
+            Window::Box(side) => return Err(Error::argument("window", "an odd side from 3 to 601 px", side)),
+        };
+        Ok(Self { options: *options, kernel })
     }
     /// Frames differenced.
     pub fn frames_needed(&self) -> usize {
@@ -49,13 +77,269 @@ impl LucasKanade {
     pub fn frame(&self) -> usize {
         self.options.differences.frame()
     }
-    /// Fills `field`, in px and frames.
+    fn radius(&self) -> usize {
+        self.kernel.len() / 2
+    }
+    /// The window, and one pixel more for its gradients.
+    fn reach(&self) -> Reach {
+        let r = self.radius() + 1;
+        Reach { left: r, right: r, up: r, down: r }
+    }
+
+    /// Fills `field`, in px and frames. A window that leaves the frame has no estimate.
     pub fn estimate_into<T: SimdReal>(
         &self,
-        _frames: &[&Frame<T>],
-        _common: &Common,
-        _field: &mut FlowField<T>,
+        frames: &[&Frame<T>],
+        common: &Common,
+        field: &mut FlowField<T>,
     ) -> Result<()> {
-        Err(Error::Missing("method: Lucas-Kanade is not part of this build".into()))
+        let (w, h) = frames[0].size();
+        let (width, sites, r) = (field.width, field.layout.sites.clone(), self.reach().left);
+        let counts = common.mask.as_ref().map(MaskCounts::new);
+        let around = |x0: usize, y0: usize, x1: usize, y1: usize| Crop {
+            x0: x0.saturating_sub(r),
+            y0: y0.saturating_sub(r),
+            x1: (x1 + r).min(w),
+            y1: (y1 + r).min(h),
+        };
+        let obstacle = |at: (usize, usize)| {
+            if !self.reach().fits(at, (w, h)) {
+                return Some(Status::Border);
+            }
+            counts.as_ref().is_some_and(|c| c.touches(at, self.reach())).then_some(Status::Masked)
+        };
+        let gradients = |crop: Crop, threads: Threads| {
+            Gradients::new(frames, self.options.differences, crop, threads, common.level())
+        };
+        let region = match sites {
+            Sites::Grid { region, .. } => Some(region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h })),
+            Sites::Points(_) => None,
+        };
+        let whole = match region {
+            Some(q) => {
+                let crop = around(q.x, q.y, q.x + q.width, q.y + q.height);
+                Some((gradients(crop, common.threads)?, crop))
+            }
+            None => None,
+        };
+        let one = Threads::new(Some(1))?;
+        let noise = common.noise.map(|sd| sd * sd * self.options.differences.first_gain());
+        common.threads.install(|| {
+            bands(field).into_par_iter().try_for_each(|mut band| {
+                let mut columns = Columns::default();
+                for index in band.sites.clone() {
+                    let (col, row) = (index % width, index / width);
+                    let at = sites.pixel(col, row);
+                    let local = index - band.sites.start;
+                    if let Some(status) = obstacle(at) {
+                        put(&mut band, local, Err(status), &mut [[f64::NAN; 2]; 2], f64::NAN);
+                        continue;
+                    }
+                    let (sums, brightness) = if let Some((g, crop)) = &whole {
+                        columns.prepare(g, at.1 - crop.y0, &self.kernel);
+                        (columns.window(at.0 - crop.x0, &self.kernel), g.brightness)
+                    } else {
+                        let g = gradients(around(at.0, at.1, at.0 + 1, at.1 + 1), one)?;
+                        columns.row = None;
+                        columns.prepare(&g, r, &self.kernel);
+                        (columns.window(r, &self.kernel), g.brightness)
+                    };
+                    self.solve::<T>(&mut band, local, &sums, brightness, noise);
+                }
+                Ok(())
+            })
+        })
+    }
+
+    /// The 2x2 normal equations of one window.
+    fn solve<T: Real>(
+        &self,
+        band: &mut FieldBand<'_, T>,
+        local: usize,
+        sums: &Sums,
+        brightness: f64,
+        noise: Option<f64>,
+    ) {
+        let [xx, xy, yy, xt, yt, tt, sxx, sxy, syy] = sums.values;
+        let mut none = [[f64::NAN; 2]; 2];
+        if !sums.values.iter().all(|v| v.is_finite()) {
+            return put(band, local, Err(Status::NonFinite), &mut none, f64::NAN);
+        }
+        let weight: f64 = self.kernel.iter().sum::<f64>().powi(2);
+        let det = xx * yy - xy * xy;
+        let largest = 0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
+        let spacing = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
+        let floor = weight * (brightness * spacing).powi(2);
+        if !(largest > 0.0 && det / largest > floor.max(RANK_TOLERANCE * largest)) {
+            return put(band, local, Err(Status::Unobservable), &mut none, f64::NAN);
+        }
+        let inverse = [[yy / det, -xy / det], [-xy / det, xx / det]];
+        let u = -(inverse[0][0] * xt + inverse[0][1] * yt);
+        let v = -(inverse[1][0] * xt + inverse[1][1] * yt);
+        let left = (tt + u * xt + v * yt).max(0.0);
+        // Sandwich A^-1 (sum w^2 g g^T) A^-1: the weights are no inverse variances.
+        let middle = [[sxx, sxy], [sxy, syy]];
+        let mut covariance = [[0.0; 2]; 2];
+        for i in 0..2 {
+            for j in 0..2 {
+                for k in 0..2 {
+                    for l in 0..2 {
+                        covariance[i][j] += inverse[i][k] * middle[k][l] * inverse[l][j];
+                    }
+                }
+            }
+        }
+        let used = inverse[0][0] * sxx + 2.0 * inverse[0][1] * sxy + inverse[1][1] * syy;
+        let variance = noise.unwrap_or(left / (weight - used));
+        covariance.iter_mut().flatten().for_each(|c| *c *= variance);
+        put(band, local, Ok((u, v)), &mut covariance, (left / weight).sqrt());
+        let smallest = det / largest;
+        if let Some(p) = &mut band.condition {
+            p[local] = T::from_f64((largest / smallest).sqrt());
+        }
+    }
+}
+
+/// Products summed down the columns of one row of windows.
+#[derive(Default)]
+struct Columns {
+    row: Option<usize>,
+    sums: Vec<[f64; 9]>,
+}
+
+impl Columns {
+    fn prepare(&mut self, g: &Gradients, y: usize, kernel: &[f64]) {
+        if self.row == Some(y) {
+            return;
+        }
+        self.row = Some(y);
+        self.sums.clear();
+        self.sums.resize(g.ix.width(), [0.0; 9]);
+        for (k, &w) in kernel.iter().enumerate() {
+            let row = y + k - kernel.len() / 2;
+            let lines = g.ix.row(row).iter().zip(g.iy.row(row)).zip(g.it.row(row));
+            for (sum, ((&x, &y), &t)) in self.sums.iter_mut().zip(lines) {
+                let products = [x * x, x * y, y * y, x * t, y * t, t * t];
+                for (s, p) in sum.iter_mut().zip(products) {
+                    *s += w * p;
+                }
+                for (s, p) in sum[6..].iter_mut().zip(products) {
+                    *s += w * w * p;
+                }
+            }
+        }
+    }
+
+    fn window(&self, x: usize, kernel: &[f64]) -> Sums {
+        let mut out = Sums::default();
+        for (&w, column) in kernel.iter().zip(&self.sums[x - kernel.len() / 2..]) {
+            for (k, (o, c)) in out.values.iter_mut().zip(column).enumerate() {
+                *o += c * if k < 6 { w } else { w * w };
+            }
+        }
+        out
+    }
+}
+
+/// Writes flow or its absence.
+fn put<T: Real>(
+    band: &mut FieldBand<'_, T>,
+    local: usize,
+    flow: std::result::Result<(f64, f64), Status>,
+    covariance: &mut [[f64; 2]; 2],
+    residual: f64,
+) {
+    let (u, v) = flow.unwrap_or((f64::NAN, f64::NAN));
+    band.motion[0][local] = T::from_f64(u);
+    band.motion[1][local] = T::from_f64(v);
+    let upper = [covariance[0][0], covariance[0][1], covariance[1][1]];
+    for (plane, value) in band.covariance.iter_mut().zip(upper) {
+        plane[local] = T::from_f64(value);
+    }
+    if let Some(p) = &mut band.residual {
+        p[local] = T::from_f64(residual);
+    }
+    if let Some(p) = &mut band.rank {
+        p[local] = if flow.is_ok() { 2 } else { 0 };
+    }
+    if let Some(p) = &mut band.condition {
+        p[local] = T::nan();
+    }
+    band.status[local] = flow.err().unwrap_or(Status::Ok);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::{Estimator, Method};
+    use crate::types::Mask;
+
+    /// Two crossed waves moving by (u, v) px/frame.
+    fn frames(u: f64, v: f64) -> Vec<Frame<f64>> {
+        (0..3)
+            .map(|t| {
+                Frame::from_fn(48, 40, |x, y| {
+                    let (x, y) = (x as f64 - u * f64::from(t), y as f64 - v * f64::from(t));
+                    100.0 + 30.0 * (0.31 * x + 0.12 * y).sin() + 25.0 * (0.27 * y - 0.09 * x).cos()
+                })
+            })
+            .collect()
+    }
+
+    fn estimate(options: LucasKanadeOptions, common: Common, frames: &[Frame<f64>]) -> FlowField<f64> {
+        let estimator = Estimator::new(Method::LucasKanade(options), common).unwrap();
+        let some: Vec<&Frame<f64>> = frames.iter().take(estimator.frames_needed()).collect();
+        estimator.estimate(&some, 7).unwrap()
+    }
+
+    #[test]
+    fn a_translation_is_found_with_either_window_and_difference() {
+        let f = frames(0.3, -0.2);
+        for window in [Window::Gaussian(3.0), Window::Box(11)] {
+            for differences in [Differences::Central, Differences::Pair] {
+                let field = estimate(LucasKanadeOptions { window, differences }, Common::default(), &f);
+                assert_eq!(field.layout.frame_index, 7 + usize::from(differences == Differences::Central));
+                let i = 20 * field.width + 24;
+                assert_eq!((field.status[i], field.status[0]), (Status::Ok, Status::Border));
+                let m = field.affine(i);
+                assert!((m.u - 0.3).abs() < 0.01 && (m.v + 0.2).abs() < 0.01, "{window:?} {differences:?} {m:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_equal_the_dense_field_and_one_direction_is_not_enough() {
+        let f = frames(0.3, -0.2);
+        let dense = estimate(LucasKanadeOptions::default(), Common::default(), &f);
+        let sites = Sites::Points(vec![(24, 20), (20, 18)]);
+        let points = estimate(LucasKanadeOptions::default(), Common { sites, ..Common::default() }, &f);
+        for (k, (x, y)) in [(24, 20), (20, 18)].into_iter().enumerate() {
+            assert!((points.motion[k] - dense.motion[y * 48 + x]).abs() < 1e-12);
+        }
+        let stripes: Vec<Frame<f64>> =
+            (0..3).map(|t| Frame::from_fn(48, 40, |x, _| (0.3 * (x as f64 - 0.2 * f64::from(t))).sin())).collect();
+        let field = estimate(LucasKanadeOptions::default(), Common::default(), &stripes);
+        assert!(field.status[20 * 48 + 24] == Status::Unobservable && field.motion[20 * 48 + 24].is_nan());
+    }
+
+    #[test]
+    fn masks_and_bad_samples_touch_only_their_windows() {
+        let mut f = frames(0.3, -0.2);
+        f[1].row_mut(20)[24] = f64::NAN;
+        let mask = Mask::from_fn(48, 40, |x, y| (x, y) != (10, 12));
+        let options = LucasKanadeOptions { window: Window::Box(5), ..LucasKanadeOptions::default() };
+        let field = estimate(options, Common { mask: Some(mask), ..Common::default() }, &f);
+        for y in 3..37usize {
+            for x in 3..45usize {
+                let near = |cx: usize, cy: usize, r: usize| x.abs_diff(cx) <= r && y.abs_diff(cy) <= r;
+                let got = field.status[y * 48 + x];
+                if near(10, 12, 3) {
+                    assert_eq!(got, Status::Masked);
+                } else if got != Status::Ok {
+                    assert!(got == Status::NonFinite && near(24, 20, 3));
+                }
+            }
+        }
+        assert_eq!(field.status[20 * 48 + 24], Status::NonFinite);
     }
 }

@@ -46,6 +46,14 @@ impl Differences {
         }
     }
 
+    /// Variance of `It` for pixel noise of variance 1.
+    pub(super) fn first_gain(self) -> f64 {
+        match self {
+            Self::Central => 0.5,
+            Self::Pair => 2.0,
+        }
+    }
+
     /// The frame that the flow is filed under.
     pub(super) fn frame(self) -> usize {
         match self {

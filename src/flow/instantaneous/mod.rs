@@ -7,18 +7,22 @@
 //!
 //! Equations are formed per px and frame whatever the pixel pitch is, so that the pitch scales results and never changes a decision.
 
+mod dense;
 mod noise;
+mod normal;
 mod point;
 
 use super::model::ModelKind;
 use super::options::{Common, RankPolicy};
 use super::site::{FieldBand, MaskCounts, bands};
 use crate::error::Result;
-use crate::jet::{JetRates, JetStencil, Neighbourhood, TimeScheme};
+use crate::jet::{JetRates, JetRows, JetStencil, Neighbourhood, TimeScheme};
 use crate::math::Real;
-use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Mask, Status};
+use crate::simd::{SimdReal, dispatch};
+use crate::types::{FlowField, Frame, Mask, Rect, Sites, Status};
+use dense::{RowKernel, Source, scratch_len};
 use noise::NoiseModel;
+use normal::{LaneRates, noise_square, solve_affine};
 pub(super) use point::rounding_floor;
 use point::{Asked, PointEstimate, PointVisitor};
 use rayon::prelude::*;
@@ -63,26 +67,51 @@ impl Instantaneous {
     }
 
     /// Fills `field`, in px and frames. `frames`: three of one size, oldest first.
-    pub fn estimate_into<T: SimdReal>(
-        &self,
-        frames: [&Frame<T>; 3],
-        common: &Common,
-        field: &mut FlowField<T>,
-    ) -> Result<()> {
+    pub fn estimate_into<T: SimdReal>(&self, frames: [&Frame<T>; 3], common: &Common, field: &mut FlowField<T>) {
         let mask = common.mask.as_ref().map(|mask| SiteMask { mask, counts: MaskCounts::new(mask) });
         let job = Job { owner: self, frames, common, mask };
         let (width, sites) = (field.width, field.layout.sites.clone());
+        let quick = self.options.model == ModelKind::Affine && !common.covariance && !common.diagnostics;
+        let rows = match (&sites, quick) {
+            (&Sites::Grid { region, stride }, true) => {
+                let (w, h) = frames[0].size();
+                let region = region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h });
+                Some(RowPlan { region, stride, source: self.source::<T>() })
+            }
+            _ => None,
+        };
         let all = bands(field);
         common.threads.install(|| {
             all.into_par_iter().for_each(|mut band| {
+                if let Some(plan) = &rows {
+                    return job.rows(&mut band, width, plan);
+                }
                 for index in band.sites.clone() {
                     let at = sites.pixel(index % width, index / width);
-                    job.careful(&mut band, index, at);
+                    if quick {
+                        job.site(&mut band, index, at);
+                    } else {
+                        job.careful(&mut band, index, at);
+                    }
                 }
             });
         });
-        Ok(())
     }
+
+    /// The quickest way to the jets of rows.
+    fn source<T: SimdReal>(&self) -> Source<T> {
+        match self.options.neighbourhood {
+            Neighbourhood::Rectangle { width: 3, height: 3, sigma: None } => Source::Three,
+            _ => Source::Rows(JetRows::new(&self.stencil)),
+        }
+    }
+}
+
+/// How a grid is walked row by row.
+struct RowPlan<T> {
+    region: Rect,
+    stride: usize,
+    source: Source<T>,
 }
 
 /// The mask in the two forms that a neighbourhood asks it in.
@@ -99,7 +128,90 @@ struct Job<'a, T> {
     mask: Option<SiteMask<'a>>,
 }
 
-impl<T: Real> Job<'_, T> {
+impl<T: SimdReal> Job<'_, T> {
+    /// A band of whole rows of a grid, by the fast path, doubtful pixels with more care.
+    fn rows(&self, band: &mut FieldBand<'_, T>, width: usize, plan: &RowPlan<T>) {
+        let level = self.common.level();
+        let (w, h) = self.frames[0].size();
+        let (columns, inside) = self.owner.stencil.reach().inside((w, h));
+        let RowPlan { region, stride, source } = plan;
+        // Columns of the frame that the kernel computes, and the first site among them.
+        let first = columns.start.saturating_sub(region.x).div_ceil(*stride);
+        let last = columns.end.min(region.x + region.width).saturating_sub(region.x).div_ceil(*stride).max(first);
+        let from = region.x + first * stride;
+        let computed = if first < last { from..region.x + (last - 1) * stride + 1 } else { 0..0 };
+        let n = computed.len();
+        let mut scratch = vec![T::default(); scratch_len(source, w)];
+        let mut trust = vec![T::default(); n];
+        let mut spare = vec![T::default(); if *stride == 1 { 0 } else { 6 * n }];
+        for row in 0..band.sites.len() / width {
+            let index = band.sites.start + row * width;
+            let y = region.y + index / width * stride;
+            let base = row * width;
+            if n == 0 || !inside.contains(&y) {
+                (0..width).for_each(|k| clear(band, base + k, Status::Border));
+                continue;
+            }
+            (0..first).chain(last..width).for_each(|k| clear(band, base + k, Status::Border));
+            let mut kernel = RowKernel {
+                source,
+                scheme: self.owner.options.scheme,
+                frames: self.frames,
+                y,
+                columns: computed.clone(),
+                scratch: &mut scratch,
+                motion: Default::default(),
+                trust: &mut trust,
+            };
+            if *stride == 1 {
+                for (slot, plane) in kernel.motion.iter_mut().zip(&mut band.motion) {
+                    *slot = &mut plane[base + first..base + last];
+                }
+                dispatch(level, kernel);
+            } else {
+                for (slot, plane) in kernel.motion.iter_mut().zip(spare.chunks_exact_mut(n)) {
+                    *slot = plane;
+                }
+                dispatch(level, kernel);
+                for (plane, values) in band.motion.iter_mut().zip(spare.chunks_exact(n)) {
+                    for (to, from) in plane[base + first..base + last].iter_mut().zip(values.iter().step_by(*stride)) {
+                        *to = *from;
+                    }
+                }
+            }
+            band.status[base + first..base + last].fill(Status::Ok);
+            for k in first..last {
+                let at = (region.x + k * stride, y);
+                let trusted = trust[(k - first) * stride] > T::default();
+                if !trusted || (self.mask.is_some() && self.obstacle(at).is_some()) {
+                    self.site(band, index + k, at);
+                }
+            }
+        }
+    }
+
+    /// One site of the affine model without diagnostics: normal equations in double precision, and the careful path where even those are doubtful.
+    fn site(&self, band: &mut FieldBand<'_, T>, index: usize, at: (usize, usize)) {
+        let local = index - band.sites.start;
+        if let Some(status) = self.obstacle(at) {
+            return clear(band, local, status);
+        }
+        let Some(rates) = self.rates(at) else {
+            return clear(band, local, Status::NonFinite);
+        };
+        let [_, jet @ ..] = rates.jet;
+        let lanes = LaneRates { jet, minus_first: rates.first.map(|v| -v), second: rates.second };
+        let solution = solve_affine(&lanes, noise_square::<T>() * rates.jet[0] * rates.jet[0]);
+        if solution.trust > 0.0 {
+            for (plane, value) in band.motion.iter_mut().zip(solution.motion) {
+                plane[local] = T::from_f64(value);
+            }
+            band.status[local] = Status::Ok;
+        } else {
+            self.careful(band, index, at);
+        }
+    }
+
     /// Why there can be no estimate at this pixel, from its place alone.
     fn obstacle(&self, at: (usize, usize)) -> Option<Status> {
         let stencil = &self.owner.stencil;
@@ -137,7 +249,7 @@ impl<T: Real> Job<'_, T> {
             floor: rounding_floor::<T>(&rates),
             policy: options.rank_deficient,
             noise: self.common.covariance.then_some(&self.owner.noise),
-            pixel_variance: &|| self.owner.noise.pixel_variance(&self.owner.stencil, self.frames, at),
+            pixel_variance: &|| NoiseModel::pixel_variance(&self.owner.stencil, self.frames, at),
         };
         let estimate = options.model.visit(PointVisitor { rates: &rates, asked: &asked });
         write(band, local, &estimate);

@@ -30,7 +30,7 @@ impl NoiseModel {
     }
 
     /// Variance of the pixel noise from what the quadratics leave in the three frames; NaN when they leave nothing to judge by.
-    pub fn pixel_variance<T: Real>(&self, stencil: &JetStencil, frames: [&Frame<T>; 3], (x, y): (usize, usize)) -> f64 {
+    pub fn pixel_variance<T: Real>(stencil: &JetStencil, frames: [&Frame<T>; 3], (x, y): (usize, usize)) -> f64 {
         frames.iter().map(|f| stencil.noise_variance(f, x, y).unwrap_or(f64::NAN)).sum::<f64>() / 3.0
     }
 

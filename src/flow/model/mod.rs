@@ -90,7 +90,7 @@ macro_rules! motion_models {
         $(mod $module; pub use $module::$model;)*
 
         /// The motion models by name.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         pub enum ModelKind {
             $($(#[$doc])* $model,)*
         }
@@ -148,6 +148,7 @@ macro_rules! motion_models {
 
 motion_models! {
     /// Flow affine in space and constant in time (34): `u, v, u_x, v_x, u_y, v_y`.
+    #[default]
     affine => Affine(12, 6);
     /// Flow constant in space and time (2): `u, v`.
     translational => Translational(2, 2);
@@ -182,12 +183,6 @@ impl ModelKind {
             let names: Vec<_> = Self::ALL.iter().map(|m| m.name()).collect();
             Error::argument("model", format!("one of {}", names.join(", ")), name)
         })
-    }
-}
-
-impl Default for ModelKind {
-    fn default() -> Self {
-        Self::Affine
     }
 }
 

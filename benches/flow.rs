@@ -1,0 +1,80 @@
+//! Jets and instantaneous flow, 640x480, f32, one thread, at each instruction set of this processor.
+//!
+//! The frames are a noise texture in affine motion with noise and rounding, as a camera would deliver it.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use jacoflow::flow::instantaneous::InstantaneousOptions;
+use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::jet::{JetStencil, Neighbourhood, TimeScheme};
+use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
+use jacoflow::synth::{AffineTexture, Scene, Sensor};
+use jacoflow::types::Frame;
+use std::hint::black_box;
+use std::time::Duration;
+
+const SIZE: (usize, usize) = (640, 480);
+
+fn frames() -> Vec<Frame<f32>> {
+    let scene = AffineTexture::reference(SIZE.0, SIZE.1, 1).expect("the reference texture is valid");
+    let sensor = Sensor::eight_bit(2.0, 1);
+    (0..3u32).map(|t| sensor.apply(&scene.frame(f64::from(t)), u64::from(t)).map(|&v| v as f32)).collect()
+}
+
+fn one_thread() -> Threads {
+    Threads::new(Some(1)).expect("one is a number of threads")
+}
+
+fn jets(c: &mut Criterion) {
+    let frames = frames();
+    let mut group = c.benchmark_group("jets_640x480_f32");
+    group.throughput(Throughput::Elements((SIZE.0 * SIZE.1) as u64));
+    for side in [3, 9] {
+        let stencil = JetStencil::new(&Neighbourhood::square(side), (1.0, 1.0)).expect("a square is a neighbourhood");
+        for level in Level::available() {
+            let id = BenchmarkId::new(format!("{side}x{side}"), level.name());
+            group.bench_function(id, |b| b.iter(|| stencil.planes_with(black_box(&frames[0]), one_thread(), level)));
+        }
+    }
+    group.finish();
+}
+
+fn instantaneous(c: &mut Criterion) {
+    let frames = frames();
+    let three = [&frames[0], &frames[1], &frames[2]];
+    let mut group = c.benchmark_group("instantaneous_640x480_f32");
+    group.throughput(Throughput::Elements((SIZE.0 * SIZE.1) as u64));
+    for (name, side, scheme) in [
+        ("3x3_central", 3, TimeScheme::Central),
+        ("3x3_backward", 3, TimeScheme::Backward),
+        ("7x7_central", 7, TimeScheme::Central),
+    ] {
+        for level in Level::available() {
+            let neighbourhood = Neighbourhood::square(side);
+            let options = InstantaneousOptions { scheme, neighbourhood, ..InstantaneousOptions::default() };
+            let common = Common { threads: one_thread(), simd: Some(level), ..Common::default() };
+            let estimator = Estimator::new(Method::Instantaneous(options), common).expect("the options are valid");
+            let mut field = estimator.estimate(&three, 0).expect("the frames are valid");
+            // A stream reuses its field; the second form makes a new one each time.
+            group.bench_function(BenchmarkId::new(name, level.name()), |b| {
+                b.iter(|| estimator.estimate_into(black_box(&three), 0, &mut field).expect("the frames are valid"));
+            });
+            if side == 3 && scheme == TimeScheme::Central {
+                group.bench_function(BenchmarkId::new("3x3_central_new_field", level.name()), |b| {
+                    b.iter(|| estimator.estimate(black_box(&three), 0).expect("the frames are valid"));
+                });
+            }
+        }
+    }
+    group.finish();
+}
+
+fn quick() -> Criterion {
+    Criterion::default()
+        .sample_size(30)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2))
+}
+
+criterion_group!(name = layers; config = quick(); targets = jets, instantaneous);
+criterion_main!(layers);
