@@ -99,11 +99,7 @@ impl UnscentedFilter {
         let (n, m, batch) = (self.dim_x, self.dim_z, self.batch);
         expect("z", z, &[batch * m])?;
         let factors = self.state.factors()?;
-        let sigmas = if self.redraw || self.sigmas.is_empty() {
-            self.draw_from(&factors)
-        } else {
-            self.sigmas.clone()
-        };
+        let sigmas = if self.redraw || self.sigmas.is_empty() { self.draw_from(&factors) } else { self.sigmas.clone() };
         let rows = sigmas.len() / (batch * n);
         let mut measured = vec![0.0; batch * rows * m];
         hx(&sigmas, &mut measured)?;

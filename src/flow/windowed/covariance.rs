@@ -10,14 +10,15 @@
 //! residual's sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which makes it unbiased for white noise, rounding included; what discretisation
 //! leaves in the residual widens it.
 
+use super::covariance_kernels::{Outer, Pass, Sandwich, Scatter, Weigh};
 use super::estimate::Strip;
-use super::noise::{PixelNoise, columns, pulled_back};
+use super::noise::PixelNoise;
 use super::rows::Plan;
-use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
+use super::solve::{ENTRIES, MomentRow};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
-use super::window::{Window, filter};
+use super::window::Window;
 use crate::jet::JetStencil;
-use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::simd::{Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -55,6 +56,16 @@ impl<T: SimdReal> NoiseSetting<T> {
         pairs.map(|(&(x, y), w)| ((x as isize, y as isize), w.map(T::from_f64))).collect()
     }
 
+    /// Unknowns that have a column of their own in the equations; with row 1 alone the others act by transport only.
+    fn unknowns(&self) -> usize {
+        if self.rows == 1 { 2 } else { 6 }
+    }
+
+    /// The products of those.
+    pub fn plan(&self) -> Plan {
+        if self.rows == 1 { Plan::flow() } else { Plan::outer() }
+    }
+
     /// How far beyond a site estimates of the motion are used, px.
     pub fn margin(&self) -> usize {
         self.squared.radius() + self.smoothing.radius() + self.reach
@@ -82,24 +93,7 @@ impl<T: SimdReal> NoiseSetting<T> {
         }
         bands.into_par_iter().for_each_init(Scratch::new, |scratch, (rows, out)| {
             let columns = columns.clone();
-            match self.rows {
-                1 => dispatch(
-                    self.level,
-                    BandKernel::<T, 1, 1> { setting: self, source, strip, scratch, rows, columns, out },
-                ),
-                3 => dispatch(
-                    self.level,
-                    BandKernel::<T, 3, 3> { setting: self, source, strip, scratch, rows, columns, out },
-                ),
-                6 => dispatch(
-                    self.level,
-                    BandKernel::<T, 6, 6> { setting: self, source, strip, scratch, rows, columns, out },
-                ),
-                _ => dispatch(
-                    self.level,
-                    BandKernel::<T, 12, 6> { setting: self, source, strip, scratch, rows, columns, out },
-                ),
-            }
+            BandTask { setting: self, source, strip, scratch, rows, columns, out }.run();
         });
         planes
     }
@@ -144,12 +138,14 @@ impl<T: SimdReal> Scratch<T> {
 }
 
 /// Fixed-point steps towards the true motion in the pull of the noise.
-const PULL_STEPS: usize = 3;
+pub(super) const PULL_STEPS: usize = 3;
 /// Rows of `Scratch::pixel`.
-const PIXEL: usize = 2 * ENTRIES + 6 + 2 + 6;
+const PIXEL: usize = PIXEL_RESULT + ENTRIES;
+/// Where the result begins among them.
+pub(super) const PIXEL_RESULT: usize = ENTRIES + 6 + 2 + 6;
 
-/// `ROWS` equations a pixel, of which `BLOCK` in each block.
-struct BandKernel<'a, 'b, T, const ROWS: usize, const BLOCK: usize> {
+/// The covariance of a band of rows.
+struct BandTask<'a, 'b, T> {
     setting: &'a NoiseSetting<T>,
     source: &'a Source<'a, T>,
     strip: &'a Strip<T>,
@@ -159,18 +155,16 @@ struct BandKernel<'a, 'b, T, const ROWS: usize, const BLOCK: usize> {
     out: Vec<&'b mut [T]>,
 }
 
-impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> Kernel<T> for BandKernel<'_, '_, T, ROWS, BLOCK> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(mut self) {
+impl<T: SimdReal> BandTask<'_, '_, T> {
+    fn run(mut self) {
+        let level = self.setting.level;
         let (Some(&top), Some(&bottom)) = (self.rows.first(), self.rows.last()) else { return };
         let radius = self.setting.squared.radius();
-        let plan = Self::plan();
+        let plan = self.setting.plan();
         self.scratch.pixel.resize(PIXEL * TILE_COLUMNS, T::default());
         for left in self.columns.clone().step_by(TILE_COLUMNS) {
-            self.scores::<V>(left, (top, bottom));
-            self.products::<V>((top, bottom));
+            self.scores(left, (top, bottom));
+            self.products((top, bottom));
             if !self.source.support.is_whole() {
                 self.usable(left, (top, bottom));
             }
@@ -182,38 +176,28 @@ impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> Kernel<T> for BandKerne
                 let centres = &mut centres[..rows.len()];
                 let Scratch { sums, planes, usable, usable_sums, .. } = &mut *self.scratch;
                 for p in 0..plan.planes() {
-                    sums.sum::<V>(&self.setting.squared, planes, (p, plan.order(p), plan.base(p)), centres);
+                    sums.sum(level, &self.setting.squared, planes, (p, plan.order(p), plan.base(p)), centres);
                 }
                 if !self.source.support.is_whole() {
                     let more = self.setting.window.radius() - radius;
                     centres.iter_mut().for_each(|c| *c += more);
-                    usable_sums.sum::<V>(&self.setting.window, usable, (0, 2, 0), centres);
+                    usable_sums.sum(level, &self.setting.window, usable, (0, 2, 0), centres);
                 }
                 for g in 0..rows.len() {
-                    self.finish_row::<V>(group * GROUP_ROWS + g, g, left);
+                    self.finish_row(group * GROUP_ROWS + g, g, left);
                 }
             }
         }
     }
-}
-
-impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> BandKernel<'_, '_, T, ROWS, BLOCK> {
-    /// Unknowns that have a column of their own in the equations; with row 1 alone the others act by transport only.
-    const UNKNOWNS: usize = if ROWS == 1 { 2 } else { 6 };
-
-    const fn plan() -> Plan {
-        if ROWS == 1 { Plan::flow() } else { Plan::outer() }
-    }
 
     /// The planes h of a tile, before smoothing: `scores` holds `way * UNKNOWNS + unknown`.
-    #[inline(always)]
-    fn scores<V: Lanes<Scalar = T>>(&mut self, left: usize, (top, bottom): (usize, usize)) {
+    fn scores(&mut self, left: usize, (top, bottom): (usize, usize)) {
         let Self { setting, source, strip, scratch, .. } = self;
         let Scratch { jets, motion, weights, scores, .. } = &mut **scratch;
         let (reach, spread) = (setting.reach, setting.squared.radius() + setting.smoothing.radius());
-        let ways = setting.pixel.mixing.len();
+        let count = setting.pixel.mixing.len() * setting.unknowns();
         let (width, height) = (padded(TILE_COLUMNS + 2 * spread), bottom - top + 1 + 2 * spread);
-        scores.resize(ways * Self::UNKNOWNS, width, height);
+        scores.resize(count, width, height);
         scores.data.fill(T::default());
         // Pixels whose stencils reach into that rectangle.
         let margin = (reach + spread) as isize;
@@ -221,57 +205,32 @@ impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> BandKernel<'_, '_, T, R
         let (wide, high) = (padded(width + 2 * reach), height + 2 * reach);
         jets.load(source, corner, wide, high);
         motion.resize(6 * wide, T::default());
-        weights.resize(ways * Self::UNKNOWNS * 6 * wide, T::default());
+        weights.resize(count * 6 * wide, T::default());
         for r in 0..high {
-            jets.row::<V>(source, r);
+            jets.row(setting.level, source, r);
             strip.motion_row(corner.0, corner.1 + r as isize, setting.scale, motion);
-            let mut c = 0;
-            while c < wide {
-                let m: [V; 6] = std::array::from_fn(|k| V::load(&motion[k * wide + c..]));
-                let j = jets.jets::<V>(c, false);
-                let scale = V::constant(setting.scale);
-                let first = columns::<V, BLOCK>(&j.coefficient);
-                let second = columns::<V, BLOCK>(&j.first);
-                for a in 0..Self::UNKNOWNS {
-                    let s = if a < 2 { V::constant(1.0) } else { scale };
-                    let own: [V; 6] = std::array::from_fn(|k| first[a][k] * s);
-                    let through_jet = pulled_back(&own, &m);
-                    let mut through_first = own;
-                    let mut through_second = [V::zero(); 6];
-                    if ROWS == 12 {
-                        through_second = std::array::from_fn(|k| second[a][k] * s);
-                        let more = pulled_back(&through_second, &m);
-                        through_first = std::array::from_fn(|k| own[k] + more[k]);
-                    }
-                    for (q, mix) in setting.pixel.mixing.iter().enumerate() {
-                        let [x, y, z] = mix.map(|v| V::constant(v));
-                        for k in 0..6 {
-                            let mut d = through_jet[k].mul_add(x, through_first[k] * y);
-                            if ROWS == 12 {
-                                d = through_second[k].mul_add(z, d);
-                            }
-                            d.store(&mut weights[((q * Self::UNKNOWNS + a) * 6 + k) * wide + c..]);
-                        }
-                    }
-                }
-                c += V::LANES;
+            let (motion, jets, weights) = (&motion[..], &*jets, &mut weights[..]);
+            match setting.rows {
+                1 => dispatch(setting.level, Weigh::<T, 1, 1> { setting, jets, motion, wide, weights }),
+                3 => dispatch(setting.level, Weigh::<T, 3, 3> { setting, jets, motion, wide, weights }),
+                6 => dispatch(setting.level, Weigh::<T, 6, 6> { setting, jets, motion, wide, weights }),
+                _ => dispatch(setting.level, Weigh::<T, 12, 6> { setting, jets, motion, wide, weights }),
             }
-            scatter::<V>(&setting.taps, weights, wide, (r, reach), scores);
+            dispatch(setting.level, Scatter { taps: &setting.taps, weights, wide, row: (r, reach), scores });
         }
     }
 
     /// Smooths the planes h and multiplies them.
-    #[inline(always)]
-    fn products<V: Lanes<Scalar = T>>(&mut self, (top, bottom): (usize, usize)) {
-        let plan = Self::plan();
+    fn products(&mut self, (top, bottom): (usize, usize)) {
         let Self { setting, scratch, .. } = self;
+        let plan = setting.plan();
         let Scratch { scores, planes, row, smoothed, .. } = &mut **scratch;
         let (radius, spread) = (setting.squared.radius(), setting.smoothing.radius());
-        let ways = setting.pixel.mixing.len();
+        let count = setting.pixel.mixing.len() * setting.unknowns();
         let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
         planes.resize(plan.planes(), width, height);
         row.resize(scores.width.max(padded(width + 2 * spread)), T::default());
-        smoothed.resize(ways * Self::UNKNOWNS * width, T::default());
+        smoothed.resize(count * width, T::default());
         for r in 0..height {
             for (p, target) in smoothed.chunks_exact_mut(width).enumerate() {
                 if spread == 0 {
@@ -280,36 +239,17 @@ impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> BandKernel<'_, '_, T, R
                 } else {
                     let taps = &setting.smoothing.taps;
                     let centre = (r + spread) * scores.width;
-                    filter::<V, 1>(scores.plane(p), centre, scores.width, scores.width, taps, [row]);
-                    filter::<V, 1>(row, spread, 1, width, taps, [target]);
+                    let plane = scores.plane(p);
+                    let pass = Pass { source: plane, centre, stride: scores.width, len: scores.width, taps, out: row };
+                    dispatch(setting.level, pass);
+                    let pass = Pass { source: row, centre: spread, stride: 1, len: width, taps, out: target };
+                    dispatch(setting.level, pass);
                 }
             }
-            let mut c = 0;
-            while c < width {
-                let mut sums = [V::zero(); ENTRIES];
-                for q in 0..ways {
-                    let h: [V; 6] = std::array::from_fn(|a| {
-                        if a < Self::UNKNOWNS {
-                            V::load(&smoothed[(q * Self::UNKNOWNS + a) * width + c..])
-                        } else {
-                            V::zero()
-                        }
-                    });
-                    for i in 0..Self::UNKNOWNS {
-                        for j in i..Self::UNKNOWNS {
-                            sums[upper(i, j)] = h[i].mul_add(h[j], sums[upper(i, j)]);
-                        }
-                    }
-                }
-                for i in 0..Self::UNKNOWNS {
-                    for j in i..Self::UNKNOWNS {
-                        if let Some(p) = plan.place(i, j) {
-                            let at = planes.at(p, r, c);
-                            sums[upper(i, j)].store(&mut planes.data[at..]);
-                        }
-                    }
-                }
-                c += V::LANES;
+            if setting.rows == 1 {
+                dispatch(setting.level, Outer::<T, 2> { plan, smoothed, planes, row: r });
+            } else {
+                dispatch(setting.level, Outer::<T, 6> { plan, smoothed, planes, row: r });
             }
         }
     }
@@ -326,79 +266,21 @@ impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> BandKernel<'_, '_, T, R
     }
 
     /// Covariance of row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that begins at `left`.
-    #[inline(always)]
-    fn finish_row<V: Lanes<Scalar = T>>(&mut self, j: usize, g: usize, left: usize) {
+    fn finish_row(&mut self, j: usize, g: usize, left: usize) {
         self.gather(j, g, left);
         let Self { setting, scratch, .. } = self;
         let Scratch { sums, pixel, .. } = &mut **scratch;
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
-        let noise = &setting.pixel;
-        let mut c = 0;
-        while c < TILE_COLUMNS {
-            let at = |k: usize| V::load(&pixel[k * TILE_COLUMNS + c..]);
-            let inverse: [V; ENTRIES] = std::array::from_fn(at);
-            let m: [V; 6] = std::array::from_fn(|k| at(ENTRIES + k));
-            let (residual, weight) = (at(ENTRIES + 6), at(ENTRIES + 7));
-            let ones: [V; 6] = std::array::from_fn(|k| at(ENTRIES + 8 + k));
-            let score = normal_matrix::<V, T>(Self::plan(), &row, c);
-            // B = N^-1 S, then B N^-1.
-            let mut b = [[V::zero(); 6]; 6];
-            let mut trace = V::zero();
-            for i in 0..6 {
-                for k in 0..6 {
-                    let mut sum = V::zero();
-                    for l in 0..6 {
-                        sum = symmetric(&inverse, i, l).mul_add(symmetric(&score, l, k), sum);
-                    }
-                    b[i][k] = sum;
-                }
-                trace = trace + b[i][i];
-            }
-            let variance = match setting.variance {
-                Some(v) => V::constant(v),
-                None => {
-                    let expected = one_pixel::<V>(noise, &m) * weight;
-                    let left = (expected - trace).max(expected * V::constant(0.05));
-                    residual / left
-                }
-            };
-            // The pull acts on the true motion, which is what is left after undoing it.
-            let mut shift = [V::zero(); 6];
-            for _ in 0..PULL_STEPS {
-                let whole: [V; 6] = std::array::from_fn(|k| m[k] + shift[k]);
-                let pull = pull::<V>(noise, &ones, &whole);
-                for i in 0..6 {
-                    let mut sum = V::zero();
-                    for k in 0..6 {
-                        sum = symmetric(&inverse, i, k).mul_add(pull[k], sum);
-                    }
-                    shift[i] = sum * variance;
-                }
-            }
-            for i in 0..6 {
-                for k in i..6 {
-                    let mut sum = V::zero();
-                    for l in 0..6 {
-                        sum = b[i][l].mul_add(symmetric(&inverse, l, k), sum);
-                    }
-                    let whole = sum.mul_add(variance, shift[i] * shift[k]);
-                    let unit = (if i < 2 { 1.0 } else { setting.scale }) * if k < 2 { 1.0 } else { setting.scale };
-                    let target = (ENTRIES + 14 + upper(i, k)) * TILE_COLUMNS + c;
-                    (whole * V::constant(unit)).store(&mut pixel[target..]);
-                }
-            }
-            c += V::LANES;
-        }
+        dispatch(setting.level, Sandwich { setting, row, pixel });
         let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
-            let source = (ENTRIES + 14 + k) * TILE_COLUMNS;
+            let source = (PIXEL_RESULT + k) * TILE_COLUMNS;
             plane[from..from + count].copy_from_slice(&self.scratch.pixel[source..source + count]);
         }
     }
 
     /// Copies what the strip and the window know of row `j` of the band to `Scratch::pixel`.
-    #[inline(never)]
     fn gather(&mut self, j: usize, g: usize, left: usize) {
         let Self { setting, source, strip, scratch, rows, columns, .. } = self;
         let y = rows[j];
@@ -424,90 +306,4 @@ impl<T: SimdReal, const ROWS: usize, const BLOCK: usize> BandKernel<'_, '_, T, R
             }
         }
     }
-}
-
-/// Adds the adjoint stencil of one row of weights to the planes: `h(p + o) += sum_j L_j(o) d_j(p)`.
-#[inline(always)]
-fn scatter<V: Lanes>(
-    taps: &[((isize, isize), [V::Scalar; 6])],
-    weights: &[V::Scalar],
-    wide: usize,
-    (r, reach): (usize, usize),
-    scores: &mut Planes<V::Scalar>,
-) where
-    V::Scalar: SimdReal,
-{
-    let (width, height) = (scores.width, scores.height);
-    for (p, d) in weights.chunks_exact(6 * wide).enumerate() {
-        for ((x, y), w) in taps {
-            // Row r of the weights is row r - reach of the planes.
-            let target = r as isize - reach as isize + y;
-            if target < 0 || target >= height as isize {
-                continue;
-            }
-            let w: [V; 6] = std::array::from_fn(|k| V::splat(w[k]));
-            let start = scores.at(p, target as usize, 0);
-            let row = &mut scores.data[start..start + width];
-            let shift = (reach as isize - x) as usize;
-            let mut c = 0;
-            while c < width {
-                let mut sum = V::load(&row[c..]);
-                for k in 0..6 {
-                    sum = V::load(&d[k * wide + shift + c..]).mul_add(w[k], sum);
-                }
-                sum.store(&mut row[c..]);
-                c += V::LANES;
-            }
-        }
-    }
-}
-
-/// Entry (i, j) of a symmetric matrix kept as its upper triangle.
-#[inline(always)]
-fn symmetric<V: Lanes>(list: &[V; ENTRIES], i: usize, j: usize) -> V {
-    list[if i <= j { upper(i, j) } else { upper(j, i) }]
-}
-
-/// Expected squared residual of one pixel for unit noise, `k + 2 l . m + m^T Q m`.
-#[inline(always)]
-fn one_pixel<V: Lanes>(noise: &PixelNoise, m: &[V; 6]) -> V {
-    let mut sum = V::constant(noise.constant);
-    for i in 0..6 {
-        let mut inner = V::constant(2.0 * noise.linear[i]);
-        for j in 0..6 {
-            let q = noise.quadratic[if i <= j { upper(i, j) } else { upper(j, i) }];
-            inner = m[j].mul_add(V::constant(q), inner);
-        }
-        sum = m[i].mul_add(inner, sum);
-    }
-    sum
-}
-
-/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels: minus the pull of unit noise on the score.
-#[inline(always)]
-fn pull<V: Lanes>(noise: &PixelNoise, ones: &[V; 6], m: &[V; 6]) -> [V; 6] {
-    const POWER: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-    let q = |i: usize, j: usize| V::constant(noise.quadratic[if i <= j { upper(i, j) } else { upper(j, i) }]);
-    std::array::from_fn(|i| {
-        let (k, c) = (i / 2, i % 2);
-        let mut sum = V::constant(noise.linear[c]) * ones[k];
-        if k > 0 {
-            sum = sum + V::constant(noise.linear[i]) * ones[0];
-        }
-        for j in 0..6 {
-            let (l, d) = (j / 2, j % 2);
-            let mut entry = q(c, d) * ones[POWER[k][l]];
-            if l > 0 {
-                entry = q(c, j).mul_add(ones[k], entry);
-            }
-            if k > 0 {
-                entry = q(i, d).mul_add(ones[l], entry);
-            }
-            if k > 0 && l > 0 {
-                entry = q(i, j).mul_add(ones[0], entry);
-            }
-            sum = entry.mul_add(m[j], sum);
-        }
-        sum
-    })
 }

@@ -76,11 +76,8 @@ impl<T: SimdReal> Strip<T> {
         if n > 0 {
             let spacing = strip.rows.get(1).map_or(1, |second| second - strip.rows[0]);
             let task = (TASK_ROWS / spacing).max(1);
-            strip.bands(task).into_par_iter().for_each_init(Scratch::new, |scratch, band| match setting.rows {
-                1 => dispatch(setting.level, BandKernel::<T, 1> { source, setting, scratch, band }),
-                3 => dispatch(setting.level, BandKernel::<T, 3> { source, setting, scratch, band }),
-                6 => dispatch(setting.level, BandKernel::<T, 6> { source, setting, scratch, band }),
-                _ => dispatch(setting.level, BandKernel::<T, 12> { source, setting, scratch, band }),
+            strip.bands(task).into_par_iter().for_each_init(Scratch::new, |scratch, band| {
+                BandTask { source, setting, scratch, band }.run();
             });
         }
         strip
@@ -183,21 +180,19 @@ impl<T: SimdReal> Scratch<T> {
 /// Rows of `Scratch::solved`: motion, quality, largest diagonal entry, residual, inverse.
 const SOLVED: usize = 9 + ENTRIES;
 
-struct BandKernel<'a, 'b, T, const ROWS: usize> {
+struct BandTask<'a, 'b, T> {
     source: &'a Source<'a, T>,
     setting: &'a Setting<T>,
     scratch: &'a mut Scratch<T>,
     band: Band<'b, T>,
 }
 
-impl<T: SimdReal, const ROWS: usize> Kernel<T> for BandKernel<'_, '_, T, ROWS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(mut self) {
+impl<T: SimdReal> BandTask<'_, '_, T> {
+    fn run(mut self) {
+        let level = self.setting.level;
         let radius = self.setting.window.radius();
         let (Some(&top), Some(&bottom)) = (self.band.rows.first(), self.band.rows.last()) else { return };
-        let plan = Plan::new(ROWS);
+        let plan = Plan::new(self.setting.rows);
         let whole = self.source.support.is_whole();
         let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
         self.scratch.solved.resize(SOLVED * TILE_COLUMNS, T::default());
@@ -209,7 +204,8 @@ impl<T: SimdReal, const ROWS: usize> Kernel<T> for BandKernel<'_, '_, T, ROWS> {
             planes.resize(plan.planes() + 1, width, height);
             let corner = (left as isize - radius as isize, top as isize - radius as isize);
             jets.load(self.source, corner, width, height);
-            planes.fill::<V, ROWS>(self.source, jets, T::from_f64(self.setting.scale), !whole);
+            let rows = (level, self.setting.rows);
+            planes.fill(rows, self.source, jets, T::from_f64(self.setting.scale), !whole);
             let groups = self.band.rows.len().div_ceil(GROUP_ROWS);
             for group in 0..groups {
                 let first = group * GROUP_ROWS;
@@ -222,56 +218,31 @@ impl<T: SimdReal, const ROWS: usize> Kernel<T> for BandKernel<'_, '_, T, ROWS> {
                 let Scratch { planes, moments: sums, .. } = &mut *self.scratch;
                 let window = &self.setting.window;
                 for p in 0..plan.planes() {
-                    sums.sum::<V>(window, planes, (p, plan.order(p), plan.base(p)), centres);
+                    sums.sum(level, window, planes, (p, plan.order(p), plan.base(p)), centres);
                 }
                 if !whole {
-                    sums.sum::<V>(window, planes, (plan.planes(), 0, plan.base(plan.planes())), centres);
+                    sums.sum(level, window, planes, (plan.planes(), 0, plan.base(plan.planes())), centres);
                 }
                 for j in first..last {
-                    self.solve_row::<V>(j, j - first, left);
+                    self.solve_row(j, j - first, left);
                 }
             }
         }
     }
-}
 
-impl<T: SimdReal, const ROWS: usize> BandKernel<'_, '_, T, ROWS> {
     /// Solves row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that begins at `left`.
-    #[inline(always)]
-    fn solve_row<V: Lanes<Scalar = T>>(&mut self, j: usize, g: usize, left: usize) {
-        let plan = Plan::new(ROWS);
+    fn solve_row(&mut self, j: usize, g: usize, left: usize) {
         let Scratch { moments: sums, solved, .. } = &mut *self.scratch;
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
-        let energy = plan.base(plan.planes() - 1);
-        let mut c = 0;
-        while c < TILE_COLUMNS {
-            let n = normal_matrix::<V, T>(plan, &row, c);
-            let r = right_side::<V, T>(plan, &row, c);
-            let f = factor(&n);
-            let m = f.solve(&r);
-            let mut residual = row.load::<V>(energy, c);
-            for k in 0..6 {
-                residual = m[k].neg_mul_add(r[k], residual);
-                m[k].store(&mut solved[k * TILE_COLUMNS + c..]);
-            }
-            f.quality.store(&mut solved[6 * TILE_COLUMNS + c..]);
-            f.largest.store(&mut solved[7 * TILE_COLUMNS + c..]);
-            residual.max(V::zero()).store(&mut solved[8 * TILE_COLUMNS + c..]);
-            if self.setting.inverse {
-                for (k, value) in f.inverse().into_iter().enumerate() {
-                    value.store(&mut solved[(9 + k) * TILE_COLUMNS + c..]);
-                }
-            }
-            c += V::LANES;
-        }
+        let solve = Solve { plan: Plan::new(self.setting.rows), row, solved, inverse: self.setting.inverse };
+        dispatch(self.setting.level, solve);
         self.keep(j, g, left);
     }
 
     /// Judges the solutions of a row and copies them to the band. Not vectorised.
-    #[inline(never)]
     fn keep(&mut self, j: usize, g: usize, left: usize) {
         let Self { source, setting, scratch, band } = self;
-        let plan = Plan::new(ROWS);
+        let plan = Plan::new(setting.rows);
         let y = band.rows[j];
         let count = (band.columns.end - left).min(TILE_COLUMNS);
         let at = j * band.columns.len() + left - band.columns.start;
@@ -333,6 +304,45 @@ impl<T: SimdReal, const ROWS: usize> BandKernel<'_, '_, T, ROWS> {
                 }
                 band.residual[out] = Lanes::max(residual, T::default());
             }
+        }
+    }
+}
+
+/// The normal equations of one row of a tile, solved.
+struct Solve<'a, T> {
+    plan: Plan,
+    row: MomentRow<'a, T>,
+    solved: &'a mut [T],
+    inverse: bool,
+}
+
+impl<T: SimdReal> Kernel<T> for Solve<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { plan, row, solved, inverse } = self;
+        let energy = plan.base(plan.planes() - 1);
+        let mut c = 0;
+        while c < TILE_COLUMNS {
+            let n = normal_matrix::<V, T>(plan, &row, c);
+            let r = right_side::<V, T>(plan, &row, c);
+            let f = factor(&n);
+            let m = f.solve(&r);
+            let mut residual = row.load::<V>(energy, c);
+            for k in 0..6 {
+                residual = m[k].neg_mul_add(r[k], residual);
+                m[k].store(&mut solved[k * TILE_COLUMNS + c..]);
+            }
+            f.quality.store(&mut solved[6 * TILE_COLUMNS + c..]);
+            f.largest.store(&mut solved[7 * TILE_COLUMNS + c..]);
+            residual.max(V::zero()).store(&mut solved[8 * TILE_COLUMNS + c..]);
+            if inverse {
+                for (k, value) in f.inverse().into_iter().enumerate() {
+                    value.store(&mut solved[(9 + k) * TILE_COLUMNS + c..]);
+                }
+            }
+            c += V::LANES;
         }
     }
 }

@@ -30,6 +30,7 @@
 
 mod combine;
 mod covariance;
+mod covariance_kernels;
 mod estimate;
 mod noise;
 mod options;

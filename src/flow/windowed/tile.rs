@@ -5,7 +5,7 @@ use super::rows::{Jets, Plan, moments, products};
 use super::support::Support;
 use super::window::{CHUNK, Window, filter};
 use crate::jet::{JetRows, Reach};
-use crate::simd::{Lanes, SimdReal};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
 
 /// Columns of a tile.
@@ -82,14 +82,14 @@ impl<T: SimdReal> JetTile<T> {
     }
 
     /// Computes the jets and weights of row `r` of the rectangle.
-    #[inline(always)]
-    pub fn row<V: Lanes<Scalar = T>>(&mut self, source: &Source<'_, T>, r: usize) {
+    pub fn row(&mut self, level: Level, source: &Source<'_, T>, r: usize) {
         let images = self.images.len() / 3;
         let w = self.image_width;
         for (k, rows) in self.rows.chunks_exact_mut(6 * w).enumerate() {
             if k < 2 || source.second {
                 let image = &self.images[k * images..(k + 1) * images];
-                source.jets.row::<V>(image, w, r + self.up, &mut self.scratch, rows);
+                let (jets, row, scratch) = (&source.jets, r + self.up, &mut self.scratch[..]);
+                dispatch(level, JetRow { jets, image, width: w, row, scratch, rows });
             }
         }
         source.support.weights(self.corner.0, self.corner.1 + r as isize, &mut self.weight);
@@ -143,33 +143,77 @@ impl<T: SimdReal> Planes<T> {
         (p * self.height + r) * self.width + c
     }
 
-    /// Fills the product planes from the jets, and after them the plane of weights where `weights` says so.
-    #[inline(always)]
-    pub fn fill<V: Lanes<Scalar = T>, const ROWS: usize>(
+    /// Fills the product planes of `rows` equations (1, 3, 6 or 12) a pixel from the jets, and after them the plane of weights where `weights` says so.
+    pub fn fill(
         &mut self,
+        (level, rows): (Level, usize),
         source: &Source<'_, T>,
         jets: &mut JetTile<T>,
         scale: T,
         weights: bool,
     ) {
-        let count = Plan::new(ROWS).planes();
-        let scale = V::splat(scale);
+        let count = Plan::new(rows).planes();
         let n = self.width * self.height;
         for r in 0..self.height {
-            jets.row::<V>(source, r);
-            let mut c = 0;
-            while c < self.width {
-                let values = products::<V, ROWS>(&jets.jets::<V>(c, ROWS == 12), scale);
-                let at = r * self.width + c;
-                for (p, value) in values.into_iter().enumerate().take(count) {
-                    value.store(&mut self.data[p * n + at..]);
-                }
-                c += V::LANES;
+            jets.row(level, source, r);
+            match rows {
+                1 => dispatch(level, Products::<T, 1> { planes: self, jets, row: r, scale }),
+                3 => dispatch(level, Products::<T, 3> { planes: self, jets, row: r, scale }),
+                6 => dispatch(level, Products::<T, 6> { planes: self, jets, row: r, scale }),
+                _ => dispatch(level, Products::<T, 12> { planes: self, jets, row: r, scale }),
             }
             if weights {
                 let at = count * n + r * self.width;
                 self.data[at..at + self.width].copy_from_slice(jets.weight());
             }
+        }
+    }
+}
+
+// Each step is a kernel of its own, and what does not depend on the equations is not compiled again for each set of them.
+
+/// Jets of one row.
+struct JetRow<'a, T> {
+    jets: &'a JetRows<T>,
+    image: &'a [T],
+    width: usize,
+    row: usize,
+    scratch: &'a mut [T],
+    rows: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for JetRow<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        self.jets.row::<V>(self.image, self.width, self.row, self.scratch, self.rows);
+    }
+}
+
+/// Product planes of one row.
+struct Products<'a, T, const ROWS: usize> {
+    planes: &'a mut Planes<T>,
+    jets: &'a JetTile<T>,
+    row: usize,
+    scale: T,
+}
+
+impl<T: SimdReal, const ROWS: usize> Kernel<T> for Products<'_, T, ROWS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Planes { data, width, height } = self.planes;
+        let (count, n, scale) = (Plan::new(ROWS).planes(), *width * *height, V::splat(self.scale));
+        let mut c = 0;
+        while c < *width {
+            let values = products::<V, ROWS>(&self.jets.jets::<V>(c, ROWS == 12), scale);
+            let at = self.row * *width + c;
+            for (p, value) in values.into_iter().enumerate().take(count) {
+                value.store(&mut data[p * n + at..]);
+            }
+            c += V::LANES;
         }
     }
 }
@@ -187,26 +231,45 @@ impl<T: SimdReal> Moments<T> {
 
     /// Sums plane `p` of `planes`, up to the power `order`, into the moments from `base` on, around rows `centres` (at most [`GROUP_ROWS`]) of the planes and
     /// columns `radius ..`.
-    #[inline(always)]
-    pub fn sum<V: Lanes<Scalar = T>>(
+    pub fn sum(
         &mut self,
+        level: Level,
         window: &Window<T>,
         planes: &Planes<T>,
-        (p, order, base): (usize, usize, usize),
+        place: (usize, usize, usize),
         centres: &[usize],
     ) {
+        dispatch(level, Sum { moments: self, window, planes, place, centres });
+    }
+}
+
+/// The sums of one plane.
+struct Sum<'a, T> {
+    moments: &'a mut Moments<T>,
+    window: &'a Window<T>,
+    planes: &'a Planes<T>,
+    place: (usize, usize, usize),
+    centres: &'a [usize],
+}
+
+impl<T: SimdReal> Kernel<T> for Sum<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { moments: sums, window, planes, place: (p, order, base), centres } = self;
         let (width, radius) = (planes.width, window.radius());
         let taps = &window.taps[..];
         let size = GROUP_ROWS * TILE_COLUMNS;
-        self.data.resize(self.data.len().max((base + moments(order)) * size), T::default());
-        for v in &mut self.column_sums {
+        sums.data.resize(sums.data.len().max((base + moments(order)) * size), T::default());
+        for v in &mut sums.column_sums {
             v.resize(v.len().max(width), T::default());
         }
-        let [v0, v1, v2] = &mut self.column_sums;
+        let [v0, v1, v2] = &mut sums.column_sums;
         for (j, &row) in centres.iter().enumerate() {
             let plane = planes.plane(p);
             let centre = row * width;
-            let mut places = self.data[base * size..(base + moments(order)) * size].chunks_exact_mut(size);
+            let mut places = sums.data[base * size..(base + moments(order)) * size].chunks_exact_mut(size);
             let mut next = || &mut places.next().unwrap_or_default()[j * TILE_COLUMNS..(j + 1) * TILE_COLUMNS];
             match order {
                 0 => {
