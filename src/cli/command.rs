@@ -1,7 +1,11 @@
 //! The subcommands.
 
+use super::demo::DemoCommand;
+use super::filter::FilterCommand;
 use super::flow::FlowCommand;
+use super::info::InfoCommand;
 use super::interrupt::Watch;
+use super::measure::MeasureCommand;
 use super::report::Report;
 use super::synth::SynthCommand;
 use crate::error::Result;
@@ -12,8 +16,16 @@ use clap::Subcommand;
 pub enum Command {
     /// Estimate flow and its Jacobian from frames
     Flow(Box<FlowCommand>),
+    /// Filter flow and its Jacobian over time
+    Filter(Box<FilterCommand>),
+    /// Measure rotation, time to contact, divergence, ... with their standard deviations
+    Measure(Box<MeasureCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
-    Synth(SynthCommand),
+    Synth(Box<SynthCommand>),
+    /// Tell what a recording or a result file holds
+    Info(InfoCommand),
+    /// Make a scene, estimate its flow, draw it and compare with the truth
+    Demo(DemoCommand),
 }
 
 impl Command {
@@ -21,7 +33,11 @@ impl Command {
     pub fn json(&self) -> bool {
         match self {
             Self::Flow(command) => command.tell.json,
+            Self::Filter(command) => command.tell.json,
+            Self::Measure(command) => command.tell.json,
             Self::Synth(command) => command.tell.json,
+            Self::Info(command) => command.tell.json,
+            Self::Demo(command) => command.tell.json,
         }
     }
 
@@ -29,7 +45,11 @@ impl Command {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         match self {
             Self::Flow(command) => command.execute(watch),
+            Self::Filter(command) => command.execute(watch),
+            Self::Measure(command) => command.execute(watch),
             Self::Synth(command) => command.execute(watch),
+            Self::Info(command) => command.execute(watch),
+            Self::Demo(command) => command.execute(watch),
         }
     }
 }

@@ -8,8 +8,12 @@
 
 mod arguments;
 mod command;
+mod demo;
+mod filter;
 mod flow;
+mod info;
 mod interrupt;
+mod measure;
 mod open;
 mod progress;
 mod report;
@@ -57,4 +61,15 @@ where
     let json = cli.command.json();
     let result = cli.command.execute(&watch);
     report::finish(result, json)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_of_every_subcommand_are_consistent() {
+        Cli::command().debug_assert();
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::flow::Estimator;
+use crate::io::Element;
 use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter, FlowFilterOptions};
 use crate::types::{FlowField, Frame};
@@ -97,13 +98,17 @@ impl<T: SimdReal> FilterStage<T> {
         Self { options: filter.options().clone(), filter: Some(filter), pushed: 0 }
     }
 
+    /// The filter's options.
+    pub fn options(&self) -> &FlowFilterOptions {
+        &self.options
+    }
     /// The filter, once there is one.
     pub fn filter(&self) -> Option<&FlowFilter<T>> {
         self.filter.as_ref()
     }
 }
 
-impl<T: SimdReal> Stage<T> for FilterStage<T> {
+impl<T: SimdReal + Element> Stage<T> for FilterStage<T> {
     fn frames_needed(&self) -> usize {
         1
     }
@@ -122,5 +127,12 @@ impl<T: SimdReal> Stage<T> for FilterStage<T> {
 
     fn repairs(&self) -> usize {
         self.filter.as_ref().map_or(0, |filter| filter.repairs() as usize)
+    }
+
+    fn save(&self, path: &Path) -> Result<()> {
+        match &self.filter {
+            Some(filter) => filter.save(path),
+            None => Err(Error::argument("save_state", "at least one filtered frame", 0)),
+        }
     }
 }

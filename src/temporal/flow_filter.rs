@@ -77,6 +77,13 @@ impl<T: SimdReal> FlowFilter<T> {
         Ok(Self { options, frame_size, frames: 0, repairs: 0, store, constants, decorrelation, fit })
     }
 
+    /// The same filter with other threads and, where one is given, another instruction set: for a filter that was saved elsewhere.
+    pub fn with_computation(mut self, threads: Threads, simd: Option<Level>) -> Self {
+        self.options.threads = threads;
+        self.options.simd = simd.or(self.options.simd);
+        self
+    }
+
     /// The options.
     pub fn options(&self) -> &FlowFilterOptions {
         &self.options

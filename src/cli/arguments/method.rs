@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
 use crate::flow::instantaneous::InstantaneousOptions;
 use crate::flow::model::ModelKind;
-use crate::flow::windowed::WindowedOptions;
+use crate::flow::windowed::{RowSet, WindowedOptions};
 use crate::flow::{Method, RankPolicy};
 use crate::jet::{Neighbourhood, TimeScheme};
 use clap::Args;
@@ -40,7 +40,7 @@ pub struct MethodArguments {
     /// horn-schunck: weight of smoothness, in units of the frame's root mean square gradient [default: 1]
     #[arg(long, value_name = "WEIGHT", value_parser = parse_positive)]
     pub smoothness: Option<f64>,
-    /// instantaneous: what becomes of pixels whose equations do not determine every unknown, nan (default) or min-norm
+    /// windowed, instantaneous: what becomes of pixels whose equations do not determine every unknown, nan (default) or min-norm
     #[arg(long, value_name = "POLICY")]
     pub rank_deficient: Option<String>,
     /// Leave the covariance out: faster, smaller files
@@ -74,7 +74,7 @@ impl MethodArguments {
         self.refuse_foreign(&method)?;
         let pair = self.pair || frames == Some(2);
         Ok(match method {
-            Method::Windowed(options) => Method::Windowed(self.windowed(options, smoothed)?),
+            Method::Windowed(options) => Method::Windowed(self.windowed(options, pair, smoothed)?),
             Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
             Method::LucasKanade(mut options) => {
                 options.window = self.window.map_or(options.window, Window::Gaussian);
@@ -87,10 +87,14 @@ impl MethodArguments {
         })
     }
 
-    fn windowed(&self, mut options: WindowedOptions, smoothed: Option<f64>) -> Result<WindowedOptions> {
+    fn windowed(&self, mut options: WindowedOptions, pair: bool, smoothed: Option<f64>) -> Result<WindowedOptions> {
         options.sigma = self.window.unwrap_or(options.sigma);
         options.scheme = self.scheme(options.scheme)?;
-        let _ = smoothed;
+        options.rows = self.rows.as_deref().map_or(Ok(options.rows), RowSet::parse)?;
+        options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
+        options.rank_deficient = self.rank_policy(options.rank_deficient)?;
+        options.already_smoothed = smoothed;
+        options.frames = if pair { 2 } else { options.frames };
         Ok(options)
     }
 
@@ -98,9 +102,12 @@ impl MethodArguments {
         options.model = self.model.as_deref().map_or(Ok(options.model), ModelKind::parse)?;
         options.scheme = self.scheme(options.scheme)?;
         options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
-        let policy = self.rank_deficient.as_deref().map(word);
-        options.rank_deficient = policy.as_deref().map_or(Ok(options.rank_deficient), RankPolicy::parse)?;
+        options.rank_deficient = self.rank_policy(options.rank_deficient)?;
         Ok(options)
+    }
+
+    fn rank_policy(&self, default: RankPolicy) -> Result<RankPolicy> {
+        self.rank_deficient.as_deref().map_or(Ok(default), |name| RankPolicy::parse(&word(name)))
     }
 
     fn scheme(&self, default: TimeScheme) -> Result<TimeScheme> {
@@ -120,7 +127,7 @@ impl MethodArguments {
             ("window", self.window.is_some(), windowed || lucas_kanade),
             ("rows", self.rows.is_some(), windowed),
             ("smoothness", self.smoothness.is_some(), matches!(method, Method::HornSchunck(_))),
-            ("rank_deficient", self.rank_deficient.is_some(), instantaneous),
+            ("rank_deficient", self.rank_deficient.is_some(), windowed || instantaneous),
         ];
         match given.iter().find(|(_, given, known)| *given && !known) {
             Some((name, ..)) => Err(Error::argument(name, "a method that has this option", method.name())),
@@ -136,7 +143,7 @@ impl MethodArguments {
             square / (2.0 * offsets.len().max(1) as f64)
         };
         let variance = match method {
-            Method::Windowed(options) => options.sigma.powi(2),
+            Method::Windowed(options) => options.sigma.powi(2) + of(&options.neighbourhood),
             Method::Instantaneous(options) => of(&options.neighbourhood),
             Method::LucasKanade(options) => match options.window {
                 Window::Gaussian(sigma) => sigma * sigma,

@@ -1,14 +1,16 @@
 //! Argument groups that several subcommands share, and the words they are parsed from.
 
 mod compute;
+mod filter;
 mod input;
 mod method;
 mod output;
 mod sites;
 
 pub use compute::{ComputeArguments, Precision, TellArguments};
+pub use filter::{FilterArguments, describe_filter};
 pub use input::InputArguments;
-pub use method::{MethodArguments, rectangle, word};
+pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use sites::SiteArguments;
 

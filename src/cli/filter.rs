@@ -1,0 +1,129 @@
+//! `jacoflow filter`: flow filtered in time, a field for every frame.
+
+use super::arguments::{
+    ComputeArguments, FilterArguments, InputArguments, OutputArguments, Precision, SiteArguments, TellArguments,
+    describe_filter,
+};
+use super::flow::plan_output;
+use super::interrupt::Watch;
+use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
+use super::report::{Report, tell};
+use super::run::{Telling, input_details, report, run_pipeline};
+use crate::error::{Error, Result};
+use crate::io::Element;
+use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target};
+use crate::simd::SimdReal;
+use crate::temporal::{FlowFilter, FlowFilterOptions};
+use clap::Args;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Options of `filter`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "A filter starts from nothing and needs some tens of frames to settle. Its state can be saved and taken up again: the next run then gives\n\
+    the same bits as one run over all frames. The state is saved after the last completed frame, also when the run is stopped.\n\n\
+    Examples:\n  \
+    jacoflow filter frames/ -o out/ --profile patent --quantise --smooth 3\n  \
+    jacoflow filter frames/ --profile measured --points 140,140 > point.csv\n  \
+    jacoflow filter frames/ -o out/ --limit 200 --save-state state.npz\n  \
+    jacoflow filter frames/ -o out/ --first 200 --resume state.npz"
+)]
+pub struct FilterCommand {
+    #[command(flatten)]
+    pub input: InputArguments,
+    #[command(flatten)]
+    pub filter: FilterArguments,
+    #[command(flatten)]
+    pub sites: SiteArguments,
+    #[command(flatten)]
+    pub output: OutputArguments,
+    /// Save the state after the last frame (.npz)
+    #[arg(long, value_name = "FILE", help_heading = "State")]
+    pub save_state: Option<PathBuf>,
+    /// Go on from a saved state, with its options; the frames are those that follow
+    #[arg(long, value_name = "FILE", help_heading = "State", conflicts_with_all = ["region", "stride", "points", "mask"])]
+    pub resume: Option<PathBuf>,
+    #[command(flatten)]
+    pub compute: ComputeArguments,
+    #[command(flatten)]
+    pub tell: TellArguments,
+}
+
+impl FilterCommand {
+    /// Runs the command.
+    pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
+            return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
+        }
+        let opened = open_input(&self.input)?;
+        let options = self.options(&opened)?;
+        if let Some(path) = &self.save_state {
+            check_target(path, self.output.force || self.resume.as_ref() == Some(path))?;
+        }
+        if let Some(path) = &self.resume {
+            return self.resume(path, opened, &options, watch);
+        }
+        // Small measurement noise is beyond single precision; see `FlowFilter`.
+        if in_double(self.compute.precision, &opened.first, options.measurement_noise < 0.25) {
+            self.run(opened, FilterStage::<f64>::new(options), watch)
+        } else {
+            self.run(opened, FilterStage::<f32>::new(options), watch)
+        }
+    }
+
+    /// Goes on with a saved filter, in the precision that it was saved in.
+    fn resume(&self, path: &Path, opened: Opened, options: &FlowFilterOptions, watch: &Watch) -> Result<Report> {
+        if self.compute.precision != Precision::Auto {
+            return Err(Error::argument("precision", "auto with --resume, whose state has its own", "another"));
+        }
+        let (threads, simd) = (options.threads, options.simd);
+        match FlowFilter::<f64>::load(path) {
+            Ok(filter) => self.run(opened, FilterStage::resume(filter.with_computation(threads, simd)), watch),
+            Err(Error::Format { .. }) => {
+                let filter = FlowFilter::<f32>::load(path)?;
+                self.run(opened, FilterStage::resume(filter.with_computation(threads, simd)), watch)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn options(&self, opened: &Opened) -> Result<FlowFilterOptions> {
+        let mut options = self.filter.options(opened.first.dtype)?;
+        options.sites = self.sites.sites()?;
+        options.sites.shape(opened.first.size)?;
+        options.mask = read_mask(self.sites.mask.as_deref(), opened.first.size)?;
+        options.frame_period = opened.numbering.period();
+        (options.threads, options.simd) = compute(&self.compute)?;
+        Ok(options)
+    }
+
+    fn run<T: SimdReal + Element>(&self, opened: Opened, stage: FilterStage<T>, watch: &Watch) -> Result<Report> {
+        let options = stage.options();
+        let (description, threads) = (describe_filter(options), options.threads);
+        let mut details = input_details(&opened, &self.sites);
+        if let Value::Object(details) = &mut details {
+            details.insert("form".into(), options.form.name().into());
+            details.insert("save_state".into(), serde_json::json!(self.save_state));
+        }
+        let plan: OutputPlan = plan_output(&self.output, &options.sites, self.tell.json, opened.frames)?;
+        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
+            .with_preprocess(preprocess(&self.input)?)
+            .with_threads(threads)
+            .with_numbering(opened.numbering);
+        for sink in plan.sinks(description.to_string(), self.output.ranges()) {
+            pipeline = pipeline.with_sink(sink);
+        }
+        let telling = Telling { command: "filter", tell: &self.tell, output: self.output.output.as_deref(), details };
+        let (summary, mut failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
+        if let Some(path) = self.save_state.as_ref().filter(|_| summary.fields > 0) {
+            let saved = pipeline.stage().save(path);
+            if saved.is_ok() && !self.tell.quiet {
+                let next = opened.numbering.index(summary.fields);
+                tell(&format!("state in {}; go on with --resume and --first {next}", path.display()));
+            }
+            failure = failure.or(saved.err());
+        }
+        Ok(report(&summary, failure, telling))
+    }
+}

@@ -1,0 +1,211 @@
+//! `jacoflow info`: what a recording or a result file holds.
+
+use super::arguments::TellArguments;
+use super::interrupt::Watch;
+use super::open::open_source;
+use super::progress::Bar;
+use super::report::{Report, print};
+use crate::error::{Error, Result};
+use crate::io::{FlowImage, FrameSource, OpenOptions, read_flo, read_kitti, read_npz, read_pfm};
+use crate::parallel::Progress;
+use crate::types::AnyFrame;
+use clap::Args;
+use serde_json::{Map, Value, json};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Options of `info`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Reads recordings (folder, images, .y4m, .npy, video) and results (.npz, .flo, .pfm, KITTI .png).\n\n\
+    Examples:\n  \
+    jacoflow info frames/\n  \
+    jacoflow info out/000012.npz --json"
+)]
+pub struct InfoCommand {
+    /// A recording, as for `flow`, or one result file
+    #[arg(required = true, value_name = "INPUT")]
+    pub input: Vec<String>,
+    #[command(flatten)]
+    pub tell: TellArguments,
+}
+
+impl InfoCommand {
+    /// Runs the command.
+    pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        let summary = match &self.input[..] {
+            [one] => match result_info(Path::new(one)) {
+                Some(info) => info?,
+                None => self.recording(watch)?,
+            },
+            _ => self.recording(watch)?,
+        };
+        if !self.tell.json {
+            print(&in_words(&summary))?;
+        }
+        Ok(Report { summary, failure: None })
+    }
+
+    fn recording(&self, watch: &Watch) -> Result<Value> {
+        let options = OpenOptions { colour: crate::io::Colour::Luminance, ..OpenOptions::default() };
+        let mut source = open_source(&self.input, &options)?;
+        let (name, hint, rate) = (source.describe(), source.len_hint(), source.frame_rate());
+        let first = source.next_frame()?;
+        let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
+        let frames = match hint {
+            Some(frames) => frames,
+            None => 1 + count(&mut *source, &Bar::new(watch, "info", self.tell.quiet))?,
+        };
+        let (width, height) = first.size();
+        Ok(json!({
+            "command": "info", "kind": "recording", "input": name, "frames": frames, "width": width, "height": height,
+            "dtype": first.dtype(), "fps": rate, "first_frame": statistics(samples(&first).into_iter()),
+        }))
+    }
+}
+
+fn samples(frame: &AnyFrame) -> Vec<f64> {
+    frame.to_real::<f64>().into_data()
+}
+
+fn count(source: &mut dyn FrameSource, bar: &Bar<'_>) -> Result<usize> {
+    let mut frames = 0;
+    while source.next_frame()?.is_some() {
+        frames += 1;
+        bar.step(frames, 0)?;
+    }
+    Ok(frames)
+}
+
+/// Least, mean and greatest of the finite values, and their share.
+fn statistics(values: impl Iterator<Item = f64>) -> Value {
+    let (mut least, mut greatest, mut sum, mut finite, mut all) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0u64, 0u64);
+    for value in values {
+        all += 1;
+        if value.is_finite() {
+            finite += 1;
+            sum += value;
+            least = least.min(value);
+            greatest = greatest.max(value);
+        }
+    }
+    if finite == 0 {
+        return json!({"min": null, "mean": null, "max": null, "known_share": 0.0});
+    }
+    json!({"min": least, "mean": sum / finite as f64, "max": greatest, "known_share": finite as f64 / all as f64})
+}
+
+/// What a result file holds; `None`: not a result file by its name (or, for PNG, its kind of pixels).
+fn result_info(path: &Path) -> Option<Result<Value>> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    match extension.as_str() {
+        "flo" => Some(read_flo(path).map(|flow| flow_image_info(path, "flo", &flow))),
+        "pfm" => Some(read_pfm(path).map(|map| {
+            let names: &[&str] = if map.planes.len() == 1 { &["value"] } else { &["u", "v", "third"] };
+            let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, wide(plane)));
+            planes_info(path, "pfm", (map.width, map.height), planes)
+        })),
+        "npz" => Some(npz_info(path)),
+        "png" if is_kitti(path) => Some(read_kitti(path).map(|flow| flow_image_info(path, "kitti", &flow))),
+        _ => None,
+    }
+}
+
+/// KITTI flow is the only 16-bit RGB picture among ours.
+fn is_kitti(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return false };
+    let info = reader.info();
+    info.color_type == png::ColorType::Rgb && info.bit_depth == png::BitDepth::Sixteen
+}
+
+fn wide(plane: &[f32]) -> Vec<f64> {
+    plane.iter().map(|value| f64::from(*value)).collect()
+}
+
+fn flow_image_info(path: &Path, format: &str, flow: &FlowImage) -> Value {
+    let planes = [("u", wide(flow.u())), ("v", wide(flow.v()))];
+    planes_info(path, format, (flow.width(), flow.height()), planes.into_iter())
+}
+
+fn planes_info<'a>(
+    path: &Path,
+    format: &str,
+    (width, height): (usize, usize),
+    planes: impl Iterator<Item = (&'a str, Vec<f64>)>,
+) -> Value {
+    let planes: Map<String, Value> =
+        planes.map(|(name, values)| (name.to_string(), statistics(values.into_iter()))).collect();
+    let share = planes.get("u").or(planes.get("value")).map(|plane| plane["known_share"].clone());
+    json!({
+        "command": "info", "kind": "result", "input": path, "format": format, "width": width, "height": height,
+        "valid_share": share, "planes": planes,
+    })
+}
+
+fn npz_info(path: &Path) -> Result<Value> {
+    let stored = read_npz::<f64>(path)?;
+    let field = &stored.field;
+    let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[]).to_vec()));
+    let mut info = planes_info(path, "npz", (field.width, field.height), planes);
+    let valid = field.status.iter().filter(|status| status.is_valid()).count();
+    if let Value::Object(info) = &mut info {
+        info.insert("valid_share".into(), json!(valid as f64 / field.len().max(1) as f64));
+        info.insert("model".into(), json!(field.layout.model));
+        info.insert("frame_index".into(), json!(field.layout.frame_index));
+        info.insert("frame_period".into(), json!(field.layout.frame_period));
+        info.insert("covariance".into(), json!(field.covariance.is_some()));
+        info.insert("options".into(), json!(stored.options));
+        info.insert("library".into(), json!(stored.library));
+    }
+    Ok(info)
+}
+
+/// Entries in the order in which people want to read them.
+const ORDER: [&str; 14] = [
+    "kind",
+    "input",
+    "format",
+    "frames",
+    "width",
+    "height",
+    "dtype",
+    "fps",
+    "model",
+    "frame_index",
+    "frame_period",
+    "covariance",
+    "valid_share",
+    "library",
+];
+
+/// The summary as lines `name: value`, planes as a small table.
+fn in_words(summary: &Value) -> String {
+    let mut text = String::new();
+    for name in ORDER {
+        match &summary[name] {
+            Value::Null => {}
+            Value::String(value) => text += &format!("{:<14}{value}\n", name.replace('_', " ")),
+            value => text += &format!("{:<14}{value}\n", name.replace('_', " ")),
+        }
+    }
+    if summary["first_frame"].is_object() {
+        text += &format!("{:<14}{}\n", "first frame", statistics_line(&summary["first_frame"]));
+    }
+    for (name, plane) in summary["planes"].as_object().into_iter().flatten() {
+        text += &format!("{:<14}{}\n", name, statistics_line(plane));
+    }
+    text
+}
+
+fn statistics_line(plane: &Value) -> String {
+    let number = |key: &str| plane[key].as_f64().map_or_else(|| "-".to_string(), |value| format!("{value:.6}"));
+    format!(
+        "min {}  mean {}  max {}  known {:.1} %",
+        number("min"),
+        number("mean"),
+        number("max"),
+        100.0 * plane["known_share"].as_f64().unwrap_or(0.0)
+    )
+}

@@ -1,0 +1,13 @@
+//! The binary, end to end: real processes, real files, exit codes.
+
+#[path = "cli/support.rs"]
+mod support;
+
+#[path = "cli/commands.rs"]
+mod commands;
+#[path = "cli/mistakes.rs"]
+mod mistakes;
+#[path = "cli/recordings.rs"]
+mod recordings;
+#[path = "cli/streams.rs"]
+mod streams;

@@ -1,0 +1,225 @@
+//! Every subcommand on synthetic input.
+
+use super::support::{Place, temporary};
+use jacoflow::io::{read_flo, read_npz};
+use std::fs;
+
+#[test]
+fn version_and_help_go_to_standard_output() {
+    let place = Place::new();
+    let version = place.good("--version");
+    assert_eq!(version.out.trim(), concat!("jacoflow ", env!("CARGO_PKG_VERSION")));
+    for command in ["flow", "filter", "measure", "synth", "info", "demo"] {
+        let help = place.good(&format!("{command} --help"));
+        assert!(help.out.contains("Example") && help.out.contains("--json"), "{command}");
+    }
+}
+
+#[test]
+fn a_folder_of_frames_becomes_a_folder_of_fields_and_pictures() {
+    let place = Place::new();
+    place.good("synth affine -o frames --frames 5 --size 72x60 --truth truth");
+    let formats = "--format npz,flo,kitti,pfm,csv --picture colour,quiver,divergence,curl";
+    let ended = place.good(&format!("flow frames -o out --json {formats}"));
+    let summary = ended.json();
+    assert_eq!((summary["frames"].as_u64(), summary["fields"].as_u64()), (Some(5), Some(3)));
+    assert_eq!(summary["files"].as_u64(), Some(3 * 8 + 1));
+    assert!(summary["valid_share"].as_f64().unwrap() > 0.9);
+    for index in 1..=3 {
+        for ending in [".npz", ".flo", ".png", ".pfm", "_colour.png", "_quiver.png", "_divergence.png", "_curl.png"] {
+            assert!(place.path(&format!("out/{index:06}{ending}")).is_file(), "{index}{ending}");
+        }
+    }
+    assert!(temporary(&place.path("out")).is_empty());
+    let got = read_npz::<f64>(place.path("out/000002.npz")).unwrap().field;
+    let want = read_npz::<f64>(place.path("truth/000002.npz")).unwrap().field;
+    assert_eq!(got.layout.frame_index, 2);
+    let middle = 30 * 72 + 36;
+    let (got, want) = (got.affine(middle).to_array(), want.affine(middle).to_array());
+    for k in 0..6 {
+        let tolerance = if k < 2 { 0.05 } else { 0.02 };
+        assert!((got[k] - want[k]).abs() < tolerance, "{k}: {} {}", got[k], want[k]);
+    }
+    let rows = fs::read_to_string(place.path("out/points.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 3 * 72 * 60);
+}
+
+#[test]
+fn three_images_become_one_file() {
+    let place = Place::new();
+    place.good("synth affine -o f --frames 3 --size 48x40");
+    let images = "f/frame_000000.png f/frame_000001.png f/frame_000002.png";
+    place.good(&format!("flow {images} -o flow.flo --picture colour"));
+    assert_eq!(
+        (read_flo(place.path("flow.flo")).unwrap().width(), place.path("flow_colour.png").is_file()),
+        (48, true)
+    );
+    let again = place.line(&format!("flow {images} -o flow.flo"));
+    assert!(again.code == 2 && again.err.contains("output") && again.err.contains("--force"), "{}", again.err);
+    place.good(&format!("flow {images} -o flow.flo --force"));
+}
+
+#[test]
+fn points_and_regions_agree_with_the_whole() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 64x48 --depth float");
+    place.good("flow s.npy -o whole.npz");
+    place.good("flow s.npy -o part.npz --region 20,10,21,15 --stride 2");
+    let points = place.good("flow s.npy --points 30,20 --points 24,16");
+    let whole = read_npz::<f64>(place.path("whole.npz")).unwrap().field;
+    let part = read_npz::<f64>(place.path("part.npz")).unwrap().field;
+    assert_eq!((part.width, part.height), (11, 8));
+    let (row, col) = (5, 5);
+    assert_eq!(part.affine(row * 11 + col), whole.affine((10 + 2 * row) * 64 + 20 + 2 * col));
+    let lines: Vec<&str> = points.out.lines().collect();
+    assert!(lines[0].starts_with("frame,x,y,status,u,v") && lines[0].contains("std_u"));
+    let cells: Vec<&str> = lines[1].split(',').collect();
+    assert_eq!(cells[..4], ["1", "30", "20", "ok"]);
+    assert_eq!(cells[4].parse::<f64>().unwrap(), whole.affine(20 * 64 + 30).u);
+}
+
+#[test]
+fn frames_are_numbered_as_in_the_input() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 12 --size 40x40 --set u=0.05 --set v=0");
+    place.good("flow s.npy -o out --first 2 --step 3 --limit 3 --stride 8");
+    assert_eq!(place.names("out"), ["000005.npz"]);
+    let field = read_npz::<f64>(place.path("out/000005.npz")).unwrap().field;
+    assert_eq!(field.layout.frame_index, 5);
+}
+
+#[test]
+fn rpm_of_a_disc_is_measured_within_its_deviation() {
+    let place = Place::new();
+    place.good("synth disc -o disc.y4m --frames 8 --size 128x128 --rate 60 --set rpm=40 --set fps=60 --noise 1");
+    let ended = place.good("measure disc.y4m --quantity rpm,rotation_centre_x,divergence --region 44,44,40,40");
+    let mut lines = ended.out.lines();
+    assert_eq!(lines.next(), Some("frame,time_s,x,y,quantity,value,std,unit,valid_share"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 6 * 3);
+    for row in &rows {
+        let (value, std): (f64, f64) = (row[5].parse().unwrap(), row[6].parse().unwrap());
+        let (truth, allowance, unit) = match row[4] {
+            "rpm" => (40.0, 0.4, "rpm"),
+            "rotation_centre_x" => (63.5, 0.3, "px"),
+            _ => (0.0, 0.2, "1/s"),
+        };
+        assert!(std > 0.0 && (value - truth).abs() < 4.0 * std + allowance, "{row:?}");
+        assert_eq!((row[7], row[8]), (unit, "1"));
+    }
+    assert!((rows[0][1].parse::<f64>().unwrap() - 1.0 / 60.0).abs() < 1e-9);
+}
+
+#[test]
+fn time_to_contact_counts_down() {
+    let place = Place::new();
+    place.good("synth plane -o p.npy --frames 12 --size 96x96 --set time_to_contact=50");
+    place.good("measure p.npy --quantity time-to-contact --region 20,20,56,56 -o ttc.csv");
+    let text = fs::read_to_string(place.path("ttc.csv")).unwrap();
+    for (row, line) in text.lines().skip(1).enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        let truth = 50.0 - (row + 1) as f64;
+        let value: f64 = cells[5].parse().unwrap();
+        assert!((value / truth - 1.0).abs() < 0.08 && cells[7] == "frame", "{line}");
+    }
+}
+
+#[test]
+fn the_filter_follows_the_ramp_and_goes_on_from_its_state() {
+    let place = Place::new();
+    place.good("synth ramp -o ramp.npy --frames 60 --size 24x20 --origin 48,70 --rounding floor");
+    let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9";
+    place.good(&format!("{filter} -o whole --limit 60"));
+    place.good(&format!("{filter} -o first --limit 25 --save-state state.npz"));
+    place.good("filter ramp.npy -o second --first 25 --resume state.npz");
+    assert_eq!((place.names("first").len(), place.names("second").len()), (25, 35));
+    for index in 25..60 {
+        let name = format!("{index:06}.npz");
+        let (a, b) = (place.path("whole").join(&name), place.path("second").join(&name));
+        let (a, b) = (read_npz::<f64>(a).unwrap().field, read_npz::<f64>(b).unwrap().field);
+        assert_eq!((bits(&a.motion), a.status, a.layout), (bits(&b.motion), b.status, b.layout), "{index}");
+    }
+    let last = read_npz::<f64>(place.path("whole/000059.npz")).unwrap().field;
+    let got = last.affine(10 * 24 + 12);
+    assert!(got.u.is_finite() && (got.v_x - 0.0314).abs() < 0.02, "{got:?}");
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 4 --size 70x61 --noise 1");
+    for threads in [1, 2] {
+        let smooth = "--smooth 1 --picture colour,curl --format npz,flo";
+        place.good(&format!("flow s.npy -o out{threads} --threads {threads} {smooth}"));
+        place.good(&format!("filter s.npy -o filtered{threads} --threads {threads} --limit 2"));
+    }
+    for folder in ["out", "filtered"] {
+        let (one, two) = (format!("{folder}1"), format!("{folder}2"));
+        assert_eq!(place.names(&one), place.names(&two));
+        for name in place.names(&one) {
+            let bytes = |folder: &str| fs::read(place.path(folder).join(&name)).unwrap();
+            assert!(bytes(&one) == bytes(&two), "{folder}/{name}");
+        }
+    }
+}
+
+#[test]
+fn synth_writes_every_kind_of_recording() {
+    let place = Place::new();
+    let list = place.good("synth --list");
+    assert!(list.out.contains("ramp") && list.out.contains("vortex") && list.out.contains("particles"));
+    assert!(place.good("synth --list --json").json()["scenes"].as_array().unwrap().len() >= 6);
+    place.good("synth vortex -o v16 --frames 2 --size 30x20 --depth 16 --truth t --truth-format npz,flo");
+    assert_eq!(place.names("t"), ["000000.flo", "000000.npz", "000001.flo", "000001.npz"]);
+    place.good("synth vortex -o v.npy --frames 2 --size 30x20 --depth float");
+    place.good("synth vortex -o v.y4m --frames 2 --size 30x20 --rate 30000/1001 --seed 4 --noise 3");
+    for (input, dtype) in [("v16", "uint16"), ("v.npy", "float64"), ("v.y4m", "uint8")] {
+        let info = place.good(&format!("info {input} --json")).json();
+        assert_eq!((info["frames"].as_u64(), info["dtype"].as_str()), (Some(2), Some(dtype)), "{input}");
+        assert_eq!((info["width"].as_u64(), info["height"].as_u64()), (Some(30), Some(20)));
+    }
+    assert!(place.good("info v.y4m").out.contains("29.97"));
+    let stream = place.good("synth ramp -o - --frames 1 --size 8x8 --quiet");
+    assert!(stream.out.starts_with("YUV4MPEG2 W8 H8"));
+}
+
+#[test]
+fn info_reads_results() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32");
+    for name in ["a.npz", "a.flo", "a.pfm", "a.png"] {
+        place.good(&format!("flow s.npy -o {name}"));
+        let info = place.good(&format!("info {name} --json")).json();
+        assert_eq!((info["kind"].as_str(), info["width"].as_u64()), (Some("result"), Some(40)), "{name}");
+        let mean = info["planes"]["u"]["mean"].as_f64().unwrap();
+        assert!((mean - 0.3).abs() < 0.1, "{name}: {mean}");
+        assert!(place.good(&format!("info {name}")).out.contains("mean"));
+    }
+}
+
+#[test]
+fn the_demo_measures_its_scene() {
+    let place = Place::new();
+    let ended = place.good("demo -o demo --json");
+    let summary = ended.json();
+    assert!(summary["flow_rms_error"].as_f64().unwrap() < 0.1, "{summary}");
+    assert!(summary["jacobian_rms_error"].as_f64().unwrap() < 0.02, "{summary}");
+    assert!(place.path("demo/frames/frame_000000.png").is_file());
+    assert!(place.path("demo/flow/000001_curl.png").is_file());
+    assert_eq!(place.line("demo -o demo").code, 2);
+}
+
+#[test]
+fn a_pair_is_enough_for_a_field() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 2 --size 48x40");
+    for method in ["windowed", "lucas-kanade", "horn-schunck"] {
+        place.good(&format!("flow s.npy -o {method}.npz --method {method}"));
+        let field = read_npz::<f64>(place.path(&format!("{method}.npz"))).unwrap().field;
+        assert!((field.affine(20 * 48 + 24).u - 0.3).abs() < 0.1, "{method}");
+    }
+}

@@ -1,0 +1,139 @@
+//! What goes wrong is told by name, early, with the documented exit code.
+
+use super::support::Place;
+use std::fs;
+
+/// Runs a line that must fail: exit code, and words on standard error.
+fn fails(place: &Place, line: &str, code: i32, words: &[&str]) {
+    let ended = place.line(line);
+    assert_eq!(ended.code, code, "{line}: {}", ended.err);
+    assert!(ended.err.contains("error:"), "{line}: {}", ended.err);
+    for word in words {
+        assert!(ended.err.contains(word), "{line}: no {word:?} in {}", ended.err);
+    }
+    assert!(!ended.err.contains("panicked"), "{}", ended.err);
+}
+
+#[test]
+fn unusable_arguments_are_named() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 4 --size 40x32");
+    fs::write(place.path("small.png"), b"no picture").unwrap();
+    for (line, words) in [
+        ("flow", &["INPUT"][..]),
+        ("flow s.npy --method best", &["method", "windowed"]),
+        ("flow s.npy --method instantaneous --model quadratic", &["model", "affine"]),
+        ("flow s.npy --method windowed --smoothness 1", &["smoothness"]),
+        ("flow s.npy --rows many", &["rows"]),
+        ("flow s.npy --scheme sideways", &["scheme"]),
+        ("flow s.npy --window -1", &["--window"]),
+        ("flow s.npy --neighbourhood 2x2", &["neighbourhood"]),
+        ("flow s.npy --region 30,0,20,20", &["region", "40 x 32"]),
+        ("flow s.npy --region 1,2,3", &["--region"]),
+        ("flow s.npy --points 99,1", &["points", "(99, 1)"]),
+        ("flow s.npy --points 1,-1", &["points"]),
+        ("flow s.npy --points 1,1 --stride 2", &["--stride"]),
+        ("flow s.npy --step 0", &["--step"]),
+        ("flow s.npy --threads 0", &["--threads"]),
+        ("flow s.npy --simd mmx", &["simd"]),
+        ("flow s.npy --smooth nan", &["--smooth"]),
+        ("flow s.npy --fps 0", &["--fps"]),
+        ("flow s.npy -o out --format gif", &["format", "npz"]),
+        ("flow s.npy -o out --picture photo", &["picture", "curl"]),
+        ("flow s.npy --picture curl", &["output"]),
+        ("flow s.npy -o out.xyz", &["output", ".npz"]),
+        ("flow s.npy -o one.npz", &["output", "folder"]),
+        ("flow s.npy -o p --points 1,1 --format flo", &["format"]),
+        ("flow s.npy --limit 1", &["frames", "1"]),
+        ("flow s.npy --first 9", &["input"]),
+        ("measure s.npy --quantity rpm", &["fps"]),
+        ("measure s.npy --quantity beauty", &["quantity", "divergence"]),
+        ("measure s.npy --quantity curl --method horn-schunck", &["method"]),
+        ("measure s.npy --quantity curl -o rows.txt", &["output", ".csv"]),
+        ("measure s.npy --quantity curl --json", &["output"]),
+        ("filter s.npy --profile mine", &["profile"]),
+        ("filter s.npy --form square", &["form"]),
+        ("filter s.npy --process-noise 1,2", &["--process-noise"]),
+        ("synth nowhere -o x", &["scene", "ramp"]),
+        ("synth affine -o x --set spin=1", &["spin"]),
+        ("synth affine -o x.avi", &["output"]),
+        ("synth affine -o x --depth float", &["output", ".npy"]),
+        ("synth affine -o s.npy", &["output", "--force"]),
+        ("frobnicate", &["frobnicate"]),
+    ] {
+        fails(&place, line, 2, words);
+    }
+    assert_eq!(place.names("."), ["s.npy", "small.png"], "mistakes leave nothing behind");
+}
+
+#[test]
+fn broken_and_missing_files_are_named() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 4 --size 40x32");
+    fs::write(place.path("bad.y4m"), b"YUV4MPEG2 W4 H4 F25:1 Cmono\nFRAME\n1234").unwrap();
+    fs::write(place.path("bad.png"), b"no picture").unwrap();
+    fs::write(place.path("bad.flo"), b"PIEH").unwrap();
+    for (line, word) in [
+        ("flow nowhere -o out1", "nowhere"),
+        ("flow bad.y4m -o out2", "bad.y4m"),
+        ("flow s.npy -o no/such/folder/x.csv", "no/such/folder"),
+        ("flow s.npy --mask bad.png", "bad.png"),
+        ("flow s.npy --points list.csv", "list.csv"),
+        ("info bad.flo", "bad.flo"),
+        ("info nowhere", "nowhere"),
+        ("filter s.npy --resume nothing.npz", "nothing.npz"),
+    ] {
+        fails(&place, line, 1, &[word]);
+    }
+}
+
+#[test]
+fn a_mask_of_another_size_and_frames_of_another_size_are_refused() {
+    let place = Place::new();
+    place.good("synth affine -o a --frames 3 --size 40x32");
+    place.good("synth affine -o b --frames 1 --size 41x32");
+    fails(&place, "flow a --mask b/frame_000000.png", 2, &["mask", "40 x 32", "41 x 32"]);
+    let images = "a/frame_000000.png a/frame_000001.png b/frame_000000.png";
+    let ended = place.line(&format!("flow {images} -o out"));
+    assert!(ended.code != 0 && ended.err.contains("41"), "{}", ended.err);
+}
+
+#[test]
+fn colour_is_refused_with_the_way_out() {
+    let place = Place::new();
+    place.good("synth affine -o f --frames 3 --size 40x32");
+    place.good("flow f -o out --picture colour");
+    let image = "out/000001_colour.png";
+    let ended = place.line(&format!("flow {image} {image} {image}"));
+    assert!(ended.code != 0 && ended.err.contains("luminance"), "{}", ended.err);
+    place.good(&format!("flow {image} {image} {image} --luminance"));
+}
+
+#[test]
+fn video_without_ffmpeg_is_a_missing_program() {
+    let place = Place::new();
+    fs::write(place.path("film.mp4"), b"\0\0\0\x18ftypmp42").unwrap();
+    let output = place.command(&["flow", "film.mp4", "-o", "out"]).env("PATH", "").output().unwrap();
+    let words = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{words}");
+    assert!(words.contains("ffmpeg"), "{words}");
+}
+
+#[test]
+fn json_of_a_failure_is_one_object_too() {
+    let place = Place::new();
+    let ended = place.line("flow nowhere --json");
+    let object = ended.json();
+    assert_eq!((ended.code, object["exit_code"].as_i64()), (1, Some(1)));
+    assert!(object["error"].as_str().unwrap().contains("nowhere"));
+}
+
+#[test]
+fn quiet_runs_say_nothing() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32 --quiet");
+    let ended = place.good("flow s.npy -o out --quiet");
+    assert_eq!((ended.out.as_str(), ended.err.as_str()), ("", ""));
+    let told = place.good("flow s.npy -o out2");
+    assert!(told.out.is_empty() && told.err.contains("1 fields"));
+}

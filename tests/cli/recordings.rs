@@ -1,0 +1,77 @@
+//! Real recordings, from files to pictures. Skipped where the data are not there.
+
+use super::support::Place;
+use jacoflow::io::{read_flo, read_npz};
+use std::path::PathBuf;
+
+/// A folder or file of the recorded sequences: `JACOFLOW_DATA`, or `../shared/data` beside the package; `None`, with a note, when it is not there.
+fn data(part: &str) -> Option<String> {
+    let root = std::env::var_os("JACOFLOW_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let path = root.join(part);
+    if !path.exists() {
+        println!("skipped: {part} is not there (set JACOFLOW_DATA)");
+        return None;
+    }
+    Some(path.to_string_lossy().into_owned())
+}
+
+/// Runs `flow` with pictures and returns the valid share; every picture must be there and not be of one colour.
+fn to_pictures(place: &Place, input: &[String], more: &str, index: usize) -> f64 {
+    let mut arguments: Vec<String> = vec!["flow".into()];
+    arguments.extend_from_slice(input);
+    let rest = format!("-o out --json --picture colour,quiver,divergence,curl {more}");
+    arguments.extend(rest.split_whitespace().map(String::from));
+    let ended = place.run(&arguments);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    for kind in ["colour", "quiver", "divergence", "curl"] {
+        let path = place.path(&format!("out/{index:06}_{kind}.png"));
+        let picture = image::open(&path).unwrap().to_rgb8();
+        let first = picture.get_pixel(0, 0);
+        assert!(picture.pixels().any(|pixel| pixel != first), "{kind} is of one colour");
+    }
+    ended.json()["valid_share"].as_f64().unwrap()
+}
+
+#[test]
+fn rubber_whale_in_colour() {
+    let Some(folder) = data("middlebury_flow/RubberWhale") else { return };
+    let place = Place::new();
+    let refused = place.run(&["flow".to_string(), folder.clone(), "-o".into(), "x".into()]);
+    assert!(refused.code != 0 && refused.err.contains("luminance"), "{}", refused.err);
+    let frames: Vec<String> = [9, 10, 11].map(|k| format!("{folder}/frame{k:02}.png")).to_vec();
+    let share = to_pictures(&place, &frames, "--luminance --smooth 1 --format npz,flo", 1);
+    assert!(share > 0.95, "{share}");
+    let (got, truth) = (read_flo(place.path("out/000001.flo")), read_flo(format!("{folder}/flow10.flo")));
+    let (got, truth) = (got.unwrap(), truth.unwrap());
+    let errors: Vec<f64> = (0..got.u().len())
+        .map(|i| f64::from(got.u()[i] - truth.u()[i]).hypot(f64::from(got.v()[i] - truth.v()[i])))
+        .filter(|e| e.is_finite() && *e < 1e3)
+        .collect();
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    // No motion at all would be 1.26 px off; there is no pyramid here.
+    assert!(mean < 0.8, "mean error {mean} px");
+}
+
+#[test]
+fn yosemite() {
+    let Some(folder) = data("yosemite/yosemite_sequence") else { return };
+    let place = Place::new();
+    let share = to_pictures(&place, &[format!("{folder}/*.tif")], "--limit 4 --smooth 1", 1);
+    assert!(share > 0.9, "{share}");
+    assert_eq!(read_npz::<f32>(place.path("out/000002.npz")).unwrap().field.layout.frame_size, (316, 252));
+}
+
+#[test]
+fn a_pair_of_particle_images() {
+    let Some(folder) = data("piv_synthetic/DNS_turbulence") else { return };
+    let mut images: Vec<String> = super::support::names(folder.as_ref())
+        .into_iter()
+        .filter(|name| name.starts_with("DNS_turbulence_00001") && name.ends_with(".tif"))
+        .map(|name| format!("{folder}/{name}"))
+        .collect();
+    images.sort();
+    let place = Place::new();
+    let share = to_pictures(&place, &images, "--smooth 1", 0);
+    assert!(images.len() == 2 && share > 0.95, "{share} {images:?}");
+}

@@ -1,0 +1,178 @@
+//! Standard input, long runs, interruption.
+
+use super::support::{Place, temporary};
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+const WIDTH: usize = 64;
+const HEIGHT: usize = 48;
+
+fn header() -> Vec<u8> {
+    format!("YUV4MPEG2 W{WIDTH} H{HEIGHT} F25:1 Ip A1:1 Cmono\n").into_bytes()
+}
+
+/// A frame of moving texture.
+fn frame(index: usize) -> Vec<u8> {
+    let mut bytes = b"FRAME\n".to_vec();
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let phase = (x as f64 - 0.3 * index as f64) * 0.5;
+            bytes.push((128.0 + 50.0 * phase.sin() + 40.0 * (y as f64 * 0.4 + 0.2 * phase).cos()) as u8);
+        }
+    }
+    bytes
+}
+
+/// Waits for a condition, for at most a minute.
+fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < Duration::from_secs(60), "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn interrupt(child: &Child) {
+    let status = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(status.success());
+}
+
+fn start(place: &Place, line: &str) -> Child {
+    let arguments: Vec<&str> = line.split_whitespace().collect();
+    let mut command = place.command(&arguments);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+#[test]
+fn y4m_on_standard_input_is_the_same_as_from_a_file() {
+    let place = Place::new();
+    let mut bytes = header();
+    (0..5).for_each(|index| bytes.extend(frame(index)));
+    fs::write(place.path("s.y4m"), &bytes).unwrap();
+    place.good("flow s.y4m -o a --format flo");
+    let ended = place.fed("flow - -o b --format flo --json", &bytes);
+    assert_eq!((ended.code, ended.json()["fields"].as_u64()), (0, Some(3)), "{}", ended.err);
+    for name in ["000001.flo", "000002.flo", "000003.flo"] {
+        assert_eq!(fs::read(place.path("a").join(name)).unwrap(), fs::read(place.path("b").join(name)).unwrap());
+    }
+}
+
+#[test]
+fn a_stream_that_breaks_off_keeps_what_was_complete() {
+    let place = Place::new();
+    let mut bytes = header();
+    (0..6).for_each(|index| bytes.extend(frame(index)));
+    bytes.truncate(bytes.len() - 100);
+    let ended = place.fed("flow - -o out --format npz,csv --stride 4", &bytes);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert_eq!(place.names("out"), ["000001.npz", "000002.npz", "000003.npz", "points.partial.csv"]);
+}
+
+#[test]
+fn an_interrupted_run_leaves_no_half_file_and_loses_nothing() {
+    let place = Place::new();
+    let mut child = start(&place, "flow - -o out --format npz,csv --stride 2 --json");
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&header()).unwrap();
+    (0..6).for_each(|index| pipe.write_all(&frame(index)).unwrap());
+    pipe.flush().unwrap();
+    wait_until("four fields", || place.path("out/000004.npz").exists());
+    // The pipe stays open: the run is waiting for a frame when the signal comes.
+    interrupt(&child);
+    wait_until("the end", || child.try_wait().unwrap().is_some());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let mut out = String::new();
+    child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((summary["interrupted"].as_bool(), summary["fields"].as_u64()), (Some(true), Some(4)));
+    let want = ["000001.npz", "000002.npz", "000003.npz", "000004.npz", "points.partial.csv"];
+    assert_eq!(place.names("out"), want);
+    for index in 1..=4 {
+        jacoflow::io::read_npz::<f64>(place.path(&format!("out/{index:06}.npz"))).unwrap();
+    }
+    let rows = fs::read_to_string(place.path("out/points.partial.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 4 * (WIDTH / 2) * (HEIGHT / 2));
+    drop(pipe);
+}
+
+#[test]
+fn an_interrupted_single_file_does_not_appear() {
+    let place = Place::new();
+    let mut child = start(&place, "flow - -o one.npz --limit 3");
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&header()).unwrap();
+    (0..2).for_each(|index| pipe.write_all(&frame(index)).unwrap());
+    pipe.flush().unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    interrupt(&child);
+    wait_until("the end", || child.try_wait().unwrap().is_some());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(place.names(".").is_empty());
+}
+
+#[test]
+fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
+    let place = Place::new();
+    let mut child = start(&place, "flow - --points 20,20 --quiet");
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&header()).unwrap();
+    (0..3).for_each(|index| pipe.write_all(&frame(index)).unwrap());
+    pipe.flush().unwrap();
+    let mut rows = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    rows.read_line(&mut line).unwrap();
+    assert!(line.starts_with("frame,x,y,status"));
+    line.clear();
+    // The first row is there although the input is not at its end.
+    rows.read_line(&mut line).unwrap();
+    assert!(line.starts_with("1,20,20,ok"), "{line}");
+    drop(rows);
+    let mut index = 3;
+    while index < 2000 && pipe.write_all(&frame(index)).is_ok() {
+        index += 1;
+    }
+    drop(pipe);
+    let status = child.wait().unwrap();
+    let mut words = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
+    assert!(status.code() == Some(0) && words.is_empty() && index < 2000, "{status:?} {words} {index}");
+}
+
+/// Peak memory of a process, kB; from the system's own account.
+#[cfg(target_os = "linux")]
+fn peak_memory(child: &Child) -> Option<u64> {
+    let text = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+    let line = text.lines().find(|line| line.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_stream() {
+    let place = Place::new();
+    let mut child = start(&place, "flow - --points 20,20 --points 40,30 -o rows.csv --threads 2 --quiet");
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&header()).unwrap();
+    let (mut early, mut late) = (0, 0);
+    // 3000 frames of 64 x 48 would be 9 MB as bytes and 37 MB as floats.
+    for index in 0..3000 {
+        pipe.write_all(&frame(index % 50)).unwrap();
+        if index == 300 {
+            early = peak_memory(&child).unwrap();
+        }
+    }
+    wait_until("a reading", || {
+        late = peak_memory(&child).unwrap_or(late);
+        late > 0
+    });
+    drop(pipe);
+    assert!(child.wait().unwrap().success());
+    let rows = fs::read_to_string(place.path("rows.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 2 * 2998);
+    assert!(temporary(&place.path(".")).is_empty());
+    assert!(late < early + 6 * 1024, "{early} kB after 300 frames, {late} kB after 3000");
+    assert!(late < 64 * 1024, "{late} kB");
+}
