@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of `filter`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(
     after_help = "A filter starts from nothing and needs some tens of frames to settle. Its state can be saved and taken up again: the next run then gives\n\
     the same bits as one run over all frames. The state is saved after the last completed frame, also when the run is stopped.\n\n\

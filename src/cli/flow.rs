@@ -19,6 +19,7 @@ use std::path::Path;
 
 /// Options of `flow`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Results in a folder are numbered by the frame they belong to. What exists is not replaced without --force. When a run is stopped\n\
     (Ctrl-C), the files that are complete stay; rows of a .csv are then kept in name.partial.csv.\n\n\

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of `measure`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Rows: frame, time_s, x, y, quantity, value, std, unit, valid_share. For a region (without --region: the whole frame) one affine motion is\n\
     fitted to its estimates; std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of `synth`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Frames are written as a folder of PNG files (OUT without an extension), a .npy stack or a .y4m file.\n\
     Truth is the velocity and its Jacobian at the time of each frame.\n\n\

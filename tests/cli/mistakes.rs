@@ -32,6 +32,7 @@ fn unusable_arguments_are_named() {
         ("flow s.npy --region 1,2,3", &["--region"]),
         ("flow s.npy --points 99,1", &["points", "(99, 1)"]),
         ("flow s.npy --points 1,-1", &["points"]),
+        ("flow s.npy --points -1,1", &["points", "-1,1"]),
         ("flow s.npy --points 1,1 --stride 2", &["--stride"]),
         ("flow s.npy --step 0", &["--step"]),
         ("flow s.npy --threads 0", &["--threads"]),

@@ -16,7 +16,7 @@ pub struct SiteArguments {
     #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
     pub stride: Option<usize>,
     /// Only these pixels: `X,Y`, or a CSV file with columns x and y; may be repeated
-    #[arg(long, value_name = "X,Y|FILE", conflicts_with_all = ["region", "stride"])]
+    #[arg(long, value_name = "X,Y|FILE", allow_hyphen_values = true, conflicts_with_all = ["region", "stride"])]
     pub points: Vec<String>,
     /// Use only pixels that are not black in this image of the frames' size
     #[arg(long, value_name = "IMAGE")]
