@@ -1,0 +1,69 @@
+"""Rotation speed of a machine from a patch of its surface that does not contain the axis.
+
+The curl of a turning surface is twice its angular velocity at every point of it, so any patch will do; the axis itself, p - M^-1 (u, v), may lie outside the picture.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import jacoflow
+from jacoflow import plot, scenes
+from picture import check, save
+
+RPM, FPS, RADIUS = 45.0, 500.0, 150.0
+AXIS = (20.0, 130.0)
+"""Of the disc, in px of the camera's picture: left of and below the patch that is looked at."""
+PATCH = (96, 72)
+"""Width and height of the picture, px."""
+CORNER = (90.0, 20.0)
+"""Where the camera's picture lies on the machine, px."""
+
+
+def main() -> None:
+    disc = scenes.Scene(
+        "disc", width=PATCH[0], height=PATCH[1], origin=CORNER, seed=8, sigma=3.0, rpm=RPM, fps=FPS, centre_x=AXIS[0], centre_y=AXIS[1], disc_radius=RADIUS
+    )
+    camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, seed=2)
+    frames = np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(disc.frames(12))])
+    fields = jacoflow.estimate(frames, method="windowed", window_sigma=5.0, rows="all", smooth=1.0, fps=FPS)
+    # The part of the picture well inside the disc.
+    y, x = np.mgrid[0 : PATCH[1], 0 : PATCH[0]]
+    inside = np.hypot(x + CORNER[0] - AXIS[0], y + CORNER[1] - AXIS[1]) < RADIUS - 15
+    readings = []
+    print("frame     rpm   +- one pixel's   axis, px")
+    for k in range(len(frames) - 2):
+        field = fields[k]
+        good = inside & np.asarray(field.valid)
+        rpm, spread = np.asarray(field.rpm)[good], np.asarray(field.std("rpm"))[good]
+        weight = 1 / spread**2
+        reading = float((weight * rpm).sum() / weight.sum())
+        readings.append(reading)
+        axis = axis_of(field, good)
+        print(f"{k + 1:5}  {reading:7.3f}  {np.median(spread):8.3f}      ({axis[0] + CORNER[0]:6.1f}, {axis[1] + CORNER[1]:6.1f})")
+    mean, error = np.mean(readings), np.std(readings, ddof=1) / np.sqrt(len(readings))
+    print(f"rotation speed {mean:.3f} +- {error:.3f} rpm, truth {RPM} rpm; axis truth {AXIS}")
+    check("rpm", float(mean), RPM, 0.02 * RPM)
+    check("axis x", axis[0] + CORNER[0], AXIS[0], 5.0)
+    check("axis y", axis[1] + CORNER[1], AXIS[1], 5.0)
+
+    def draw(figure):
+        left, right = figure.subplots(1, 2)
+        plot.quiver(fields[4], axes=left, frame=frames[5])
+        plot.scalar_map(np.where(inside, fields[4].rpm, np.nan), axes=right, signed=False, limit=1.5 * RPM, label="rotation speed", unit="rpm")
+
+    save("rotation_speed", draw)
+
+
+def axis_of(field: jacoflow.FlowField, good: np.ndarray) -> tuple[float, float]:
+    """The point at rest, px of the picture: u = -w (y - y0), v = w (x - x0) fitted to the flow by least squares."""
+    y, x = np.nonzero(good)
+    u, v = np.asarray(field.flow, dtype=float)[good].T
+    one, zero = np.ones(len(x)), np.zeros(len(x))
+    rows = np.concatenate([np.stack([-y, zero, one], axis=1), np.stack([x, -one, zero], axis=1)])
+    w, w_x, w_y = np.linalg.lstsq(rows, np.concatenate([u, v]), rcond=None)[0]
+    return float(w_x / w), float(w_y / w)
+
+
+if __name__ == "__main__":
+    main()
