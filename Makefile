@@ -6,7 +6,7 @@ WHEELS := target/wheels
 # Wherever clippy, rustdoc and cargo test look at the binding they look at it with the same features, so that crates are built once.
 ALL := --features python
 
-.PHONY: test demo format clippy rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs clean
+.PHONY: test demo format clippy rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare clean
 
 test: format clippy rustdoc rust-test guide pytest stubtest typing examples
 	@echo "everything passed"
@@ -60,6 +60,18 @@ examples: install
 # A quick build for work on the binding: development profile, installed in place.
 develop: $(BIN)/maturin
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --extras test
+
+# API reference of the Python package (target/docs) and of the crate (target/doc), generated from the docstrings; and README's picture.
+docs: install
+	$(BIN)/python -m pip install -q "pdoc>=15"
+	$(BIN)/python -m pdoc -o target/docs jacoflow
+	RUSTDOCFLAGS="-D warnings" cargo doc -q --no-deps
+	$(BIN)/python docs/overview_picture.py
+
+# Dated table of accuracy and speed against OpenCV and filterpy, measured in one process; JACOFLOW_DATA names a folder of recordings with truth.
+compare: install
+	$(BIN)/python -m pip install -q "opencv-python-headless>=4.10" "filterpy>=1.4.5"
+	$(BIN)/python benchmarks/compare.py
 
 clean:
 	rm -rf target $(VENV) dist
