@@ -107,6 +107,9 @@ impl Instantaneous {
     }
 }
 
+/// Sites whose trust is looked at together.
+const LOOK: usize = 32;
+
 /// How a grid is walked row by row.
 struct RowPlan<T> {
     region: Rect,
@@ -180,11 +183,19 @@ impl<T: SimdReal> Job<'_, T> {
                 }
             }
             band.status[base + first..base + last].fill(Status::Ok);
-            for k in first..last {
-                let at = (region.x + k * stride, y);
-                let trusted = trust[(k - first) * stride] > T::default();
-                if !trusted || (self.mask.is_some() && self.obstacle(at).is_some()) {
-                    self.site(band, index + k, at);
+            for start in (first..last).step_by(LOOK) {
+                let end = (start + LOOK).min(last);
+                let looked_at = &trust[(start - first) * stride..=(end - 1 - first) * stride];
+                // Nearly always true, and then cheap: one comparison a lane.
+                if self.mask.is_none() && looked_at.iter().all(|t| *t > T::default()) {
+                    continue;
+                }
+                for k in start..end {
+                    let at = (region.x + k * stride, y);
+                    let trusted = trust[(k - first) * stride] > T::default();
+                    if !trusted || self.obstacle(at).is_some() {
+                        self.site(band, index + k, at);
+                    }
                 }
             }
         }
