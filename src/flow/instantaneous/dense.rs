@@ -14,7 +14,10 @@ pub(super) enum Source<T> {
     Rows(JetRows<T>),
 }
 
-/// One row's estimates: columns `columns` of row `y`, all of whose neighbourhoods fit.
+/// Columns below which a row runs in scalars: the widest vector.
+pub(super) const NARROW: usize = 16;
+
+/// One row's estimates: columns `columns` of row `y`, all of whose neighbourhoods fit; at least [`NARROW`] of them unless it runs in scalars.
 pub(super) struct RowKernel<'a, T> {
     pub source: &'a Source<T>,
     pub scheme: TimeScheme,
@@ -41,23 +44,14 @@ impl<T: SimdReal> Kernel<T> for RowKernel<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        if self.columns.len() >= V::LANES {
-            self.lanes::<V>();
-        } else {
-            self.lanes::<T>();
-        }
-    }
-}
-
-impl<T: SimdReal> RowKernel<'_, T> {
-    #[inline(always)]
-    fn lanes<V: Lanes<Scalar = T>>(self) {
         match self.source {
             Source::Three => self.three::<V>(),
             Source::Rows(_) => self.rows::<V>(),
         }
     }
+}
 
+impl<T: SimdReal> RowKernel<'_, T> {
     /// 3x3: sums, differences and second differences down the columns of the three combinations in time, then across.
     #[inline(always)]
     fn three<V: Lanes<Scalar = T>>(self) {
