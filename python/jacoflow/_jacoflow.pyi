@@ -21,6 +21,7 @@ __all__ = [
     "FlowField",
     "quantities",
     "_restore_field",
+    "_status_names",
     "ExtendedKalmanFilter",
     "GaussianFilter",
     "KalmanFilter",
@@ -30,6 +31,7 @@ __all__ = [
     "_restore_kalman",
     "_restore_unscented",
     "FlowFilter",
+    "_restore_filter",
     "luminance",
     "quantise",
     "smooth",
@@ -204,7 +206,7 @@ class FlowField:
         """Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2)."""
     @property
     def frame_index(self) -> int:
-        """Index of the frame the estimate belongs to, counted from 0; of the first one for a stack."""
+        """Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack."""
     @property
     def frame_size(self) -> tuple[int, int]:
         """Size (width, height) of the frames, px."""
@@ -213,13 +215,13 @@ class FlowField:
         """Seconds between frames, or None."""
     @property
     def pixel_pitch(self) -> tuple[float, float]:
-        """Physical size (dx, dy) of a pixel."""
+        """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
     @property
     def model(self) -> str:
-        """Name of the motion model."""
+        """Name of the motion model (no unit)."""
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the model's parameters."""
+        """Names of the model's parameters; `unit(name)` tells their units."""
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack."""
@@ -259,7 +261,7 @@ def estimate(
     fps: float | None = None,
     frame_period: float | None = None,
     pixel_pitch: float | tuple[float, float] | None = None,
-    covariance: bool = True,
+    covariance: bool | None = None,
     diagnostics: bool = False,
     noise: float | None = None,
     precision: _Precision | None = None,
@@ -269,8 +271,8 @@ def estimate(
 ) -> FlowField:
     """Flow, its Jacobian and their covariance, from two or three frames or from a stack.
 
-    A list or tuple of exactly as many frames (H, W) as the method needs (three; two for a baseline with time_scheme="pair") gives one FlowField (H, W), more
-    give a stack (T - 2, H, W); an array (T, H, W) always gives a stack. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
+    A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well (every method but "instantaneous"); a longer list
+    gives a stack (T - 2, H, W), and so does an array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
     gain does not change the flow. float64 is computed in float64, everything else in float32. Inputs are never modified.
 
     Parameters
@@ -282,8 +284,9 @@ def estimate(
         nearly noise-free images. The others are baselines.
     model : "affine", "translational" or "accelerating"
         Motion model of "instantaneous".
-    time_scheme : "central" (default), "backward" or, for baselines, "pair"
-        How time derivatives are taken, and so to which frame the field belongs: the middle or the newest one.
+    time_scheme : "central", "backward" or "pair"
+        How time derivatives are taken, and so to which frame the field belongs: the middle one of three (default), the newest of three ("windowed" and
+        "instantaneous" only), or the first of two (the default for two frames; not "instantaneous").
     neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
         Pixels that the local quadratic is fitted to; default 3 x 3.
     neighbourhood_sigma : float, px
@@ -297,7 +300,7 @@ def estimate(
     iterations : int
         Most iterations of "horn_schunck".
     rank_deficient : "nan" or "min_norm"
-        What "instantaneous" reports where the equations do not determine every unknown.
+        What "windowed" and "instantaneous" report where the equations do not determine every unknown.
     smooth : float, px
         Standard deviation of a Gaussian that smooths each frame first; default none.
     quantise : float, grey levels
@@ -317,7 +320,7 @@ def estimate(
     pixel_pitch : float or (dx, dy), any length unit
         Size of a pixel; flow then comes in that unit per frame.
     covariance : bool
-        Whether to compute the covariance of the parameters.
+        Whether to compute the covariance of the parameters; default yes, where the method has one (not "horn_schunck").
     diagnostics : bool
         Whether to report residual, rank and condition number.
     noise : float, grey levels
@@ -344,7 +347,7 @@ class FlowEstimator:
     """Flow from a stream: frames are pushed one by one, memory stays bounded.
 
     The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-    (two for baselines with time_scheme="pair"). Pickles in mid-stream.
+    (two with time_scheme="pair"). Pickles in mid-stream.
     """
     def __new__(
         cls,
@@ -369,7 +372,7 @@ class FlowEstimator:
         fps: float | None = None,
         frame_period: float | None = None,
         pixel_pitch: float | tuple[float, float] | None = None,
-        covariance: bool = True,
+        covariance: bool | None = None,
         diagnostics: bool = False,
         noise: float | None = None,
         precision: _Precision | None = None,
@@ -459,6 +462,17 @@ class FlowFilter:
     @property
     def options(self) -> dict[str, Any]:
         """The options as a dictionary, in the units of the constructor."""
+    def save(self, /, path: _Path) -> None:
+        """Writes the states (one file, .npz) so that `load` goes on bit for bit, in the units of `state`.
+
+        Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be written.
+        """
+    def load(self, /, path: _Path) -> None:
+        """Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be those of the saved one.
+
+        FormatError for a damaged file, ValueError for a file of other options or another precision, OSError when it cannot be read.
+        """
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
 
 def quantities() -> dict[str, tuple[str, str]]:
     """Derived quantities with their units (per frame, with a frame period), as a dictionary."""
@@ -781,9 +795,11 @@ def _write_pfm(path: _Path, values: ArrayLike) -> None: ...
 def _restore_estimator(options: dict[str, Any], memory: dict[str, Any]) -> FlowEstimator: ...
 def _restore_extended(state: dict[str, Any]) -> ExtendedKalmanFilter: ...
 def _restore_field(state: dict[str, Any]) -> FlowField: ...
+def _restore_filter(options: dict[str, Any], state: tuple[bytes, str] | None) -> FlowFilter: ...
 def _restore_kalman(state: dict[str, Any]) -> KalmanFilter: ...
 def _restore_unscented(state: dict[str, Any]) -> UnscentedKalmanFilter: ...
 def _run_command_line(arguments: list[str]) -> int: ...
 def _scene_carriers() -> dict[str, str]: ...
 def _scene_names() -> dict[str, str]: ...
 def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...
+def _status_names() -> list[str]: ...

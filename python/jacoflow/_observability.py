@@ -64,7 +64,8 @@ class ObservabilityMap:
     @property
     def observable(self) -> NDArray[np.bool_]:
         """Where all six unknowns are determined, bool array (H, W)."""
-        return np.logical_and(self.known, self.rank == 6)
+        observable: NDArray[np.bool_] = self.known & (self.rank == 6)
+        return observable
 
 
 def observability(

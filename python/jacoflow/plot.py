@@ -39,7 +39,7 @@ _UNKNOWN = "#6e6e6e"
 
 
 class FieldLike(Protocol):
-    """What a picture is made of: `FlowField` is one."""
+    """What a picture is made of, arrays (H, W, ...): `FlowField` is one."""
 
     @property
     def flow(self) -> NDArray[Any]:

@@ -10,7 +10,8 @@ use crate::simd::SimdReal;
 use crate::temporal::{FilterForm, FlowFilter as Core, FlowFilterOptions, Transition};
 use crate::types::{AnyFrame, Frame, Sample, Sites};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
 
 /// The keyword options, as a dictionary when pickled.
 #[derive(FromPyObject, IntoPyObject)]
@@ -241,6 +242,7 @@ impl FlowFilter {
         if matches!(self.engine, Engine::Waiting) {
             self.engine = self.start(&frame)?;
         }
+        self.accept_dtype(&frame)?;
         match &mut self.engine {
             Engine::Waiting => Err(Error::Numerical("the filter has not started".into()).into()),
             Engine::Single(core, dtype) => advance(py, core, dtype, &self.preprocess, &frame).map(FlowField::single),
@@ -292,6 +294,39 @@ impl FlowFilter {
         self.arguments.copy(py).into_pyobject(py)
     }
 
+    /// Writes the states (one file, .npz) so that `load` goes on bit for bit, in the units of `state`.
+    ///
+    /// Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be written.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let early = || Error::argument("path", "a filter that has seen a frame", "one that has not");
+        each_engine!(&self.engine, core => Ok(py.detach(|| core.save(&path))?), Err(early().into()))
+    }
+
+    /// Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be those of the saved one.
+    ///
+    /// FormatError for a damaged file, ValueError for a file of other options or another precision, OSError when it cannot be read.
+    fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let engine = py.detach(|| match Core::<f32>::load(&path) {
+            Ok(core) => Ok(Engine::Single(core, "")),
+            Err(_) => Core::<f64>::load(&path).map(|core| Engine::Double(core, "")),
+        })?;
+        self.engine = self.resume(engine)?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>, Option<(Bound<'py, PyBytes>, &'static str)>))> {
+        let state = match &self.engine {
+            Engine::Waiting => None,
+            Engine::Single(core, dtype) => Some((core.to_bytes()?, *dtype)),
+            Engine::Double(core, dtype) => Some((core.to_bytes()?, *dtype)),
+        };
+        let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_filter")?;
+        Ok((restore, (self.options(py)?, state.map(|(bytes, dtype)| (PyBytes::new(py, &bytes), dtype)))))
+    }
+
     fn __repr__(&self) -> String {
         let Arguments { profile, .. } = &self.arguments;
         let form = self.options.form.name();
@@ -312,16 +347,56 @@ impl FlowFilter {
         })
     }
 
+    /// The sample value of 255 grey levels for frames like this one.
+    fn full_scale(&self, frame: &AnyFrame) -> f64 {
+        match (self.arguments.full_scale, frame) {
+            (None, AnyFrame::U8(_)) => u8::FULL_SCALE,
+            (None, AnyFrame::U16(_)) => u16::FULL_SCALE,
+            _ => self.options.full_scale,
+        }
+    }
+
+    /// After loading a state the first frame tells the sample type; it must have the scale that the state was made with.
+    fn accept_dtype(&mut self, frame: &AnyFrame) -> PyResult<()> {
+        let expected = self.full_scale(frame);
+        let (scale, dtype) = match &mut self.engine {
+            Engine::Waiting => return Ok(()),
+            Engine::Single(core, dtype) => (core.options().full_scale, dtype),
+            Engine::Double(core, dtype) => (core.options().full_scale, dtype),
+        };
+        if dtype.is_empty() {
+            if scale != expected {
+                let wanted = format!("frames of full scale {scale}, as those of the saved filter");
+                return Err(Error::argument("frame", wanted, format!("{} ({expected})", frame.dtype())).into());
+            }
+            *dtype = frame.dtype();
+        }
+        Ok(())
+    }
+
+    /// Takes up a saved state, if it was made with these options. Full scale depends on the frames and is looked at with them.
+    fn resume(&self, engine: Engine) -> crate::Result<Engine> {
+        let same = |saved: &FlowFilterOptions| {
+            let mut mine = self.options.clone();
+            (mine.threads, mine.simd, mine.full_scale) = (saved.threads, saved.simd, saved.full_scale);
+            mine == *saved
+        };
+        let fits = each_engine!(&engine, core => same(core.options()), true);
+        if fits {
+            let threads = self.options.threads;
+            Ok(match engine {
+                Engine::Waiting => Engine::Waiting,
+                Engine::Single(core, dtype) => Engine::Single(core.with_threads(threads), dtype),
+                Engine::Double(core, dtype) => Engine::Double(core.with_threads(threads), dtype),
+            })
+        } else {
+            Err(Error::argument("path", "a state of a filter with the same options", "other options"))
+        }
+    }
+
     /// The filters for a sequence that begins with `frame`.
     fn start(&self, frame: &AnyFrame) -> PyResult<Engine> {
-        let mut options = self.options.clone();
-        if self.arguments.full_scale.is_none() {
-            options.full_scale = match frame {
-                AnyFrame::U8(_) => u8::FULL_SCALE,
-                AnyFrame::U16(_) => u16::FULL_SCALE,
-                AnyFrame::F32(_) | AnyFrame::F64(_) => options.full_scale,
-            };
-        }
+        let options = FlowFilterOptions { full_scale: self.full_scale(frame), ..self.options.clone() };
         let (size, dtype) = (frame.size(), frame.dtype());
         let engine = if self.precision.is_double(frame) {
             Core::new(size, options).map(|core| Engine::Double(core, dtype))
@@ -363,4 +438,19 @@ fn advance<T: SimdReal>(
         core.push(&prepared)
     });
     Ok(field?)
+}
+
+/// The inverse of `FlowFilter.__reduce__`.
+#[pyfunction(name = "_restore_filter")]
+pub fn restore_filter(py: Python<'_>, options: Arguments, state: Option<(Vec<u8>, String)>) -> PyResult<FlowFilter> {
+    let mut filter = FlowFilter::from_arguments(py, options)?;
+    if let Some((bytes, name)) = state {
+        let dtype = options::known_dtype(&name)?;
+        let engine = py.detach(|| match Core::<f32>::from_bytes(&bytes) {
+            Ok(core) => Ok(Engine::Single(core, dtype)),
+            Err(_) => Core::<f64>::from_bytes(&bytes).map(|core| Engine::Double(core, dtype)),
+        })?;
+        filter.engine = filter.resume(engine)?;
+    }
+    Ok(filter)
 }

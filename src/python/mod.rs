@@ -29,7 +29,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::estimate::{FlowEstimator, estimate, restore_estimator};
     #[pymodule_export]
-    use super::field::{FlowField, quantities, restore_field};
+    use super::field::{FlowField, quantities, restore_field, status_names};
     #[pymodule_export]
     use super::filters::{
         ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter,
@@ -37,7 +37,7 @@ mod _jacoflow {
     };
 
     #[pymodule_export]
-    use super::flow_filter::FlowFilter;
+    use super::flow_filter::{FlowFilter, restore_filter};
     #[pymodule_export]
     use super::image::{luminance, quantise, smooth};
     #[pymodule_export]

@@ -6,7 +6,7 @@ use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{AnyFrame, Rect, Sites};
+use crate::types::{AnyFrame, Rect, Sample, Sites};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -186,4 +186,10 @@ pub fn region(region: Option<(i64, i64, i64, i64)>) -> PyResult<Option<Rect>> {
     let rect = || Some(Rect { x: side(x)?, y: side(y)?, width: side(width)?, height: side(height)? });
     let got = format!("({x}, {y}, {width}, {height})");
     rect().map(Some).ok_or_else(|| Error::argument("region", "(x, y, width, height), none negative", got).into())
+}
+
+/// The static name of a sample type.
+pub fn known_dtype(name: &str) -> PyResult<&'static str> {
+    let known = [u8::DTYPE, u16::DTYPE, f32::DTYPE, f64::DTYPE].into_iter().find(|known| *known == name);
+    known.ok_or_else(|| Error::argument("state", "a sample type that frames have", format!("{name:?}")).into())
 }

@@ -14,10 +14,7 @@ pub(super) enum Source<T> {
     Rows(JetRows<T>),
 }
 
-/// Columns below which a row runs in scalars: the widest vector.
-pub(super) const NARROW: usize = 16;
-
-/// One row's estimates: columns `columns` of row `y`, all of whose neighbourhoods fit; at least [`NARROW`] of them unless it runs in scalars.
+/// One row's estimates: columns `columns` of row `y`, all of whose neighbourhoods fit.
 pub(super) struct RowKernel<'a, T> {
     pub source: &'a Source<T>,
     pub scheme: TimeScheme,
@@ -44,17 +41,26 @@ impl<T: SimdReal> Kernel<T> for RowKernel<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        match self.source {
-            Source::Three => self.three::<V>(),
-            Source::Rows(_) => self.rows::<V>(),
+        if self.columns.len() >= V::LANES {
+            self.lanes::<V>();
+        } else {
+            self.lanes::<T>();
         }
     }
 }
 
 impl<T: SimdReal> RowKernel<'_, T> {
+    #[inline(always)]
+    fn lanes<V: Lanes<Scalar = T>>(self) {
+        match self.source {
+            Source::Three => self.three::<V>(),
+            Source::Rows(_) => self.rows::<V>(),
+        }
+    }
+
     /// 3x3: sums, differences and second differences down the columns of the three combinations in time, then across.
     #[inline(always)]
-    fn three<V: Lanes<Scalar = T>>(self) {
+    fn three<V: Lanes<Scalar = T>>(mut self) {
         let w = self.frames[0].width();
         let (from, to) = (self.columns.start - 1, self.columns.end + 1);
         let span = to - from;
@@ -69,9 +75,7 @@ impl<T: SimdReal> RowKernel<'_, T> {
             let mut first = [V::zero(); 3];
             let mut second = [V::zero(); 3];
             for r in 0..3 {
-                // SAFETY: `starts` keeps x + LANES within span, the length of these rows and of the nine below.
-                let (o, m, n) =
-                    unsafe { (load_at::<V>(old[r], x), load_at::<V>(middle[r], x), load_at::<V>(new[r], x)) };
+                let (o, m, n) = (V::load(&old[r][x..]), V::load(&middle[r][x..]), V::load(&new[r][x..]));
                 // Exactly zero where nothing changes: o + n = 2 m without rounding.
                 second[r] = m.neg_mul_add(V::constant(2.0), o + n);
                 still[r] = if central { m } else { n };
@@ -79,36 +83,28 @@ impl<T: SimdReal> RowKernel<'_, T> {
             }
             for (k, [t, m, b]) in [still, first, second].into_iter().enumerate() {
                 let outer = t + b;
-                // SAFETY: as above.
-                unsafe {
-                    store_at(outer + m, nine[3 * k], x);
-                    store_at(b - t, nine[3 * k + 1], x);
-                    store_at(m.neg_mul_add(V::constant(2.0), outer), nine[3 * k + 2], x);
-                }
+                (outer + m).store(&mut nine[3 * k][x..]);
+                (b - t).store(&mut nine[3 * k + 1][x..]);
+                m.neg_mul_add(V::constant(2.0), outer).store(&mut nine[3 * k + 2][x..]);
             }
         }
         let [s0, d0, c0, s1, d1, c1, s2, d2, c2] = nine;
         let centre = if central { middle[1] } else { new[1] };
-        let mut motion = self.motion.map(|out| &mut out[..span - 2]);
-        let trust = &mut self.trust[..span - 2];
-        let (one, half) = (1.0, if central { 0.5 } else { 1.0 });
+        let half = V::constant(if central { 0.5 } else { 1.0 });
         let noise = V::constant(noise_square::<T>());
         for x in starts(0..span - 2, V::LANES) {
-            // SAFETY: `starts` keeps x + LANES within span - 2, the length of the outputs; the other rows are two longer.
-            unsafe {
-                let [_, ix, iy, ixx, ixy, iyy] = across::<T, V>(s0, d0, c0, x, one);
-                let rates = LaneRates {
-                    jet: [ix, iy, ixx, ixy, iyy],
-                    minus_first: across::<T, V>(s1, d1, c1, x, half),
-                    second: across::<T, V>(s2, d2, c2, x, one),
-                };
-                let brightness = load_at::<V>(centre, x + 1);
-                let solution = solve_affine::<T, V>(&rates, brightness * brightness * noise);
-                for (out, m) in motion.iter_mut().zip(solution.motion) {
-                    store_at(m, out, x);
-                }
-                store_at(solution.trust, trust, x);
+            let [_, ix, iy, ixx, ixy, iyy] = across::<T, V>(s0, d0, c0, x);
+            let rates = LaneRates {
+                jet: [ix, iy, ixx, ixy, iyy],
+                minus_first: across::<T, V>(s1, d1, c1, x).map(|v| v * half),
+                second: across::<T, V>(s2, d2, c2, x),
+            };
+            let brightness = V::load(&centre[x + 1..]);
+            let solution = solve_affine::<T, V>(&rates, brightness * brightness * noise);
+            for (out, m) in self.motion.iter_mut().zip(solution.motion) {
+                m.store(&mut out[x..]);
             }
+            solution.trust.store(&mut self.trust[x..]);
         }
     }
 
@@ -146,49 +142,19 @@ impl<T: SimdReal> RowKernel<'_, T> {
     }
 }
 
-/// Loads the lanes at `at`.
-///
-/// # Safety
-/// `at + V::LANES <= row.len()`.
+/// The jet from column sums `s`, differences `d` and second differences `c` of three rows, for lanes whose left neighbours start at `x`.
 #[inline(always)]
-unsafe fn load_at<V: Lanes>(row: &[V::Scalar], at: usize) -> V {
-    debug_assert!(at + V::LANES <= row.len());
-    // SAFETY: the caller's promise. Dozens of checks a vector cost a fifth of the whole estimate.
-    V::load(unsafe { row.get_unchecked(at..at + V::LANES) })
-}
-
-/// Stores lanes at `at`.
-///
-/// # Safety
-/// `at + V::LANES <= row.len()`.
-#[inline(always)]
-unsafe fn store_at<V: Lanes>(value: V, row: &mut [V::Scalar], at: usize) {
-    debug_assert!(at + V::LANES <= row.len());
-    // SAFETY: the caller's promise.
-    value.store(unsafe { row.get_unchecked_mut(at..at + V::LANES) });
-}
-
-/// `gain` times the jet from column sums `s`, differences `d` and second differences `c` of three rows, for lanes whose left neighbours start at `x`.
-///
-/// # Safety
-/// The rows hold at least `x + V::LANES + 2` values.
-#[inline(always)]
-unsafe fn across<T: SimdReal, V: Lanes<Scalar = T>>(s: &[T], d: &[T], c: &[T], x: usize, gain: f64) -> [V; 6] {
-    // SAFETY: the caller's promise; offsets go up to 2.
-    let ([sl, sm, sr], [dl, dm, dr], [cl, cm, cr]) = unsafe {
-        (
-            [load_at::<V>(s, x), load_at::<V>(s, x + 1), load_at::<V>(s, x + 2)],
-            [load_at::<V>(d, x), load_at::<V>(d, x + 1), load_at::<V>(d, x + 2)],
-            [load_at::<V>(c, x), load_at::<V>(c, x + 1), load_at::<V>(c, x + 2)],
-        )
-    };
-    let (sixth, third) = (V::constant(gain / 6.0), V::constant(gain / 3.0));
-    let outer = sl + sr;
-    let ixx = sm.neg_mul_add(V::constant(2.0), outer) * third;
-    let ix = (sr - sl) * sixth;
-    let iy = (dl + dr + dm) * sixth;
-    let ixy = (dr - dl) * V::constant(gain / 4.0);
-    let iyy = (cl + cr + cm) * third;
-    let i = (outer + sm).mul_add(V::constant(gain / 9.0), (ixx + iyy) * V::constant(-1.0 / 3.0));
+fn across<T: SimdReal, V: Lanes<Scalar = T>>(s: &[T], d: &[T], c: &[T], x: usize) -> [V; 6] {
+    let at = |row: &[T], k: usize| V::load(&row[x + k..]);
+    let (sixth, third) = (V::constant(1.0 / 6.0), V::constant(1.0 / 3.0));
+    let (left, mid, right) = (at(s, 0), at(s, 1), at(s, 2));
+    let outer = left + right;
+    let ixx = mid.neg_mul_add(V::constant(2.0), outer) * third;
+    let ix = (right - left) * sixth;
+    let (dl, dr) = (at(d, 0), at(d, 2));
+    let iy = (dl + dr + at(d, 1)) * sixth;
+    let ixy = (dr - dl) * V::constant(0.25);
+    let iyy = (at(c, 0) + at(c, 2) + at(c, 1)) * third;
+    let i = (outer + mid).mul_add(V::constant(1.0 / 9.0), (ixx + iyy) * V::constant(-1.0 / 3.0));
     [i, ix, iy, ixx, ixy, iyy]
 }

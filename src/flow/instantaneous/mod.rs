@@ -18,9 +18,9 @@ use super::site::{FieldBand, MaskCounts, bands};
 use crate::error::Result;
 use crate::jet::{JetRates, JetRows, JetStencil, Neighbourhood, TimeScheme};
 use crate::math::Real;
-use crate::simd::{Level, SimdReal, dispatch};
+use crate::simd::{SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, Rect, Sites, Status};
-use dense::{NARROW, RowKernel, Source, scratch_len};
+use dense::{RowKernel, Source, scratch_len};
 use noise::NoiseModel;
 use normal::{LaneRates, noise_square, solve_affine};
 pub(super) use point::rounding_floor;
@@ -107,9 +107,6 @@ impl Instantaneous {
     }
 }
 
-/// Sites whose trust is looked at together.
-const LOOK: usize = 32;
-
 /// How a grid is walked row by row.
 struct RowPlan<T> {
     region: Rect,
@@ -144,7 +141,6 @@ impl<T: SimdReal> Job<'_, T> {
         let from = region.x + first * stride;
         let computed = if first < last { from..region.x + (last - 1) * stride + 1 } else { 0..0 };
         let n = computed.len();
-        let level = if n < NARROW { Level::SCALAR } else { level };
         let mut scratch = vec![T::default(); scratch_len(source, w)];
         let mut trust = vec![T::default(); n];
         let mut spare = vec![T::default(); if *stride == 1 { 0 } else { 6 * n }];
@@ -184,19 +180,11 @@ impl<T: SimdReal> Job<'_, T> {
                 }
             }
             band.status[base + first..base + last].fill(Status::Ok);
-            for start in (first..last).step_by(LOOK) {
-                let end = (start + LOOK).min(last);
-                let looked_at = &trust[(start - first) * stride..=(end - 1 - first) * stride];
-                // Nearly always true, and then cheap: one comparison a lane.
-                if self.mask.is_none() && looked_at.iter().all(|t| *t > T::default()) {
-                    continue;
-                }
-                for k in start..end {
-                    let at = (region.x + k * stride, y);
-                    let trusted = trust[(k - first) * stride] > T::default();
-                    if !trusted || self.obstacle(at).is_some() {
-                        self.site(band, index + k, at);
-                    }
+            for k in first..last {
+                let at = (region.x + k * stride, y);
+                let trusted = trust[(k - first) * stride] > T::default();
+                if !trusted || (self.mask.is_some() && self.obstacle(at).is_some()) {
+                    self.site(band, index + k, at);
                 }
             }
         }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
 use crate::flow::instantaneous::InstantaneousOptions;
 use crate::flow::model::ModelKind;
-use crate::flow::windowed::WindowedOptions;
+use crate::flow::windowed::{RowSet, WindowedOptions};
 use crate::flow::{Common, Estimator, Method, RankPolicy};
 use crate::image::Preprocess;
 use crate::jet::{Neighbourhood, TimeScheme};
@@ -37,13 +37,16 @@ pub struct Arguments {
     pub fps: Option<f64>,
     pub frame_period: Option<f64>,
     pub pixel_pitch: Object,
-    pub covariance: bool,
+    pub covariance: Option<bool>,
     pub diagnostics: bool,
     pub noise: Option<f64>,
     pub precision: Option<String>,
     pub threads: Option<i64>,
     pub simd: Option<String>,
 }
+
+/// The time scheme of two frames.
+pub const PAIR: &str = "pair";
 
 /// Everything that a sequence of frames goes through.
 pub struct Plan {
@@ -84,8 +87,8 @@ impl Arguments {
 
     /// The core's options; errors name the arguments as Python knows them.
     pub fn plan(&self, py: Python<'_>) -> PyResult<Plan> {
-        let common = self.common(py)?;
         let method = self.method(py)?;
+        let common = self.common(py, !matches!(method, Method::HornSchunck(_)))?;
         let estimator = Estimator::new(method, common).map_err(|e| renamed(e, "sigma", "window_sigma"))?;
         Ok(Plan {
             estimator,
@@ -97,17 +100,17 @@ impl Arguments {
 
     /// Whether the method can make do with two frames.
     pub fn takes_pairs(&self) -> bool {
-        matches!(Method::parse(&self.method), Ok(Method::LucasKanade(_) | Method::HornSchunck(_)))
+        !matches!(Method::parse(&self.method), Ok(Method::Instantaneous(_)))
     }
 
-    fn common(&self, py: Python<'_>) -> PyResult<Common> {
+    fn common(&self, py: Python<'_>, has_covariance: bool) -> PyResult<Common> {
         let default = Common::default();
         Ok(Common {
             sites: options::sites(py, &self.points, self.region, self.stride)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
             frame_period: options::frame_period(self.fps, self.frame_period)?,
-            covariance: self.covariance,
+            covariance: self.covariance.unwrap_or(has_covariance),
             diagnostics: self.diagnostics,
             noise: self.noise,
             threads: options::threads(self.threads)?,
@@ -121,8 +124,8 @@ impl Arguments {
             options::neighbourhood(py, &self.neighbourhood, self.neighbourhood_sigma, default)
         };
         match &mut method {
-            Method::Instantaneous(o) => self.instantaneous(o, fit(&Neighbourhood::default())?)?,
-            Method::Windowed(o) => self.windowed(o, fit(&Neighbourhood::default())?)?,
+            Method::Instantaneous(o) => self.instantaneous(o, fit(&o.neighbourhood)?)?,
+            Method::Windowed(o) => self.windowed(o, fit(&o.neighbourhood)?)?,
             Method::LucasKanade(o) => self.lucas_kanade(o)?,
             Method::HornSchunck(o) => self.horn_schunck(o)?,
         }
@@ -138,15 +141,20 @@ impl Arguments {
         Ok(())
     }
 
-    fn windowed(&self, o: &mut WindowedOptions, _neighbourhood: Neighbourhood) -> Result<()> {
-        self.refuse(&["smoothness", "iterations", "rank_deficient"])?;
+    fn windowed(&self, o: &mut WindowedOptions, neighbourhood: Neighbourhood) -> Result<()> {
+        self.refuse(&["smoothness", "iterations"])?;
         self.expect_model("affine")?;
-        //D o.neighbourhood = neighbourhood;
-        o.scheme = self.scheme(o.scheme)?;
+        o.neighbourhood = neighbourhood;
+        if self.time_scheme.as_deref() == Some(PAIR) {
+            o.frames = 2;
+        } else {
+            o.scheme = self.scheme(o.scheme)?;
+        }
         o.sigma = self.window_sigma.unwrap_or(o.sigma);
-        //D o.rows = self.rows.as_deref().map_or(Ok(o.rows), RowSet::parse)?;
+        o.rows = self.rows.as_deref().map_or(Ok(o.rows), RowSet::parse)?;
+        o.rank_deficient = RankPolicy::parse(&self.rank_deficient)?;
         // Smoothing correlates the noise of neighbouring pixels; the covariance must know.
-        //D o.already_smoothed = self.smooth.filter(|&sigma| sigma > 0.0);
+        o.already_smoothed = self.smooth.filter(|&sigma| sigma > 0.0);
         Ok(())
     }
 

@@ -8,13 +8,13 @@ use super::field::{FlowField, Packed};
 use super::progress::Reporter;
 use crate::error::Error;
 use crate::types::{AnyFrame, Frame};
-use arguments::{Arguments, Plan};
+use arguments::{Arguments, PAIR, Plan};
 use memory::{AnyField, Memory, Ring};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::VecDeque;
 
-use super::options::Object;
+use super::options::{self, Object};
 
 impl AnyField {
     fn single(self) -> FlowField {
@@ -80,8 +80,8 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
 
 /// Flow, its Jacobian and their covariance, from two or three frames or from a stack.
 ///
-/// A list or tuple of exactly as many frames (H, W) as the method needs (three; two for a baseline with time_scheme="pair") gives one FlowField (H, W), more
-/// give a stack (T - 2, H, W); an array (T, H, W) always gives a stack. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
+/// A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well (every method but "instantaneous"); a longer list
+/// gives a stack (T - 2, H, W), and so does an array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
 /// gain does not change the flow. float64 is computed in float64, everything else in float32. Inputs are never modified.
 ///
 /// Parameters
@@ -93,8 +93,9 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
 ///     nearly noise-free images. The others are baselines.
 /// model : "affine", "translational" or "accelerating"
 ///     Motion model of "instantaneous".
-/// time_scheme : "central" (default), "backward" or, for baselines, "pair"
-///     How time derivatives are taken, and so to which frame the field belongs: the middle or the newest one.
+/// time_scheme : "central", "backward" or "pair"
+///     How time derivatives are taken, and so to which frame the field belongs: the middle one of three (default), the newest of three ("windowed" and
+///     "instantaneous" only), or the first of two (the default for two frames; not "instantaneous").
 /// neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
 ///     Pixels that the local quadratic is fitted to; default 3 x 3.
 /// neighbourhood_sigma : float, px
@@ -108,7 +109,7 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
 /// iterations : int
 ///     Most iterations of "horn_schunck".
 /// rank_deficient : "nan" or "min_norm"
-///     What "instantaneous" reports where the equations do not determine every unknown.
+///     What "windowed" and "instantaneous" report where the equations do not determine every unknown.
 /// smooth : float, px
 ///     Standard deviation of a Gaussian that smooths each frame first; default none.
 /// quantise : float, grey levels
@@ -128,7 +129,7 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
 /// pixel_pitch : float or (dx, dy), any length unit
 ///     Size of a pixel; flow then comes in that unit per frame.
 /// covariance : bool
-///     Whether to compute the covariance of the parameters.
+///     Whether to compute the covariance of the parameters; default yes, where the method has one (not "horn_schunck").
 /// diagnostics : bool
 ///     Whether to report residual, rank and condition number.
 /// noise : float, grey levels
@@ -152,7 +153,7 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
 #[pyo3(signature = (
     frames, *, method="windowed", model="affine", time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, window_sigma=None,
     rows=None, smoothness=None, iterations=None, rank_deficient="nan", smooth=None, quantise=None, colour=None, points=None, region=None,
-    stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=true, diagnostics=false, noise=None,
+    stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=None, diagnostics=false, noise=None,
     precision=None, threads=None, simd=None, progress=None
 ))]
 pub fn estimate(
@@ -177,7 +178,7 @@ pub fn estimate(
     fps: Option<f64>,
     frame_period: Option<f64>,
     pixel_pitch: Object,
-    covariance: bool,
+    covariance: Option<bool>,
     diagnostics: bool,
     noise: Option<f64>,
     precision: Option<String>,
@@ -217,7 +218,7 @@ pub fn estimate(
     let colour = arrays::ColourRule::parse(arguments.colour.as_deref())?;
     let frames = Frames::new(frames, colour)?;
     if !frames.is_array && frames.count == 2 && arguments.time_scheme.is_none() && arguments.takes_pairs() {
-        arguments.time_scheme = Some("pair".into());
+        arguments.time_scheme = Some(PAIR.into());
     }
     run(py, &frames, &arguments.plan(py)?, &Reporter::new(py, progress)?)
 }
@@ -225,7 +226,7 @@ pub fn estimate(
 /// Flow from a stream: frames are pushed one by one, memory stays bounded.
 ///
 /// The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-/// (two for baselines with time_scheme="pair"). Pickles in mid-stream.
+/// (two with time_scheme="pair"). Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowEstimator {
     arguments: Arguments,
@@ -239,7 +240,7 @@ impl FlowEstimator {
     #[pyo3(signature = (
         *, method="windowed", model="affine", time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, window_sigma=None,
         rows=None, smoothness=None, iterations=None, rank_deficient="nan", smooth=None, quantise=None, colour=None, points=None,
-        region=None, stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=true, diagnostics=false,
+        region=None, stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=None, diagnostics=false,
         noise=None, precision=None, threads=None, simd=None
     ))]
     fn new(
@@ -264,7 +265,7 @@ impl FlowEstimator {
         fps: Option<f64>,
         frame_period: Option<f64>,
         pixel_pitch: Object,
-        covariance: bool,
+        covariance: Option<bool>,
         diagnostics: bool,
         noise: Option<f64>,
         precision: Option<String>,
@@ -382,8 +383,7 @@ pub fn restore_estimator(py: Python<'_>, options: Arguments, memory: &Bound<'_, 
     let missing = || Error::argument("memory", "the entries frames, pushed and dtype", "fewer");
     let pushed: usize = memory.get_item("pushed")?.ok_or_else(missing)?.extract()?;
     let dtype: String = memory.get_item("dtype")?.ok_or_else(missing)?.extract()?;
-    let dtype =
-        ["uint8", "uint16", "float32", "float64"].into_iter().find(|known| *known == dtype).ok_or_else(missing)?;
+    let dtype = options::known_dtype(&dtype)?;
     let mut single: VecDeque<Frame<f32>> = VecDeque::new();
     let mut double: VecDeque<Frame<f64>> = VecDeque::new();
     for frame in frames.try_iter()? {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 pub use derived::quantities;
 pub use packed::Packed;
-pub use state::restore_field;
+pub use state::{restore_field, status_names};
 
 /// Both precisions.
 #[derive(Clone)]

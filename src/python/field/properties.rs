@@ -242,7 +242,7 @@ impl FlowField {
         Ok(arrays::owned(py, &shape, data.collect())?.into_any())
     }
 
-    /// Index of the frame the estimate belongs to, counted from 0; of the first one for a stack.
+    /// Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack.
     #[getter]
     fn frame_index(&self) -> usize {
         self.first_frame()
@@ -260,19 +260,19 @@ impl FlowField {
         self.layout().frame_period
     }
 
-    /// Physical size (dx, dy) of a pixel.
+    /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
     #[getter]
     fn pixel_pitch(&self) -> (f64, f64) {
         self.layout().pixel_pitch
     }
 
-    /// Name of the motion model.
+    /// Name of the motion model (no unit).
     #[getter]
     fn model(&self) -> &str {
         &self.layout().model
     }
 
-    /// Names of the model's parameters.
+    /// Names of the model's parameters; `unit(name)` tells their units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.layout().parameters)

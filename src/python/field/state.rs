@@ -118,3 +118,9 @@ fn plane<T: numpy::Element + Copy>(state: &Bound<'_, PyDict>, name: &str, length
     }
     Ok(Some(values))
 }
+
+/// Words of the status codes, by code.
+#[pyfunction(name = "_status_names")]
+pub fn status_names() -> Vec<&'static str> {
+    Status::ALL.iter().map(|status| status.name()).collect()
+}

@@ -1,0 +1,22 @@
+"""Pictures that several tests look at."""
+
+import numpy as np
+import pytest
+
+from jacoflow import scenes
+
+METHODS = ["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]
+
+
+def moving_texture(count=3, motion=(0.3, -0.2, 0.01, 0.02, -0.02, 0.01), width=48, height=40, seed=3):
+    """Smooth texture moving by the affine `motion` (u, v, u_x, v_x, u_y, v_y): float64 frames (count, H, W) in grey levels."""
+    names = ("u", "v", "u_x", "v_x", "u_y", "v_y")
+    return scenes.Scene("affine", width=width, height=height, seed=seed, **dict(zip(names, motion, strict=True))).frames(count)
+
+
+@pytest.fixture(scope="session")
+def texture():
+    """Three uint8 frames (3, 40, 48)."""
+    frames = np.clip(np.round(moving_texture()), 0, 255).astype(np.uint8)
+    frames.flags.writeable = False
+    return frames

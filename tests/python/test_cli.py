@@ -1,0 +1,46 @@
+"""The command line through Python: `python -m jacoflow` and the console script."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import jacoflow
+
+
+def run(*arguments, folder, command=(sys.executable, "-m", "jacoflow")):
+    return subprocess.run([*command, *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=120)
+
+
+def test_version_and_help(tmp_path):
+    assert run("--version", folder=tmp_path).stdout.split() == ["jacoflow", jacoflow.__version__]
+    help_text = run("--help", folder=tmp_path)
+    assert help_text.returncode == 0 and "flow" in help_text.stdout
+
+
+def test_console_script(tmp_path):
+    script = Path(sys.executable).parent / "jacoflow"
+    assert run("--version", folder=tmp_path, command=(script,)).stdout.split() == ["jacoflow", jacoflow.__version__]
+
+
+def test_wrong_usage_has_exit_code_2(tmp_path):
+    result = run("flow", "--no-such-option", folder=tmp_path)
+    assert result.returncode == 2 and "no-such-option" in result.stderr
+
+
+def test_missing_input_has_exit_code_1(tmp_path):
+    result = run("flow", "nowhere", "-o", "out", folder=tmp_path)
+    assert result.returncode == 1 and "nowhere" in result.stderr
+    assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
+
+
+def test_flow_equals_the_python_call(tmp_path):
+    frames = np.clip(np.round(jacoflow.scenes.Scene("affine", width=40, height=32).frames(3)), 0, 255).astype(np.uint8)
+    np.save(tmp_path / "frames.npy", frames)
+    result = run("flow", "frames.npy", "-o", "field.npz", "--json", folder=tmp_path)
+    assert result.returncode == 0, result.stderr
+    json.loads(result.stdout)
+    field = jacoflow.FlowField.load(tmp_path / "field.npz")
+    np.testing.assert_array_equal(field.flow, jacoflow.estimate(list(frames)).flow)

@@ -1,0 +1,98 @@
+"""What can be read is there, true and alike in the compiled module and its stub; examples in it run."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import pkgutil
+import re
+from pathlib import Path
+
+import pytest
+
+import jacoflow
+from jacoflow import _jacoflow
+
+PACKAGE = Path(jacoflow.__file__).parent
+MODULES = ["jacoflow", *(f"jacoflow.{module.name}" for module in pkgutil.iter_modules([str(PACKAGE)]))]
+SHAPES_OR_UNITS = re.compile(r"\((\.\.\.|H|N|T|B|n|m|2 n|6|12|count)\b|\(\.\.\.,|/frame|/s\b|\bpx\b|\bunits?\b|grey level|rad\b|frames", re.IGNORECASE)
+"""An array's shape or a number's unit, or the word that there is none."""
+NOTHING_TO_MEASURE = {"jacoflow.video.Video.close"}
+
+
+def public():
+    """(name, object) of everything public, members of classes included."""
+    for module_name in MODULES:
+        if module_name.rsplit(".", 1)[-1].startswith("_"):
+            continue
+        module = importlib.import_module(module_name)
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if name == "__version__" or inspect.ismodule(thing):
+                continue
+            yield f"{module_name}.{name}", thing
+            if inspect.isclass(thing) and thing.__module__.startswith("jacoflow") and not issubclass(thing, Exception):
+                for member, value in vars(thing).items():
+                    described = inspect.isroutine(value) or inspect.isdatadescriptor(value) or isinstance(value, property)
+                    if not member.startswith("_") and described:
+                        yield f"{module_name}.{name}.{member}", getattr(thing, member)
+
+
+@pytest.mark.parametrize(("name", "thing"), list(public()), ids=lambda value: value if isinstance(value, str) else "")
+def test_every_public_name_tells_shapes_or_units(name, thing):
+    if isinstance(thing, type) and issubclass(thing, BaseException):
+        assert thing.__doc__
+        return
+    text = inspect.getdoc(thing)
+    assert text, f"{name} has no docstring"
+    if name not in NOTHING_TO_MEASURE:
+        assert SHAPES_OR_UNITS.search(text), f"{name} tells neither shapes nor units: {text!r}"
+
+
+def stub_docstrings():
+    tree = ast.parse((PACKAGE / "_jacoflow.pyi").read_text())
+    for node in tree.body:
+        if not isinstance(node, ast.ClassDef | ast.FunctionDef):
+            continue
+        if not node.name.startswith("_"):
+            yield node.name, ast.get_docstring(node), getattr(_jacoflow, node.name).__doc__
+        if isinstance(node, ast.ClassDef):
+            for member in node.body:
+                setter = isinstance(member, ast.FunctionDef) and any(isinstance(d, ast.Attribute) for d in member.decorator_list)
+                if isinstance(member, ast.FunctionDef) and not member.name.startswith("__") and not setter:
+                    compiled = getattr(getattr(_jacoflow, node.name), member.name).__doc__
+                    yield f"{node.name}.{member.name}", ast.get_docstring(member), compiled
+
+
+@pytest.mark.parametrize(("name", "stub", "compiled"), list(stub_docstrings()))
+def test_stub_and_compiled_module_say_the_same(name, stub, compiled):
+    assert stub == inspect.cleandoc(compiled), name
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if name not in ("jacoflow.__main__", "jacoflow._jacoflow")])
+def test_examples_in_docstrings_run(name):
+    failures, _ = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+    assert failures == 0
+
+
+@pytest.mark.parametrize("name", ["README.md"])
+def test_python_in_the_readme_runs(name, tmp_path, monkeypatch):
+    """Every ```python block of the README, one after another in one namespace."""
+    path = Path(__file__).parents[2] / name
+    blocks = re.findall(r"^```python\n(.*?)^```", path.read_text(), re.DOTALL | re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    namespace: dict[str, object] = {}
+    for block in blocks:
+        if "# not run" not in block:
+            exec(compile(block, str(path), "exec"), namespace)
+
+
+def test_defaults_are_the_cores(tmp_path):
+    """What the signature promises as a default gives the same as leaving it to the core."""
+    frames = list(jacoflow.scenes.Scene("affine", width=32, height=32).frames(3))
+    plain = jacoflow.estimate(frames)
+    told = jacoflow.estimate(
+        frames, time_scheme="central", neighbourhood=(3, 3), window_sigma=4.0, colour="error", stride=1, precision="float64", pixel_pitch=1.0
+    )
+    assert (plain.flow == told.flow)[plain.valid].all()
+    assert pytest.approx(plain.covariance[16, 16]) == told.covariance[16, 16]

@@ -1,0 +1,222 @@
+"""Bad input: the right exception, and a message that names the argument."""
+
+import errno
+import pickle
+
+import numpy as np
+import pytest
+
+import jacoflow
+from jacoflow import FlowEstimator, FlowFilter, JacoflowError, scenes
+
+GOOD = np.zeros((3, 8, 10), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("frames", "error", "message"),
+    [
+        (GOOD[:2], ValueError, "frames: expected at least 3 frames, got 2 frames"),
+        (GOOD[:0], ValueError, "frames: expected at least 3 frames, got 0 frames"),
+        ([], ValueError, "frames: expected at least 3 frames, got 0 frames"),
+        (list(GOOD[:1]), ValueError, "frames: expected at least"),
+        (GOOD[0], ValueError, r"frames: expected a list of frames \(H, W\) or a stack \(T, H, W\), got an array of shape \[8, 10\]"),
+        (GOOD[:, :2], ValueError, "frames: expected at least 3 x 3 pixels, got 10 x 2"),
+        (GOOD[:, :, :1], ValueError, "frames: expected at least 3 x 3 pixels"),
+        (GOOD[:, :0], ValueError, "frames: expected at least 3 x 3 pixels"),
+        ([GOOD[0], GOOD[1], GOOD[2, :7]], ValueError, "frames: expected frames of one size"),
+        ([GOOD[0], GOOD[1], GOOD[2].astype(np.uint16)], TypeError, "frames: expected uint8 like the first frame, got uint16"),
+        (GOOD.astype(np.int32), TypeError, "frames: expected an array of uint8, uint16, float32 or float64, got int32"),
+        (GOOD.astype(bool), TypeError, "frames: .* got bool"),
+        (GOOD.astype(complex), TypeError, "frames: .* got complex128"),
+        (GOOD.astype(">u2"), TypeError, "frames: .* got >u2"),
+        (GOOD.astype(np.float16), TypeError, "frames: .* got float16"),
+        (GOOD.astype(object), TypeError, "frames: .* got object"),
+        (np.zeros((3, 8, 10, 3), np.uint8), ValueError, 'frames: .*colour="luminance"'),
+        (np.zeros((8, 10, 3), np.uint8), ValueError, "frames: .*looks like one colour image"),
+        ([np.zeros((8, 10, 3), np.uint8)] * 3, ValueError, r'frames: .*colour="luminance" or convert it with jacoflow.luminance'),
+        ([np.zeros((8, 10, 2), np.uint8)] * 3, ValueError, r"frames: expected a frame \(H, W\), got shape \[8, 10, 2\]"),
+        (np.ma.masked_array(GOOD, GOOD == 1), TypeError, "frames: expected a plain array, got a masked one"),
+        ("frames", TypeError, "frames|array"),
+        (None, TypeError, "frames|array|object"),
+    ],
+)
+@pytest.mark.parametrize("method", ["windowed", "instantaneous"])
+def test_frames_that_cannot_be_used(frames, error, message, method):
+    if error is TypeError and isinstance(frames, str | None):
+        error = (TypeError, ValueError)
+    with pytest.raises(error, match=message):
+        jacoflow.estimate(frames, method=method)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"method": "magic"}, ValueError, "method: "),
+        ({"method": 3}, TypeError, "method"),
+        ({"model": "cubic", "method": "instantaneous"}, ValueError, "model: "),
+        ({"model": "translational"}, ValueError, 'model: expected "affine" for method "windowed"'),
+        ({"time_scheme": "later"}, ValueError, "time_scheme: "),
+        ({"neighbourhood": (2, 3)}, ValueError, "neighbourhood: "),
+        ({"neighbourhood": (0, 3)}, ValueError, "neighbourhood: expected a positive integer"),
+        ({"neighbourhood": [[0, 0], [1, 0], [0, 1]], "method": "instantaneous"}, ValueError, "neighbourhood: "),
+        ({"neighbourhood": "big"}, ValueError, "neighbourhood: "),
+        ({"neighbourhood_sigma": -1.0}, ValueError, "neighbourhood: "),
+        ({"window_sigma": 0.0}, ValueError, "window_sigma: "),
+        ({"window_sigma": 3.0, "method": "instantaneous"}, ValueError, "window_sigma: expected nothing for method"),
+        ({"rows": "some"}, ValueError, "rows: "),
+        ({"rows": "all", "method": "lucas_kanade"}, ValueError, "rows: expected nothing for method"),
+        ({"rank_deficient": "guess"}, ValueError, "rank_deficient: "),
+        ({"smooth": -1.0}, ValueError, "smooth: "),
+        ({"smooth": float("nan")}, ValueError, "smooth: "),
+        ({"quantise": 0.0}, ValueError, "quantise: "),
+        ({"colour": "green"}, ValueError, "colour: "),
+        ({"points": [[1, 2, 3]]}, ValueError, r"points: expected shape \(N, 2\)"),
+        ({"points": [[1.5, 2.0]]}, TypeError, "points: expected integers, got float64"),
+        ({"points": [[-1, 2]]}, ValueError, r"points: .*got \(-1, 2\)"),
+        ({"points": [[10, 2]]}, ValueError, r"points: .*got \(10, 2\)"),
+        ({"points": [[1, 2]], "stride": 2}, ValueError, "points: expected points without stride"),
+        ({"region": (0, 0, 11, 2)}, ValueError, "region: "),
+        ({"region": (-1, 0, 4, 4)}, ValueError, "region: "),
+        ({"region": (0, 0)}, (TypeError, ValueError), "region"),
+        ({"stride": 0}, ValueError, "stride: expected a positive integer, got 0"),
+        ({"stride": -2}, ValueError, "stride: expected a positive integer, got -2"),
+        ({"stride": 1.5}, TypeError, "stride"),
+        ({"mask": np.ones((8, 9), bool)}, ValueError, "mask: "),
+        ({"mask": np.ones((8, 10), np.uint8)}, TypeError, "mask: expected a boolean array"),
+        ({"mask": np.ones(8, bool)}, ValueError, r"mask: expected shape \(H, W\)"),
+        ({"fps": 0.0}, ValueError, "fps: "),
+        ({"fps": 25.0, "frame_period": 0.04}, ValueError, "fps: expected fps or frame_period, got both"),
+        ({"frame_period": -1.0}, ValueError, "frame_period: "),
+        ({"pixel_pitch": 0.0}, ValueError, "pixel_pitch: "),
+        ({"pixel_pitch": "mm"}, TypeError, "pixel_pitch: "),
+        ({"noise": -1.0}, ValueError, "noise: "),
+        ({"precision": "float16"}, ValueError, "precision: "),
+        ({"threads": 0}, ValueError, "threads: expected a positive integer, got 0"),
+        ({"threads": -1}, ValueError, "threads: "),
+        ({"simd": "mmx"}, ValueError, "simd: "),
+        ({"iterations": 0, "method": "horn_schunck"}, ValueError, "iterations: "),
+        ({"smoothness": -1.0, "method": "horn_schunck"}, ValueError, "smoothness: "),
+        ({"unknown": 1}, TypeError, "unknown"),
+    ],
+)
+def test_options_that_cannot_be_used(options, error, message):
+    with pytest.raises(error, match=message):
+        jacoflow.estimate(GOOD, **options)
+
+
+@pytest.mark.parametrize("progress", ["yes", 3])
+def test_progress_of_a_wrong_kind(progress):
+    with pytest.raises(TypeError, match="progress: expected None, True or a function"):
+        jacoflow.estimate(GOOD, progress=progress)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"profile": "best"}, ValueError, "profile: "),
+        ({"form": "square"}, ValueError, "form: "),
+        ({"transition": "euler"}, ValueError, "transition: "),
+        ({"Q": [1.0, 2.0]}, ValueError, r"Q: expected twelve numbers, shape \(12,\), got shape \[2\]"),
+        ({"Q": [-1.0] * 12}, ValueError, "Q: "),
+        ({"Q": ["a"] * 12}, TypeError, "Q: expected real numbers"),
+        ({"R": 0.0}, ValueError, "R: "),
+        ({"x0": [np.nan] * 12}, ValueError, "x0: "),
+        ({"P0": [0.0] * 12}, ValueError, "P0: "),
+        ({"alpha": 0.0}, ValueError, "alpha: "),
+        ({"full_scale": 0.0}, ValueError, "full_scale: "),
+        ({"mask": np.ones((3, 3), bool)}, ValueError, "mask: "),
+    ],
+)
+def test_filter_options_that_cannot_be_used(options, error, message):
+    with pytest.raises(error, match=message):
+        FlowFilter(**options).push(GOOD[0])
+
+
+@pytest.mark.parametrize("make", [FlowEstimator, FlowFilter])
+def test_a_stream_refuses_a_frame_unlike_the_first_and_goes_on(make):
+    frames = scenes.Scene("affine", width=32, height=24).frames(4)
+    stream, reference = make(), make()
+    for frame in frames[:2]:
+        stream.push(frame)
+        reference.push(frame)
+    for bad, error in (
+        (frames[2][:20], ValueError),
+        (frames[2].astype(np.float32), TypeError),
+        (frames[2].astype(int), TypeError),
+        (frames, ValueError),
+    ):
+        with pytest.raises(error, match="frame"):
+            stream.push(bad)
+    for frame in frames[2:]:
+        np.testing.assert_array_equal(stream.push(frame).flow, reference.push(frame).flow)
+
+
+def test_small_and_odd_frames_of_a_stream():
+    with pytest.raises(ValueError, match="3 x 3"):
+        estimator = FlowEstimator()
+        for _ in range(3):
+            estimator.push(np.zeros((2, 9)))
+    with pytest.raises(ValueError, match="frame"):
+        FlowFilter().push(np.zeros((2, 9)))
+
+
+def test_flat_frames_are_no_error():
+    for method in ("windowed", "instantaneous", "lucas_kanade", "horn_schunck"):
+        field = jacoflow.estimate([np.full((48, 48), 7, np.uint8)] * 3, method=method)
+        if method != "horn_schunck":
+            assert not field.valid.any() and np.isnan(field.flow).all()
+            assert (field.status[20:-20, 20:-20] == jacoflow.Status.UNOBSERVABLE).all()
+
+
+def test_sixteen_bit_extremes_do_not_overflow():
+    frames = np.clip(scenes.Scene("affine", width=48, height=48).frames(3) / 255, 0, 1)
+    wide = np.round(frames * 65535).astype(np.uint16)
+    assert wide.max() > 60000
+    narrow = jacoflow.estimate(list(frames))
+    full = jacoflow.estimate(list(wide))
+    np.testing.assert_allclose(full.flow[10:-10, 10:-10], narrow.flow[10:-10, 10:-10], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "code"),
+    [
+        (lambda path: jacoflow.FlowField.load(path / "none.npz"), FileNotFoundError, errno.ENOENT),
+        (lambda path: jacoflow.FlowField.load(path / "none.flo"), FileNotFoundError, errno.ENOENT),
+        (lambda path: jacoflow.io.frames(path / "none"), FileNotFoundError, errno.ENOENT),
+        (lambda path: jacoflow.io.write_flo(path / "no" / "x.flo", np.zeros((3, 3, 2))), FileNotFoundError, errno.ENOENT),
+    ],
+)
+def test_files_that_are_not_there(call, kind, code, tmp_path):
+    with pytest.raises(kind) as caught:
+        call(tmp_path)
+    assert caught.value.errno == code
+    assert str(tmp_path) in str(caught.value.filename)
+
+
+def test_damaged_files_are_format_errors(tmp_path):
+    for name in ("x.npz", "x.flo", "x.png", "x.pfm"):
+        path = tmp_path / name
+        path.write_bytes(b"not what the name says")
+        with pytest.raises(jacoflow.FormatError, match=name):
+            jacoflow.FlowField.load(path)
+    with pytest.raises(ValueError, match="path: expected one of the extensions"):
+        jacoflow.FlowField.load(tmp_path / "x.doc")
+
+
+def test_exceptions_have_one_base_and_pickle():
+    for kind in (jacoflow.FormatError, jacoflow.NotObservableError, jacoflow.NumericalError, jacoflow.MissingDependencyError):
+        assert issubclass(kind, JacoflowError) and kind.__module__ == "jacoflow"
+        copy = pickle.loads(pickle.dumps(kind("why")))
+        assert type(copy) is kind and copy.args == ("why",)
+
+
+@pytest.mark.parametrize("what", ["nothing", "disc disc"])
+def test_unknown_scenes_are_listed(what):
+    with pytest.raises(ValueError, match="scene: expected one of ramp"):
+        scenes.Scene(what)
+    with pytest.raises(ValueError, match="parameter: expected one of"):
+        scenes.Scene("affine", wind=1.0)
+    with pytest.raises(ValueError, match="noise: "):
+        scenes.Sensor(noise=-1.0)
+    with pytest.raises(ValueError, match="rounding: "):
+        scenes.Sensor(rounding="up")

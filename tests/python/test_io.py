@@ -1,0 +1,97 @@
+"""Frames and flow in and out of files."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import jacoflow
+from jacoflow import io
+
+
+@pytest.fixture
+def frames():
+    return np.random.default_rng(1).integers(0, 256, (5, 12, 16)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("name", ["stack.npy", "clip.y4m", "folder"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_frames_round_trip(frames, name, dtype, tmp_path):
+    frames = frames.astype(dtype) * (257 if dtype == np.uint16 else 1)
+    path = tmp_path / name
+    assert io.write_frames(path, frames, frame_rate=50.0) == 5
+    reader = io.frames(path)
+    back = list(reader)
+    assert all(frame.dtype == dtype for frame in back)
+    assert_array_equal(back, frames)
+    if name.endswith("y4m"):
+        assert reader.frame_rate == 50.0
+
+
+def test_any_dtype_goes_into_a_stack(frames, tmp_path):
+    for dtype in (np.float32, np.float64):
+        io.write_frames(tmp_path / "stack.npy", (frame.astype(dtype) for frame in frames))
+        assert_array_equal(np.load(tmp_path / "stack.npy"), frames.astype(dtype))
+    with pytest.raises((ValueError, TypeError), match="frame"):
+        io.write_frames(tmp_path / "clip.y4m", frames.astype(np.float32))
+    assert not (tmp_path / "clip.y4m").exists()
+
+
+def test_parts_of_a_source(frames, tmp_path):
+    io.write_frames(tmp_path / "stack.npy", frames)
+    assert_array_equal(list(io.frames(tmp_path / "stack.npy", first=1, step=2)), frames[1::2])
+    assert_array_equal(list(io.frames(tmp_path / "stack.npy", limit=2)), frames[:2])
+    for option in ({"first": -1}, {"step": 0}, {"limit": -1}):
+        with pytest.raises(ValueError, match=next(iter(option))):
+            io.frames(tmp_path / "stack.npy", **option)
+
+
+def test_readers_pickle_where_they_stand(frames, tmp_path):
+    io.write_frames(tmp_path / "folder", frames)
+    reader = io.frames(tmp_path / "folder", limit=4)
+    next(reader)
+    other = pickle.loads(pickle.dumps(reader))
+    assert_array_equal(list(other), frames[1:4])
+    assert_array_equal(list(reader), frames[1:4])
+
+
+def test_a_source_feeds_an_estimator(tmp_path):
+    frames = np.clip(np.round(jacoflow.scenes.Scene("affine", width=32, height=32).frames(4)), 0, 255).astype(np.uint8)
+    io.write_frames(tmp_path / "folder", frames)
+    estimator = jacoflow.FlowEstimator()
+    streamed = [estimator.push(frame) for frame in io.frames(tmp_path / "folder")]
+    assert_array_equal(streamed[-1].flow, jacoflow.estimate(frames)[1].flow)
+
+
+def test_an_error_in_the_middle_leaves_no_file(frames, tmp_path):
+    def broken():
+        yield frames[0]
+        raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        io.write_frames(tmp_path / "stack.npy", broken())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("write", "read", "name"), [(io.write_flo, io.read_flo, "x.flo"), (io.write_kitti, io.read_kitti, "x.png")])
+def test_flow_round_trip(write, read, name, tmp_path):
+    flow = np.random.default_rng(2).normal(0, 5, (7, 9, 2)).astype(np.float32)
+    flow[2, 3] = np.nan
+    write(tmp_path / name, flow)
+    np.testing.assert_allclose(read(tmp_path / name), flow, atol=1 / 128 + 1e-6)
+    with pytest.raises(ValueError, match="flow: expected shape"):
+        write(tmp_path / name, flow[..., 0])
+
+
+@pytest.mark.parametrize("shape", [(4, 6), (4, 6, 3)])
+def test_float_maps_round_trip(shape, tmp_path):
+    values = np.random.default_rng(3).normal(size=shape).astype(np.float32)
+    io.write_pfm(tmp_path / "x.pfm", values)
+    assert_array_equal(io.read_pfm(tmp_path / "x.pfm"), values)
+
+
+def test_images(frames, tmp_path):
+    io.write_frames(tmp_path / "folder", frames[:1])
+    (path,) = (tmp_path / "folder").iterdir()
+    assert_array_equal(io.read_image(path), frames[0])

@@ -1,0 +1,219 @@
+"""Streams: the same as batches, resumed from pickles and files, told about and stopped."""
+
+import os
+import pickle
+import signal
+import threading
+
+import numpy as np
+import pytest
+from conftest import METHODS
+from numpy.testing import assert_array_equal
+
+import jacoflow
+from jacoflow import FlowEstimator, FlowFilter, scenes
+
+FORMS = ["augmented", "non_augmented", "fast", "extended"]
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return scenes.Scene("affine", width=40, height=32, seed=5).frames(6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_stream_equals_batch(frames, method):
+    batch = jacoflow.estimate(frames, method=method)
+    estimator = FlowEstimator(method=method)
+    assert estimator.frames_needed == 3
+    stream = [estimator.push(frame) for frame in frames]
+    assert stream[:2] == [None, None] and estimator.frames_pushed == 6
+    assert len(batch) == 4
+    for one, other in zip(batch, stream[2:], strict=True):
+        assert_array_equal(one.flow, other.flow)
+        assert_array_equal(one.covariance, other.covariance)
+        assert_array_equal(one.status, other.status)
+        assert one.frame_index == other.frame_index
+
+
+def test_lists_and_arrays(frames):
+    assert jacoflow.estimate(list(frames[:3])).shape == (32, 40)
+    assert jacoflow.estimate(tuple(frames[:3])).shape == (32, 40)
+    assert jacoflow.estimate(frames[:3]).shape == (1, 32, 40)
+    assert jacoflow.estimate(list(frames)).shape == (4, 32, 40)
+    assert jacoflow.estimate(list(frames[:2]), method="lucas_kanade").shape == (32, 40)
+    pair = jacoflow.estimate(list(frames[:2]))
+    assert pair.shape == (32, 40) and pair.frame_index == 0
+    with pytest.raises(ValueError, match="at least 3 frames"):
+        jacoflow.estimate(list(frames[:2]), method="instantaneous")
+
+
+def test_backward_fields_belong_to_the_newest_frame(frames):
+    field = jacoflow.estimate(frames, time_scheme="backward")
+    assert [each.frame_index for each in field] == [2, 3, 4, 5]
+
+
+def test_preparation_is_done_on_the_way(frames):
+    prepared = np.stack([jacoflow.smooth(jacoflow.quantise(frame), 1.5) for frame in frames])
+    one = jacoflow.estimate(frames, method="lucas_kanade", quantise=1.0, smooth=1.5)
+    other = jacoflow.estimate(prepared, method="lucas_kanade")
+    assert_array_equal(one.flow, other.flow)
+
+
+def test_colour_is_luminance_on_request(frames):
+    grey = np.clip(np.round(frames), 0, 255).astype(np.uint8)
+    colour = np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
+    expected = jacoflow.estimate(grey)
+    assert_array_equal(jacoflow.estimate(colour, colour="luminance").flow, expected.flow)
+    listed = jacoflow.estimate([frame[..., :3] for frame in colour], colour="luminance")
+    assert_array_equal(listed.flow, expected.flow)
+    estimator = FlowEstimator(colour="luminance")
+    assert_array_equal([estimator.push(frame) for frame in colour][2].flow, expected[0].flow)
+    assert jacoflow.luminance(colour[0]).dtype == np.uint8
+
+
+def test_reset_begins_anew(frames):
+    estimator = FlowEstimator()
+    for frame in frames[:3]:
+        estimator.push(frame)
+    estimator.reset()
+    assert estimator.frames_pushed == 0 and estimator.push(frames[0][:20, :20]) is None
+    flow_filter = FlowFilter()
+    flow_filter.push(frames[0])
+    flow_filter.reset()
+    assert flow_filter.state is None and flow_filter.push(frames[0][:20, :20]).frame_index == 0
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
+def test_estimator_pickles_in_mid_stream(frames, dtype):
+    frames = np.clip(np.round(frames), 0, 255).astype(dtype)
+    mask = np.ones((32, 40), bool)
+    one = FlowEstimator(points=np.array([[4, 5], [20, 11]]), mask=mask, smooth=1.0, fps=50.0, diagnostics=True)
+    for frame in frames[:4]:
+        one.push(frame)
+    mask[:] = False
+    other = pickle.loads(pickle.dumps(one))
+    assert other.options.keys() == one.options.keys() and other.frames_pushed == 4
+    for frame in frames[4:]:
+        a, b = one.push(frame), other.push(frame)
+        assert_array_equal(a.flow, b.flow)
+        assert_array_equal(a.covariance, b.covariance)
+        assert a.frame_index == b.frame_index
+        assert a.valid.any()
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_filter_resumes_bit_for_bit(frames, form, precision, tmp_path):
+    options = {"form": form, "precision": precision, "R": 0.25, "neighbourhood": (5, 5), "stride": 3, "transition": "exact"}
+    one = FlowFilter(**options)
+    for frame in frames[:3]:
+        one.push(frame)
+    pickled = pickle.loads(pickle.dumps(one))
+    one.save(tmp_path / "state.npz")
+    loaded = FlowFilter(**options, threads=1)
+    loaded.load(tmp_path / "state.npz")
+    for frame in frames[3:]:
+        expected = one.push(frame)
+        for other in (pickled, loaded):
+            field = other.push(frame)
+            assert_array_equal(field.flow, expected.flow)
+            assert_array_equal(field.covariance, expected.covariance)
+            assert field.frame_index == expected.frame_index
+    assert_array_equal(pickled.state, one.state)
+    assert_array_equal(pickled.state_covariance, one.state_covariance)
+    assert pickled.repairs == one.repairs
+
+
+def test_a_saved_filter_is_taken_up_only_where_it_fits(frames, tmp_path):
+    one = FlowFilter()
+    with pytest.raises(ValueError, match="has seen a frame"):
+        one.save(tmp_path / "early.npz")
+    one.push(np.clip(frames[0], 0, 255).astype(np.uint8))
+    one.save(tmp_path / "state.npz")
+    with pytest.raises(ValueError, match="same options"):
+        FlowFilter(R=0.5).load(tmp_path / "state.npz")
+    other = FlowFilter()
+    other.load(tmp_path / "state.npz")
+    with pytest.raises(ValueError, match="full scale"):
+        other.push(frames[1].astype(np.uint16))
+    (tmp_path / "bad.npz").write_bytes(b"PK nothing")
+    with pytest.raises(jacoflow.FormatError, match="bad.npz"):
+        other.load(tmp_path / "bad.npz")
+    with pytest.raises(FileNotFoundError):
+        other.load(tmp_path / "none.npz")
+
+
+def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):
+    narrow = np.clip(np.round(frames), 0, 255).astype(np.uint8)
+    fields = []
+    for sequence, options in (
+        (narrow, {}),
+        (narrow.astype(np.uint16) * 257, {}),
+        (narrow.astype(np.float32), {}),
+        (narrow.astype(np.float32) / 255, {"full_scale": 1.0}),
+    ):
+        flow_filter = FlowFilter(profile="measured", precision="float64", **options)
+        fields.append([flow_filter.push(frame) for frame in sequence][-1])
+    for field in fields[1:]:
+        np.testing.assert_allclose(field.flow, fields[0].flow, rtol=1e-3, atol=1e-4)
+
+
+def test_progress_is_told(frames, capsys):
+    told = []
+    jacoflow.estimate(frames, progress=lambda done, total: told.append((done, total)))
+    assert told == [(k, 6) for k in range(1, 7)]
+    jacoflow.estimate(frames, progress=True)
+    assert "6/6 frames\n" in capsys.readouterr().err
+    jacoflow.estimate(frames, progress=False)
+    assert capsys.readouterr().err == ""
+
+
+def test_an_exception_in_progress_stops_the_work(frames):
+    def stop(done, total):
+        if done == 2:
+            raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        jacoflow.estimate(frames, progress=stop)
+
+
+def test_control_c_stops_the_work(frames):
+    done = []
+
+    def press(count, total):
+        done.append(count)
+        if count == 4:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        jacoflow.estimate(np.tile(frames, (50, 1, 1)), progress=press)
+    assert 4 <= done[-1] < 10
+
+
+def test_the_interpreter_goes_on_meanwhile():
+    """While the core works, Python threads run: a counter moves during one call."""
+    frames = list(scenes.Scene("affine", width=320, height=240).frames(3))
+    counter, running = [0], threading.Event()
+    running.set()
+
+    def count():
+        while running.is_set():
+            counter[0] += 1
+
+    seen = []
+    thread = threading.Thread(target=count)
+    thread.start()
+    try:
+        estimator = FlowEstimator()
+        for frame in frames[:2]:
+            estimator.push(frame)
+        for _ in range(2):
+            before = counter[0]
+            estimator.push(frames[2])
+            seen.append(counter[0] - before)
+    finally:
+        running.clear()
+        thread.join()
+    # With the lock held the other thread could get in at most at the call's two ends.
+    assert max(seen) > 100

@@ -1,0 +1,82 @@
+"""Uses of the public interface that are type-checked (mypy --strict) and run."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, assert_type
+
+import numpy as np
+from numpy.typing import NDArray
+
+import jacoflow
+from jacoflow import FlowEstimator, FlowField, FlowFilter, Status, filters, io, scenes
+
+
+def frames() -> NDArray[np.float64]:
+    return scenes.Scene("affine", width=32, height=24, u=0.2).frames(4)
+
+
+def test_estimate() -> None:
+    stack = frames()
+    field = jacoflow.estimate(list(stack[:3]), method="windowed", fps=25.0, region=(2, 2, 20, 20), stride=2)
+    assert_type(field, FlowField)
+    assert_type(field.frame_index, int)
+    assert_type(field.status, NDArray[np.uint8])
+    assert_type(field.divergence, NDArray[np.float64])
+    assert_type(field.rpm, NDArray[np.float64])
+    assert_type(field.region_mean("curl"), tuple[float, float, int])
+    assert_type(field[0] if field.shape[0] < 0 else field, FlowField)
+    covariance = field.covariance
+    assert covariance is not None and covariance.shape[-2:] == (6, 6)
+    assert Status(int(field.status[5, 5])) is Status.OK
+    points = jacoflow.estimate(stack, points=[(3, 4), (5, 6)], neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)])
+    assert points.shape == (2, 2)
+
+
+def test_streams(tmp_path: Path) -> None:
+    estimator = FlowEstimator(method="lucas_kanade", window_sigma=3.0)
+    results = [estimator.push(frame) for frame in frames()]
+    assert_type(results, list[FlowField | None])
+    flow_filter = FlowFilter(profile="measured", Q=np.full(12, 1e-4), form="fast")
+    fields = [flow_filter.push(frame) for frame in frames()]
+    assert_type(fields, list[FlowField])
+    assert_type(flow_filter.repairs, int)
+    state = flow_filter.state
+    assert state is not None and state.shape == (24, 32, 12)
+    fields[-1].save(tmp_path / "field.npz")
+    assert_type(FlowField.load(tmp_path / "field.npz"), FlowField)
+
+
+def test_frames_and_files(tmp_path: Path) -> None:
+    assert_type(io.write_frames(tmp_path / "a.npy", frames()), int)
+    reader = io.frames(tmp_path / "a.npy")
+    iterator: Iterator[NDArray[Any]] = iter(reader)
+    assert sum(1 for _ in iterator) == 4
+    io.write_flo(str(tmp_path / "a.flo"), np.zeros((3, 4, 2)))
+    assert_type(io.read_flo(tmp_path / "a.flo"), NDArray[np.float32])
+
+
+def test_filters() -> None:
+    def fx(points: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+        return points * (1 - dt)
+
+    def hx(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return points[..., :1]
+
+    ukf = filters.UnscentedKalmanFilter(2, 1, 0.1, hx, fx, filters.MerweScaledSigmaPoints(2), batch=3)
+    ukf.x = np.ones((3, 2))
+    ukf.P *= 2
+    ukf.R = 0.5
+    ukf.predict()
+    ukf.update(np.zeros((3, 1)))
+    assert_type(ukf.x, NDArray[np.float64])
+
+
+def test_observability() -> None:
+    found = jacoflow.observability(frames()[:3])
+    assert_type(found.observable, NDArray[np.bool_])
+    assert found.rank.max() == 6
+
+
+def test_names() -> None:
+    assert_type(jacoflow.quantities(), dict[str, tuple[str, str]])
+    assert_type(scenes.parameters("affine")["u"], tuple[float | None, str])
