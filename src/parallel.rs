@@ -105,7 +105,9 @@ mod tests {
                 for_each_band(&mut buffer, 5, |band, rows, slice| {
                     assert_eq!(rows.start, band * BAND_ROWS);
                     assert_eq!(slice.len(), rows.len() * 5);
-                    slice.iter_mut().for_each(|v| *v += 1);
+                    for value in slice {
+                        *value += 1;
+                    }
                 });
             });
             assert!(buffer.iter().all(|&v| v == 1));

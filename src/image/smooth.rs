@@ -85,9 +85,9 @@ impl GaussianSmoother {
     pub fn apply_at<T: SimdReal>(&self, level: Level, frame: &Frame<T>) -> Frame<T> {
         let (width, height) = frame.size();
         let mut out = Frame::filled(width, height, T::from_f64(0.0));
-        if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+        if let (Some(frame), Some(out)) = (same::<_, Frame<f32>>(frame), same_mut(&mut out)) {
             self.apply_single(level, frame, out);
-        } else if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+        } else if let (Some(frame), Some(out)) = (same::<_, Frame<f64>>(frame), same_mut(&mut out)) {
             self.apply_double(level, frame, out);
         }
         out

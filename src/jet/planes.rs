@@ -73,9 +73,9 @@ impl JetStencil {
     /// As [`JetStencil::planes`], at a given instruction set.
     pub fn planes_with<T: SimdReal>(&self, frame: &Frame<T>, threads: Threads, level: Level) -> JetPlanes<T> {
         let mut out = JetPlanes::empty(frame.size());
-        if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+        if let (Some(frame), Some(out)) = (same::<_, Frame<f32>>(frame), same_mut(&mut out)) {
             self.planes_single(frame, threads, level, out);
-        } else if let (Some(frame), Some(out)) = (same(frame), same_mut(&mut out)) {
+        } else if let (Some(frame), Some(out)) = (same::<_, Frame<f64>>(frame), same_mut(&mut out)) {
             self.planes_double(frame, threads, level, out);
         }
         out

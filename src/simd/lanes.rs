@@ -29,8 +29,6 @@ pub(crate) trait Lanes:
     fn neg_mul_add(self, factor: Self, term: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
-    /// Absolute value.
-    fn abs(self) -> Self;
     /// The smaller of two (the second where the first is NaN).
     fn min(self, other: Self) -> Self;
     /// The larger of two (the second where the first is NaN).
@@ -90,10 +88,6 @@ macro_rules! scalar_lanes {
             #[inline(always)]
             fn sqrt(self) -> $t {
                 <$t>::sqrt(self)
-            }
-            #[inline(always)]
-            fn abs(self) -> $t {
-                <$t>::abs(self)
             }
             #[inline(always)]
             fn min(self, other: $t) -> $t {

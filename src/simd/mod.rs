@@ -147,7 +147,8 @@ mod tests {
             let a = V::splat(self.0);
             for (x, y) in self.1.chunks_exact(V::LANES).zip(self.2.chunks_exact_mut(V::LANES)) {
                 let (vx, vy) = (V::load(x), V::load(y));
-                let value = vx.mul_add(a, vy).abs().sqrt() / (V::splat(T::from_f64(1.0)) + vx * vx);
+                let sum = vx.mul_add(a, vy);
+                let value = sum.max(-sum).sqrt() / (V::splat(T::from_f64(1.0)) + vx * vx);
                 V::select(V::splat(T::from_f64(0.0)).lt(vx), value, -vx).store(y);
             }
             V::LANES

@@ -15,7 +15,7 @@ macro_rules! lanes {
         $name:ident, $vector:ty, $scalar:ty, $count:literal, $mask:ty,
         $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident, $div:ident,
         $fmadd:ident, $fnmadd:ident, $sqrt:ident, $min:ident, $max:ident,
-        |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr, |$x:ident| $abs:expr
+        |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr
     ) => {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($vector);
@@ -97,12 +97,6 @@ macro_rules! lanes {
                 Self(unsafe { $sqrt(self.0) })
             }
             #[inline(always)]
-            fn abs(self) -> Self {
-                let $x = self.0;
-                // SAFETY: see the module's note.
-                Self(unsafe { $abs })
-            }
-            #[inline(always)]
             fn min(self, other: Self) -> Self {
                 // SAFETY: see the module's note.
                 Self(unsafe { $min(self.0, other.0) })
@@ -147,8 +141,7 @@ lanes!(
     _mm256_min_ps,
     _mm256_max_ps,
     |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm256_blendv_ps(n, y, m),
-    |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x)
+    |m, y, n| _mm256_blendv_ps(n, y, m)
 );
 lanes!(
     F64x4,
@@ -169,8 +162,7 @@ lanes!(
     _mm256_min_pd,
     _mm256_max_pd,
     |a, b| _mm256_cmp_pd::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm256_blendv_pd(n, y, m),
-    |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x)
+    |m, y, n| _mm256_blendv_pd(n, y, m)
 );
 lanes!(
     F32x16,
@@ -191,8 +183,7 @@ lanes!(
     _mm512_min_ps,
     _mm512_max_ps,
     |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm512_mask_blend_ps(m, n, y),
-    |x| _mm512_abs_ps(x)
+    |m, y, n| _mm512_mask_blend_ps(m, n, y)
 );
 lanes!(
     F64x8,
@@ -213,6 +204,5 @@ lanes!(
     _mm512_min_pd,
     _mm512_max_pd,
     |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm512_mask_blend_pd(m, n, y),
-    |x| _mm512_abs_pd(x)
+    |m, y, n| _mm512_mask_blend_pd(m, n, y)
 );
