@@ -32,7 +32,7 @@ pub struct Estimator {
 #[derive(Debug)]
 enum Engine {
     Instantaneous(Box<Instantaneous>),
-    Windowed(Windowed),
+    Windowed(Box<Windowed>),
     LucasKanade(LucasKanade),
     HornSchunck(HornSchunck),
 }
@@ -46,7 +46,7 @@ impl Estimator {
         common.check()?;
         let engine = match &method {
             Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &common)?)),
-            Method::Windowed(o) => Engine::Windowed(Windowed::new(o, &common)?),
+            Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o, &common)?)),
             Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &common)?),
             Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &common)?),
         };
