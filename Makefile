@@ -32,6 +32,10 @@ rust-test:
 guide:
 	$(PYTHON) docs/check_guide.py
 
+# The page that tells how to add a motion model, followed to the letter in a copy.
+guide:
+	$(PYTHON) docs/check_guide.py
+
 $(BIN)/maturin:
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q "maturin>=1.9.4,<2"
@@ -52,7 +56,7 @@ stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest jacoflow
 
 typing: install
-	$(BIN)/python -m mypy --strict tests/python/test_typing.py
+	$(BIN)/python -m mypy --strict python/jacoflow tests/python/test_typing.py
 
 examples: install
 	@for file in examples/*.py; do [ -e "$$file" ] || continue; echo "$$file"; $(BIN)/python "$$file" >/dev/null || exit 1; done
@@ -72,6 +76,17 @@ docs: install
 compare: install
 	$(BIN)/python -m pip install -q "opencv-python-headless>=4.10" "filterpy>=1.4.5"
 	$(BIN)/python benchmarks/compare.py
+
+# Ours and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
+compare: install
+	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
+	$(BIN)/python benchmarks/compare.py $(if $(DATA),--data $(DATA))
+
+# API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python).
+docs: install
+	cargo doc --no-deps
+	$(BIN)/python -m pip install -q "pdoc>=15"
+	$(BIN)/python -m pdoc --docformat numpy --output-directory target/doc/python jacoflow
 
 clean:
 	rm -rf target $(VENV) dist

@@ -10,7 +10,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 (1, 64, 96)
 """
 
-from . import filters, io, scenes
+from . import filters, io, plot, scenes, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -50,8 +50,10 @@ __all__ = [
     "io",
     "luminance",
     "observability",
+    "plot",
     "quantise",
     "quantities",
     "scenes",
     "smooth",
+    "video",
 ]
