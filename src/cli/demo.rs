@@ -77,7 +77,9 @@ impl DemoCommand {
             .with_threads(threads)
             .with_numbering(Numbering { rate: Some(RATE), ..Numbering::default() })
             .with_sink(Box::new(kept));
-        for sink in plan.sinks(json!({"method": "windowed", "scene": "vortex"}).to_string(), PictureRanges::default()) {
+        for sink in
+            plan.sinks(json!({"method": "windowed", "scene": "vortex"}).to_string(), PictureRanges::default())?
+        {
             pipeline = pipeline.with_sink(sink);
         }
         let source = Box::new(MemorySource::new(frames)?.with_frame_rate(RATE));

@@ -112,7 +112,7 @@ impl FilterCommand {
             .with_preprocess(preprocess(&self.input)?)
             .with_threads(threads)
             .with_numbering(opened.numbering);
-        for sink in plan.sinks(description.to_string(), self.output.ranges()) {
+        for sink in plan.sinks(description.to_string(), self.output.ranges())? {
             pipeline = pipeline.with_sink(sink);
         }
         let telling = Telling { command: "filter", tell: &self.tell, output: self.output.output.as_deref(), details };

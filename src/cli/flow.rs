@@ -114,10 +114,11 @@ impl FlowCommand {
         let needed = prepared.estimator.frames_needed();
         let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(needed));
         let plan = plan_output(&self.output, &prepared.sites, self.tell.json, fields)?;
+        plan.check_parameters(prepared.estimator.model().parameters().iter().map(|parameter| parameter.name))?;
         if in_double(self.compute.precision, &opened.first, false) {
-            self.run::<f64>(opened, prepared, plan, watch)
+            self.run::<f64>(opened, prepared, &plan, watch)
         } else {
-            self.run::<f32>(opened, prepared, plan, watch)
+            self.run::<f32>(opened, prepared, &plan, watch)
         }
     }
 
@@ -125,7 +126,7 @@ impl FlowCommand {
         &self,
         opened: Opened,
         prepared: Prepared,
-        plan: OutputPlan,
+        plan: &OutputPlan,
         watch: &Watch,
     ) -> Result<Report> {
         let mut details = input_details(&opened, &self.sites);
@@ -136,7 +137,7 @@ impl FlowCommand {
             .with_preprocess(preprocess(&self.input)?)
             .with_threads(compute(&self.compute)?.0)
             .with_numbering(opened.numbering);
-        for sink in plan.sinks(prepared.description.to_string(), self.output.ranges()) {
+        for sink in plan.sinks(prepared.description.to_string(), self.output.ranges())? {
             pipeline = pipeline.with_sink(sink);
         }
         let telling = Telling { command: "flow", tell: &self.tell, output: self.output.output.as_deref(), details };

@@ -182,21 +182,21 @@ const ORDER: [&str; 14] = [
 
 /// The summary as lines `name: value`, planes as a small table.
 fn in_words(summary: &Value) -> String {
-    let mut text = String::new();
+    let mut lines: Vec<String> = Vec::new();
     for name in ORDER {
         match &summary[name] {
             Value::Null => {}
-            Value::String(value) => text += &format!("{:<14}{value}\n", name.replace('_', " ")),
-            value => text += &format!("{:<14}{value}\n", name.replace('_', " ")),
+            Value::String(value) => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
+            value => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
         }
     }
     if summary["first_frame"].is_object() {
-        text += &format!("{:<14}{}\n", "first frame", statistics_line(&summary["first_frame"]));
+        lines.push(format!("{:<14}{}", "first frame", statistics_line(&summary["first_frame"])));
     }
     for (name, plane) in summary["planes"].as_object().into_iter().flatten() {
-        text += &format!("{:<14}{}\n", name, statistics_line(plane));
+        lines.push(format!("{:<14}{}", name, statistics_line(plane)));
     }
-    text
+    lines.join("\n") + "\n"
 }
 
 fn statistics_line(plane: &Value) -> String {

@@ -59,20 +59,19 @@ pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -
 }
 
 fn in_words(summary: &Summary, output: Option<&Path>) -> String {
-    let mut line = format!(
-        "{} frames, {} fields, {:.1} % of the sites valid, {:.2} s",
-        summary.frames,
-        summary.fields,
-        100.0 * summary.valid_share(),
-        summary.seconds
-    );
+    let mut parts = vec![
+        format!("{} frames", summary.frames),
+        format!("{} fields", summary.fields),
+        format!("{:.1} % of the sites valid", 100.0 * summary.valid_share()),
+        format!("{:.2} s", summary.seconds),
+    ];
     if summary.repairs > 0 {
-        line += &format!(", {} repairs", summary.repairs);
+        parts.push(format!("{} repairs", summary.repairs));
     }
     if let Some(output) = output.filter(|_| summary.files > 0) {
-        line += &format!("; {} files: {}", summary.files, output.display());
+        parts.push(format!("{} files: {}", summary.files, output.display()));
     }
-    line
+    parts.join(", ")
 }
 
 /// The entries about the input that every summary has.

@@ -31,15 +31,19 @@ fn parameters(list: &[Parameter]) -> Vec<Value> {
 fn text() -> String {
     let mut text = String::from("Scenes\n");
     for kind in SCENES {
-        text += &format!("  {:<12}{}\n", kind.name, kind.summary);
+        text += &entry(kind.name, kind.summary);
         text += &rows(kind.parameters);
     }
     text += "\nCarriers (--carrier), for every scene but those with a picture of their own\n";
     for kind in CARRIERS {
-        text += &format!("  {:<12}{}\n", kind.name, kind.summary);
+        text += &entry(kind.name, kind.summary);
         text += &rows(kind.parameters);
     }
     text
+}
+
+fn entry(name: &str, summary: &str) -> String {
+    format!("  {name:<12}{summary}\n")
 }
 
 fn rows(parameters: &[Parameter]) -> String {

@@ -121,7 +121,7 @@ pub struct OutputWish<'a> {
 }
 
 impl OutputPlan {
-    /// Decides from the user's words where results go, makes the folder if there is none, and refuses what could only fail later.
+    /// Decides from the user's words where results go, and refuses what could only fail later. Nothing is made yet.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `output`, `format` or `picture`; [`Error::Io`] when the place cannot be written.
@@ -133,7 +133,7 @@ impl OutputPlan {
         match wish.path {
             None if formats.is_empty() && plan.pictures.is_empty() => Ok(plan),
             None => Err(Error::argument("output", "a folder or a file for the formats and pictures asked for", "none")),
-            Some(path) if path == Path::new("-") => plan.to_standard_output(&formats),
+            Some(path) if path == Path::new("-") => plan.into_standard_output(&formats),
             Some(path) if is_folder(path) => plan.into_folder(path, &formats),
             Some(path) => plan.into_file(path, &formats, wish.fields),
         }
@@ -156,8 +156,29 @@ impl OutputPlan {
         }
     }
 
-    /// The sinks of this plan; `options` says (in JSON) how the fields are made.
-    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Vec<Box<dyn Sink<T>>> {
+    /// Refuses pictures of derivatives of a flow that comes without them.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `picture`.
+    pub fn check_parameters<'a>(&self, mut parameters: impl Iterator<Item = &'a str>) -> Result<()> {
+        let needs = |kind: &&PictureKind| matches!(kind, PictureKind::Divergence | PictureKind::Curl);
+        match self.pictures.iter().find(needs) {
+            Some(kind) if !parameters.any(|name| name == "u_x") => {
+                Err(Error::argument("picture", "colour or quiver for a flow without Jacobian", kind.name()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the fields are made.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the folder cannot be made or written.
+    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Result<Vec<Box<dyn Sink<T>>>> {
+        if let Place::Folder(folder) = &self.place {
+            std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
+            check_writable(folder)?;
+        }
         let mut sinks: Vec<Box<dyn Sink<T>>> = Vec::new();
         if !self.formats.is_empty() {
             sinks.push(Box::new(Fields::new(self.clone(), options)));
@@ -168,10 +189,10 @@ impl OutputPlan {
         if let Some(target) = &self.table {
             sinks.push(Box::new(Rows::new(target.clone())));
         }
-        sinks
+        Ok(sinks)
     }
 
-    fn to_standard_output(mut self, formats: &[Format]) -> Result<Self> {
+    fn into_standard_output(mut self, formats: &[Format]) -> Result<Self> {
         if !self.pictures.is_empty() || formats.iter().any(|format| *format != Format::Table) {
             return Err(Error::argument("output", "a folder or a file; standard output takes CSV only", "-"));
         }
@@ -187,10 +208,8 @@ impl OutputPlan {
         if formats.contains(&Format::Table) {
             self.table = Some(TableTarget::File(folder.join("points.csv")));
         }
-        std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
-        check_writable(folder)?;
         self.place = Place::Folder(folder.to_path_buf());
-        if !self.replace {
+        if !self.replace && folder.is_dir() {
             self.refuse_earlier_results(folder)?;
         }
         Ok(self)
@@ -341,7 +360,9 @@ mod tests {
         assert_eq!(plan.field_path(12, FieldFormat::Kitti), Some(out.join("000012.png")));
         assert_eq!(plan.picture_path(12, PictureKind::Curl), Some(out.join("000012_curl.png")));
         assert_eq!(plan.table, Some(TableTarget::File(out.join("points.csv"))));
-        assert!(out.is_dir() && out.read_dir().unwrap().next().is_none());
+        assert!(!out.exists());
+        let sinks = plan.sinks::<f32>(String::new(), PictureRanges::default()).unwrap();
+        assert_eq!((sinks.len(), out.read_dir().unwrap().count()), (3, 0));
     }
 
     #[test]

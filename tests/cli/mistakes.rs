@@ -42,6 +42,7 @@ fn unusable_arguments_are_named() {
         ("flow s.npy -o out --format gif", &["format", "npz"]),
         ("flow s.npy -o out --picture photo", &["picture", "curl"]),
         ("flow s.npy --picture curl", &["output"]),
+        ("flow s.npy -o x/ --method lucas-kanade --picture curl", &["picture", "quiver"]),
         ("flow s.npy -o out.xyz", &["output", ".npz"]),
         ("flow s.npy -o one.npz", &["output", "folder"]),
         ("flow s.npy -o p --points 1,1 --format flo", &["format"]),

@@ -22,7 +22,8 @@ pub struct OutputArguments {
     /// Speed of the full colour (and of the usual arrow) in pictures, px/frame [default: from the first field]
     #[arg(long, value_name = "SPEED", value_parser = parse_positive)]
     pub max_speed: Option<f64>,
-    /// Divergence or curl of the full red and blue in pictures, 1/frame [default: from the first field]
+    /// Divergence or curl of the full red and blue in pictures, 1/s where the frame rate is known, else 1/frame [default: from the
+    /// first field]
     #[arg(long, value_name = "RATE", value_parser = parse_positive)]
     pub max_rate: Option<f64>,
     /// Replace files that exist

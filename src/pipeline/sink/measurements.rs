@@ -48,7 +48,7 @@ impl Measurements {
         &mut self,
         step: &Step<'_, T>,
         m: [f64; 6],
-        covariance: Option<[[f64; 6]; 6]>,
+        covariance: Option<&[[f64; 6]; 6]>,
         place: (f64, f64),
         share: f64,
     ) -> Result<()> {
@@ -56,7 +56,7 @@ impl Measurements {
         let at = (place.0 * layout.pixel_pitch.0, place.1 * layout.pixel_pitch.1);
         let time = step.time.map(cell).unwrap_or_default();
         for quantity in self.quantities.clone() {
-            let (value, std) = value_and_std(quantity, m, covariance, at, layout.frame_period);
+            let (value, std) = value_and_std(quantity, m, covariance.copied(), at, layout.frame_period);
             self.table.row([
                 layout.frame_index.to_string(),
                 time.clone(),
@@ -87,11 +87,11 @@ impl<T: Real> Sink<T> for Measurements {
             for (site, &(x, y)) in points.iter().enumerate() {
                 let m = field.affine(site).to_array().map(Real::to_f64);
                 let share = f64::from(u8::from(field.status[site].is_valid()));
-                self.rows(step, m, field.covariance_at(site), (x as f64, y as f64), share)?;
+                self.rows(step, m, field.covariance_at(site).as_ref(), (x as f64, y as f64), share)?;
             }
         } else {
             let fit = fit_region(field, self.window);
-            self.rows(step, fit.motion, Some(fit.covariance), fit.centre, fit.valid_share())?;
+            self.rows(step, fit.motion, Some(&fit.covariance), fit.centre, fit.valid_share())?;
         }
         self.table.flush()
     }

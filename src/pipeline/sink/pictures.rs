@@ -18,7 +18,7 @@ const ARROW_SPACING: usize = 16;
 pub struct PictureRanges {
     /// Speed of the full colour, in the field's unit; also sets the arrows' scale.
     pub speed: Option<f64>,
-    /// Divergence or curl of the strongest red and blue, 1/frame.
+    /// Divergence or curl of the strongest red and blue, 1/s where the frame rate is known, else 1/frame; one range for both, so that they can be compared.
     pub rate: Option<f64>,
 }
 
@@ -30,8 +30,6 @@ pub struct Pictures {
     plan: OutputPlan,
     ranges: PictureRanges,
     arrow_scale: Option<f64>,
-    divergence: Option<f64>,
-    curl: Option<f64>,
     waiting: Vec<(PathBuf, Picture)>,
     seen: usize,
     written: usize,
@@ -41,25 +39,15 @@ pub struct Pictures {
 impl Pictures {
     /// Pictures as `plan` says.
     pub fn new(plan: OutputPlan, ranges: PictureRanges) -> Self {
-        Self {
-            plan,
-            ranges,
-            arrow_scale: None,
-            divergence: ranges.rate,
-            curl: ranges.rate,
-            waiting: Vec::new(),
-            seen: 0,
-            written: 0,
-            latest: None,
-        }
+        Self { plan, ranges, arrow_scale: None, waiting: Vec::new(), seen: 0, written: 0, latest: None }
     }
 
     fn draw<T: Real>(&mut self, kind: PictureKind, field: &FlowField<T>, frame: &Frame<T>) -> Result<Picture> {
         match kind {
             PictureKind::Colour => self.colour(field),
             PictureKind::Quiver => self.quiver(field, frame),
-            PictureKind::Divergence => signed(field, Quantity::Divergence, &mut self.divergence),
-            PictureKind::Curl => signed(field, Quantity::Curl, &mut self.curl),
+            PictureKind::Divergence => self.signed(field, Quantity::Divergence),
+            PictureKind::Curl => self.signed(field, Quantity::Curl),
         }
     }
 
@@ -96,6 +84,18 @@ impl Pictures {
         Ok(picture)
     }
 
+    /// A diverging map of a quantity. The first known field sets the range of the run: that of the wider one of divergence and curl.
+    fn signed<T: Real>(&mut self, field: &FlowField<T>, quantity: Quantity) -> Result<Picture> {
+        let values = plane(field, quantity)?;
+        if self.ranges.rate.is_none() && is_known(&values) {
+            let range = |quantity| -> Result<f64> { Ok(SignedMap::default().resolve_range(&plane(field, quantity)?)) };
+            let both = [range(Quantity::Divergence)?, range(Quantity::Curl)?];
+            self.ranges.rate = Some(both[0].max(both[1]));
+        }
+        let map = SignedMap::new(self.ranges.rate);
+        Ok(map.picture(&values, field.width, field.height)?.enlarged(stride(field)))
+    }
+
     fn write(&mut self, path: PathBuf, picture: &Picture) -> Result<()> {
         write_picture(&path, picture)?;
         self.written += 1;
@@ -118,15 +118,6 @@ fn stride<T>(field: &FlowField<T>) -> usize {
         Sites::Grid { stride, .. } => stride,
         Sites::Points(_) => 1,
     }
-}
-
-/// A diverging map of a quantity; the first known plane sets the range of the run.
-fn signed<T: Real>(field: &FlowField<T>, quantity: Quantity, range: &mut Option<f64>) -> Result<Picture> {
-    let values = plane(field, quantity)?;
-    if range.is_none() && is_known(&values) {
-        *range = Some(SignedMap::default().resolve_range(&values));
-    }
-    Ok(SignedMap::new(*range).picture(&values, field.width, field.height)?.enlarged(stride(field)))
 }
 
 impl<T: Real> Sink<T> for Pictures {
