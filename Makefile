@@ -23,7 +23,7 @@ clippy:
 	cargo clippy -q --all-targets $(ALL) -- -D warnings
 
 rustdoc:
-	RUSTDOCFLAGS="-D warnings" cargo doc -q --no-deps
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
 
 rust-test:
 	cargo test
@@ -69,7 +69,7 @@ develop: $(BIN)/maturin
 docs: install
 	$(BIN)/python -m pip install -q "pdoc>=15"
 	$(BIN)/python -m pdoc -o target/docs jacoflow
-	RUSTDOCFLAGS="-D warnings" cargo doc -q --no-deps
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
 	$(BIN)/python docs/overview_picture.py
 
 # Dated table of accuracy and speed against OpenCV and filterpy, measured in one process; JACOFLOW_DATA names a folder of recordings with truth.
