@@ -383,7 +383,7 @@ fn threads_and_resuming_change_no_bit() {
         if t == 2 {
             let path = std::env::temp_dir().join(format!("jacoflow-filter-{}.npz", std::process::id()));
             two.save(&path).unwrap();
-            two = FlowFilter::<f64>::load(&path).unwrap().with_threads(Threads::new(Some(2)).unwrap());
+            two = FlowFilter::<f64>::load(&path).unwrap().with_computation(Threads::new(Some(2)).unwrap(), None);
             std::fs::remove_file(&path).unwrap();
             assert_eq!(two.frames(), 3);
             assert_eq!(

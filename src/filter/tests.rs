@@ -1,5 +1,8 @@
 //! Tests of the filters against each other, against statistics, and against numbers recorded from filterpy (`tests/golden/filters.py`).
 
+// Callbacks return a result whether they can fail or not.
+#![allow(clippy::unnecessary_wraps)]
+
 use super::*;
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;

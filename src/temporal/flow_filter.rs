@@ -1,24 +1,17 @@
 //! The dense flow filter.
 
-use super::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
-use super::kernel::transition::{Exact, Rk4, Step};
-use super::kernel::update::{Decorrelation, MEASURED, Update};
-use super::kernel::{BLOCK, Constants, N, PLANES, packed};
-use super::measurement::{Fit, Measure};
-use super::options::{FilterForm, FlowFilterOptions, Transition};
+use super::kernel::update::Decorrelation;
+use super::kernel::{BLOCK, Constants};
+use super::measurement::Fit;
+use super::options::FlowFilterOptions;
+use super::pass::{self, Mark, PAIRS, Rows};
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
 use crate::parallel::Threads;
-use crate::simd::{Level, SimdReal, dispatch};
+use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
 use rayon::prelude::*;
-use std::marker::PhantomData;
-
-/// Blocks of one task: fixed, so that results do not depend on the number of threads.
-const TASK_BLOCKS: usize = 32;
-/// Blocks that go through the three passes together: few, so that their states stay in the first-level cache.
-const PASS_BLOCKS: usize = 2;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
 ///
@@ -48,9 +41,9 @@ pub struct FlowFilter<T> {
     pub(super) frames: usize,
     pub(super) repairs: u64,
     pub(super) store: Store<T>,
-    constants: Constants<T>,
-    decorrelation: Decorrelation<T>,
-    fit: Fit<T>,
+    pub(super) constants: Constants<T>,
+    pub(super) decorrelation: Decorrelation<T>,
+    pub(super) fit: Fit<T>,
 }
 
 impl<T: SimdReal> FlowFilter<T> {
@@ -101,9 +94,8 @@ impl<T: SimdReal> FlowFilter<T> {
         self.repairs
     }
     /// The same filter on another number of threads; results do not depend on it.
-    pub fn with_threads(mut self, threads: Threads) -> Self {
-        self.options.threads = threads;
-        self
+    pub fn with_threads(self, threads: Threads) -> Self {
+        self.with_computation(threads, None)
     }
     /// Number of result sites.
     pub fn len(&self) -> usize {
@@ -140,7 +132,7 @@ impl<T: SimdReal> FlowFilter<T> {
         let mut marks = vec![Mark::default(); filters / BLOCK];
         let mut results = vec![T::from_f64(0.0); filters * rows.count];
         let threads = self.options.threads;
-        threads.install(|| self.run(frame, &mut marks, &mut results));
+        threads.install(|| pass::run(self, frame, &mut marks, &mut results))?;
         self.frames += 1;
         let live = self.store.sites.len();
         self.repairs += marks.iter().flat_map(|m| m.repaired).take(live).map(u64::from).sum::<u64>();
@@ -148,41 +140,10 @@ impl<T: SimdReal> FlowFilter<T> {
     }
 
     /// Which rows a block's results have.
-    fn rows(&self) -> Rows {
+    pub(super) fn rows(&self) -> Rows {
         let covariance = if self.options.covariance { 21 } else { 0 };
         let residual = self.options.residual.then_some(6 + covariance);
         Rows { covariance, residual, count: 6 + covariance + usize::from(residual.is_some()) }
-    }
-
-    /// Every block through its three passes; results are copied out while they are near.
-    fn run(&mut self, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
-        let rows = self.rows();
-        let Self { options, store, constants, decorrelation, fit, .. } = self;
-        let level = options.simd.unwrap_or_else(Level::detect);
-        let pass = Pass {
-            frame,
-            fit,
-            constants,
-            decorrelation,
-            rows,
-            level,
-            form: options.form,
-            transition: options.transition,
-            scale: T::from_f64(255.0 / options.full_scale),
-        };
-        let states = store.blocks.par_chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
-        let pixels = store.pixels.par_chunks(BLOCK * TASK_BLOCKS);
-        let marks = marks.par_chunks_mut(TASK_BLOCKS);
-        let results = results.par_chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
-        states.zip(pixels).zip(marks).zip(results).for_each(|(((states, pixels), marks), results)| {
-            let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
-            let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);
-            let marks = marks.chunks_mut(PASS_BLOCKS);
-            let results = results.chunks_mut(rows.count * BLOCK * PASS_BLOCKS);
-            for (((states, pixels), marks), results) in states.zip(pixels).zip(marks).zip(results) {
-                pass.run(states, pixels, marks, results);
-            }
-        });
     }
 
     /// The result after a frame.
@@ -236,103 +197,5 @@ impl<T: SimdReal> FlowFilter<T> {
             fill(plane, row, 1.0);
         }
         Ok(field)
-    }
-}
-
-/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are wanted.
-#[derive(Debug, Clone, Copy)]
-struct Rows {
-    covariance: usize,
-    residual: Option<usize>,
-    count: usize,
-}
-
-/// The upper triangle of the motion's covariance, row by row.
-const PAIRS: [(usize, usize); 21] = {
-    let mut pairs = [(0, 0); 21];
-    let (mut k, mut a) = (0, 0);
-    while a < 6 {
-        let mut b = a;
-        while b < 6 {
-            pairs[k] = (a, b);
-            k += 1;
-            b += 1;
-        }
-        a += 1;
-    }
-    pairs
-};
-
-/// What the blocks of a frame have in common.
-struct Pass<'a, T> {
-    frame: &'a Frame<T>,
-    fit: &'a Fit<T>,
-    constants: &'a Constants<T>,
-    decorrelation: &'a Decorrelation<T>,
-    rows: Rows,
-    level: Level,
-    form: FilterForm,
-    transition: Transition,
-    scale: T,
-}
-
-impl<T: SimdReal> Pass<'_, T> {
-    /// Measurement, prediction, update of a few blocks.
-    fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
-        let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
-        let zero = T::from_f64(0.0);
-        let (mut measured, mut residual) = ([zero; PASS_BLOCKS * MEASURED * BLOCK], [zero; PASS_BLOCKS * BLOCK]);
-        let mut repaired = [0u8; PASS_BLOCKS * BLOCK];
-        let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
-        let repaired = &mut repaired[..pixels.len()];
-        let wanted = rows.residual.map(|_| &mut residual[..pixels.len()]);
-        dispatch(level, Measure { frame, pixels, fit, scale, measured, residual: wanted });
-        match self.transition {
-            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, repaired, constants),
-            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, repaired, constants),
-        }
-        dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
-        for (b, mark) in marks.iter_mut().enumerate() {
-            mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
-            let present = &measured[(b * MEASURED + 6) * BLOCK..][..BLOCK];
-            for k in 0..BLOCK {
-                mark.missing[k] = u8::from(present[k] == zero);
-            }
-            let block = &blocks[b * PLANES * BLOCK..];
-            let out = &mut results[b * rows.count * BLOCK..(b + 1) * rows.count * BLOCK];
-            out[..6 * BLOCK].copy_from_slice(&block[6 * BLOCK..N * BLOCK]);
-            for (row, &(i, j)) in out[6 * BLOCK..].chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
-                let plane = N + packed(6 + i, 6 + j);
-                row.copy_from_slice(&block[plane * BLOCK..(plane + 1) * BLOCK]);
-            }
-            if let Some(row) = rows.residual {
-                out[row * BLOCK..].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
-            }
-        }
-    }
-}
-
-/// What happened to the pixels of a block.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mark {
-    repaired: [u8; BLOCK],
-    missing: [u8; BLOCK],
-}
-
-fn predict<T: SimdReal, S: Step>(
-    level: Level,
-    form: FilterForm,
-    blocks: &mut [T],
-    repaired: &mut [u8],
-    constants: &Constants<T>,
-) {
-    let step = PhantomData::<S>;
-    match form {
-        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, repaired, constants, step }),
-        FilterForm::NonAugmented => {
-            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, repaired, constants, step })
-        }
-        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, repaired, constants, step }),
-        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, repaired, constants, step }),
     }
 }

@@ -84,7 +84,7 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
                         }
                         left = z.mul_add(z, left);
                     }
-                    spoilt = left - left;
+                    spoilt = V::zero() * left;
                 } else {
                     for &offset in &self.fit.offsets {
                         spoilt = V::zero().mul_add(fetch::<V>(samples, pixels, offset, neighbours), spoilt);

@@ -7,6 +7,7 @@ mod flow_filter;
 mod kernel;
 mod measurement;
 mod options;
+mod pass;
 mod persist;
 mod store;
 

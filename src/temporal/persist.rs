@@ -234,7 +234,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         if status.shape != [rows, columns] {
             return Err(wrong(format!("expected a status of shape [{rows}, {columns}], got {:?}", status.shape)));
         }
-        let filters = status.values.iter().filter(|&&code| code == Status::Ok as u8).count();
+        let filters = status.values.iter().map(|&code| usize::from(code == Status::Ok as u8)).sum::<usize>();
         for (name, array, columns) in [("mean", &mean, N), ("covariance", &covariance, PACKED)] {
             if array.shape != [filters, columns] {
                 return Err(wrong(format!("expected {name} of shape [{filters}, {columns}], got {:?}", array.shape)));

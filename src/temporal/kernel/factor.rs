@@ -7,18 +7,18 @@ use crate::simd::{Lanes, SimdReal};
 /// The columns of a factor, zero above its diagonal: `columns[k][state index]`.
 pub(super) type Columns<V> = [[V; N]; N];
 
-/// Factors `cov`, taking the state's components in `order`. The second result is one in each lane whose pivots were all positive.
+/// Factors `cov`, taking the state's components in `order`, into columns whose upper part is zero already. The result is one in each lane whose pivots
+/// were all positive.
 ///
 /// Columns left to right; each is held in registers while the earlier ones are subtracted.
 #[inline(always)]
-pub(super) fn factor<V: Lanes>(cov: &[V; PACKED], order: &[usize; N]) -> (Columns<V>, V) {
-    let mut columns = [[V::zero(); N]; N];
+pub(super) fn factor<V: Lanes>(cov: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>) -> V {
     let mut ok = V::constant(1.0);
     macro_rules! all {
-        ($($j:literal)*) => { $(column::<V, $j>(cov, order, &mut columns, &mut ok);)* };
+        ($($j:literal)*) => { $(column::<V, $j>(cov, order, columns, &mut ok);)* };
     }
     all!(0 1 2 3 4 5 6 7 8 9 10 11);
-    (columns, ok)
+    ok
 }
 
 #[inline(always)]

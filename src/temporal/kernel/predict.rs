@@ -21,6 +21,25 @@ pub(in crate::temporal) const NON_AUGMENTED: u8 = FilterForm::NonAugmented as u8
 pub(in crate::temporal) const FAST: u8 = FilterForm::Fast as u8;
 pub(in crate::temporal) const EXTENDED: u8 = FilterForm::Extended as u8;
 
+/// Most vectors that a form's covariance is summed from: 24 images and 11 of noise.
+const VECTORS: usize = 35;
+
+/// Room for one vector of pixels; made once, since clearing it for every one would cost as much as a tenth of the work.
+struct Scratch<V> {
+    /// The factor. Entries above its diagonal are zero from the beginning and never written.
+    columns: Columns<V>,
+    images: [[V; 6]; VECTORS],
+    differences: [[V; 6]; N],
+}
+
+impl<V: Lanes> Scratch<V> {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = V::zero();
+        Self { columns: [[zero; N]; N], images: [[zero; 6]; VECTORS], differences: [[zero; 6]; N] }
+    }
+}
+
 /// Predicts every pixel of some blocks in place.
 pub(in crate::temporal) struct Predict<'a, T, S, const FORM: u8> {
     /// States.
@@ -37,22 +56,22 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
         let order = if FORM == FAST { &MOTION_FIRST } else { &BRIGHTNESS_FIRST };
+        let mut scratch = Scratch::<V>::new();
         for (block, repaired) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.repaired.chunks_exact_mut(BLOCK))
         {
             for at in (0..BLOCK).step_by(V::LANES) {
-                let (mut lane, columns) = loop {
+                let mut lane = loop {
                     let lane = Lane::<V>::load(block, at);
-                    let (columns, ok) = factor(&lane.cov, order);
-                    let bad = failed(ok);
+                    let bad = failed(factor(&lane.cov, order, &mut scratch.columns));
                     if bad == 0 {
-                        break (lane, columns);
+                        break lane;
                     }
                     for k in (0..V::LANES).filter(|k| bad >> k & 1 == 1) {
                         repair(block, at + k, self.constants);
                         repaired[at + k] = 1;
                     }
                 };
-                predict::<V, S, FORM>(&mut lane, &columns, self.constants);
+                predict::<V, S, FORM>(&mut lane, &mut scratch, self.constants);
                 lane.store(block, at);
             }
         }
@@ -62,7 +81,7 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
 #[inline(always)]
 fn predict<V: Lanes, S: Step, const FORM: u8>(
     lane: &mut Lane<V>,
-    columns: &Columns<V>,
+    scratch: &mut Scratch<V>,
     constants: &Constants<V::Scalar>,
 ) {
     // Nothing depends on I: moving it without its value keeps the digits of what is added to it.
@@ -75,14 +94,14 @@ fn predict<V: Lanes, S: Step, const FORM: u8>(
 
     let shift = match FORM {
         EXTENDED => {
-            linearised::<V, S>(lane, columns, &i, &m, &map);
+            linearised::<V, S>(lane, scratch, &i, &m, &map);
             [V::zero(); 6]
         }
-        FAST => sigma_points::<V, S, FORM, 6, 12, 18>(lane, columns, &i, &m, &centre, constants),
+        FAST => sigma_points::<V, S, FORM, 6, 12, 18>(lane, scratch, &i, &m, &centre, constants),
         AUGMENTED if S::NOISE_INSIDE => {
-            sigma_points::<V, S, FORM, 12, 24, 35>(lane, columns, &i, &m, &centre, constants)
+            sigma_points::<V, S, FORM, 12, 24, 35>(lane, scratch, &i, &m, &centre, constants)
         }
-        _ => sigma_points::<V, S, FORM, 12, 24, 24>(lane, columns, &i, &m, &centre, constants),
+        _ => sigma_points::<V, S, FORM, 12, 24, 24>(lane, scratch, &i, &m, &centre, constants),
     };
     if !(FORM == AUGMENTED && S::NOISE_INSIDE) {
         for k in 0..N {
@@ -105,7 +124,7 @@ fn predict<V: Lanes, S: Step, const FORM: u8>(
 #[inline(always)]
 fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POINTS: usize, const TOTAL: usize>(
     lane: &mut Lane<V>,
-    columns: &Columns<V>,
+    scratch: &mut Scratch<V>,
     i: &[V; 6],
     m: &[V; 6],
     centre: &[V; 6],
@@ -114,8 +133,8 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
     let spread = V::splat(constants.spread);
     let one = V::constant(1.0);
     let half = V::constant(0.5);
-    let mut images = [[V::zero(); 6]; TOTAL];
-    let mut differences = [[V::zero(); 6]; PAIRS];
+    let Scratch { columns, images, differences } = scratch;
+    let (images, differences) = (&mut images[..TOTAL], &mut differences[..PAIRS]);
     let mut sums = [V::zero(); 6];
     for k in 0..PAIRS {
         let step = times(&columns[k], spread);
@@ -137,8 +156,8 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
         for k in 0..noise.full.len() {
             images[POINTS + k] = times(&noise.full[k], whole);
         }
-        outer(&images, scale, &mut lane.cov);
-        cross(&differences, columns, half * inverse, &mut lane.cov);
+        outer(images, scale, &mut lane.cov);
+        cross(differences, columns, half * inverse, &mut lane.cov);
         noise.add_to(&mut lane.cov, constants);
         for k in 0..6 {
             shift[k] = shift[k] + noise.shift[k];
@@ -147,8 +166,8 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
         if FORM == FAST {
             conditional::<V, S>(columns, m, whole, &mut images[POINTS..]);
         }
-        outer(&images, scale, &mut lane.cov);
-        cross(&differences, columns, half * inverse, &mut lane.cov);
+        outer(images, scale, &mut lane.cov);
+        cross(differences, columns, half * inverse, &mut lane.cov);
     }
     let weight = V::splat(constants.shift);
     for a in 0..6 {
@@ -175,8 +194,15 @@ fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, ou
 
 /// The covariance through the linearised step, as a square root: `F L` squared.
 #[inline(always)]
-fn linearised<V: Lanes, S: Step>(lane: &mut Lane<V>, columns: &Columns<V>, i: &[V; 6], m: &[V; 6], map: &S::Map<V>) {
-    let mut moved = [[V::zero(); 6]; N];
+fn linearised<V: Lanes, S: Step>(
+    lane: &mut Lane<V>,
+    scratch: &mut Scratch<V>,
+    i: &[V; 6],
+    m: &[V; 6],
+    map: &S::Map<V>,
+) {
+    let Scratch { columns, images, .. } = scratch;
+    let moved = &mut images[..N];
     for k in 0..N {
         moved[k] = S::apply(map, &six(&columns[k], 0));
     }
@@ -188,6 +214,6 @@ fn linearised<V: Lanes, S: Step>(lane: &mut Lane<V>, columns: &Columns<V>, i: &[
             }
         }
     }
-    outer(&moved, V::constant(1.0), &mut lane.cov);
-    cross(&moved, columns, V::constant(1.0), &mut lane.cov);
+    outer(moved, V::constant(1.0), &mut lane.cov);
+    cross(moved, columns, V::constant(1.0), &mut lane.cov);
 }

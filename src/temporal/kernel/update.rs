@@ -3,6 +3,10 @@
 //! The measured jet has covariance `C = r (B^T B)^-1`. A unit triangular change of variables `i* = T i` makes it diagonal (for rectangles only
 //! `I* = I + a Ixx + b Iyy` differs from `I`; for 3x3 pixels it is their mean), so that each component is taken in by itself.
 
+// Unrolled loops compare constant indices, the smallest of which is zero.
+#![allow(clippy::absurd_extreme_comparisons)]
+
+use super::vector::for_six;
 use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, failed, packed};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
@@ -18,6 +22,7 @@ pub(in crate::temporal) struct Decorrelation<T> {
 impl<T: SimdReal> Decorrelation<T> {
     /// From the jet's covariance, by its `L D L^T` factors with `I` taken last.
     pub(in crate::temporal) fn new(covariance: &[[f64; 6]; 6]) -> Self {
+        const ORDER: [usize; 6] = [1, 2, 3, 4, 5, 0];
         let mut rest = *covariance;
         let (mut variances, mut steps) = ([0.0; 6], Vec::new());
         for (place, &j) in ORDER.iter().enumerate() {
@@ -102,8 +107,8 @@ fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelat
     };
     if let Some((x, y)) = rectangle {
         jet[0] = jet[3].mul_add(x, jet[5].mul_add(y, jet[0]));
-        combine(lane, 0, 3, x);
-        combine(lane, 0, 5, y);
+        combine_into_brightness::<V, 3>(lane, x);
+        combine_into_brightness::<V, 5>(lane, y);
     } else {
         for &(row, source, factor) in steps {
             let factor = V::splat(factor);
@@ -132,8 +137,8 @@ fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelat
     }
     motion_rows!(0 1 2 3 4 5);
     if let Some((x, y)) = rectangle {
-        combine(lane, 0, 5, -y);
-        combine(lane, 0, 3, -x);
+        combine_into_brightness::<V, 5>(lane, -y);
+        combine_into_brightness::<V, 3>(lane, -x);
     } else {
         for &(row, source, factor) in steps.iter().rev() {
             combine(lane, row, source, -V::splat(factor));
@@ -152,6 +157,20 @@ fn motion_row<V: Lanes, const A: usize>(cov: &mut [V; PACKED], rows: &[[V; 6]; 6
         }
         cov[at] = sum;
     }
+}
+
+/// [`combine`] for row `I` and a source known beforehand.
+#[inline(always)]
+fn combine_into_brightness<V: Lanes, const SOURCE: usize>(lane: &mut Lane<V>, factor: V) {
+    lane.mean[0] = lane.mean[SOURCE].mul_add(factor, lane.mean[0]);
+    let before = lane.cov[packed(SOURCE, 0)];
+    for_six!(K => {
+        if K != 0 {
+            lane.cov[packed(K, 0)] = lane.cov[packed(SOURCE, K)].mul_add(factor, lane.cov[packed(K, 0)]);
+        }
+        lane.cov[packed(6 + K, 0)] = lane.cov[packed(6 + K, SOURCE)].mul_add(factor, lane.cov[packed(6 + K, 0)]);
+    });
+    lane.cov[0] = (before + lane.cov[packed(SOURCE, 0)]).mul_add(factor, lane.cov[0]);
 }
 
 /// Adds `factor` times component `source` to component `row`, in mean and covariance.
@@ -181,23 +200,28 @@ struct Elimination<V> {
     innovation: [V; 6],
 }
 
-/// The order of the updates: `I`, which the others make independent, comes last.
-const ORDER: [usize; 6] = [1, 2, 3, 4, 5, 0];
-
 impl<V: Lanes> Elimination<V> {
     /// Takes one column through all updates; `rows[j]` receives its component `j` as update `j` met it.
     #[inline(always)]
     fn run(&self, column: &mut [V; 6], rows: &mut [V; 6]) {
-        for j in ORDER {
-            let own = column[j];
-            rows[j] = own;
-            for k in 0..6 {
-                if k != j {
-                    column[k] = self.gain[j][k].neg_mul_add(own, column[k]);
-                }
+        self.step::<1>(column, rows);
+        self.step::<2>(column, rows);
+        self.step::<3>(column, rows);
+        self.step::<4>(column, rows);
+        self.step::<5>(column, rows);
+        self.step::<0>(column, rows);
+    }
+
+    #[inline(always)]
+    fn step<const J: usize>(&self, column: &mut [V; 6], rows: &mut [V; 6]) {
+        let own = column[J];
+        rows[J] = own;
+        for_six!(K => {
+            if K != J {
+                column[K] = self.gain[J][K].neg_mul_add(own, column[K]);
             }
-            column[j] = own * self.keep[j];
-        }
+        });
+        column[J] = own * self.keep[J];
     }
 }
 
@@ -224,22 +248,22 @@ fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &
 #[inline(always)]
 fn take_in<V: Lanes, const J: usize>(lane: &mut Lane<V>, all: &mut Elimination<V>) {
     let mut row = [V::zero(); 6];
-    for k in 0..6 {
-        row[k] = lane.cov[packed(J, k)];
-        all.gain[J][k] = row[k] * all.inverse[J];
-        lane.mean[k] = all.gain[J][k].mul_add(all.innovation[J], lane.mean[k]);
-    }
-    for a in 0..6 {
-        for b in 0..6 {
-            if b <= a && a != J && b != J {
-                let at = packed(a, b);
-                lane.cov[at] = all.gain[J][a].neg_mul_add(row[b], lane.cov[at]);
+    for_six!(K => {
+        row[K] = lane.cov[packed(J, K)];
+        all.gain[J][K] = row[K] * all.inverse[J];
+        lane.mean[K] = all.gain[J][K].mul_add(all.innovation[J], lane.mean[K]);
+    });
+    for_six!(A => {
+        for_six!(B => {
+            if B <= A && A != J && B != J {
+                let at = packed(A, B);
+                lane.cov[at] = all.gain[J][A].neg_mul_add(row[B], lane.cov[at]);
             }
-        }
-    }
-    for k in 0..6 {
-        lane.cov[packed(J, k)] = row[k] * all.keep[J];
-    }
+        });
+    });
+    for_six!(K => {
+        lane.cov[packed(J, K)] = row[K] * all.keep[J];
+    });
 }
 
 /// One in each lane whose mean and variances are finite and whose variances are positive.

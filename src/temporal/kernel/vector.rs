@@ -47,8 +47,18 @@ pub(super) fn plus_times<V: Lanes, const K: usize>(a: &[V; K], factor: V, b: &[V
 #[inline(always)]
 pub(super) fn six<V: Lanes, const K: usize>(all: &[V; K], from: usize) -> [V; 6] {
     let mut out = [V::zero(); 6];
-    for k in 0..6 {
-        out[k] = all[from + k];
-    }
+    out.copy_from_slice(&all[from..from + 6]);
     out
 }
+
+/// Repeats a block for `K = 0, 1, ... 5`, as constants: conditions on the index vanish, and arrays stay in registers.
+macro_rules! for_six {
+    ($k:ident => $body:block) => {
+        for_six!(@each $k $body 0 1 2 3 4 5)
+    };
+    (@each $k:ident $body:block $($value:literal)*) => {$({
+        const $k: usize = $value;
+        $body
+    })*};
+}
+pub(super) use for_six;

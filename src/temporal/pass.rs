@@ -1,0 +1,185 @@
+//! One frame through the kernels: which blocks go together, and what is kept of them.
+
+use super::flow_filter::FlowFilter;
+use super::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
+use super::kernel::transition::{Exact, Rk4, Step};
+use super::kernel::update::{Decorrelation, MEASURED, Update};
+use super::kernel::{BLOCK, Constants, N, PLANES, packed};
+use super::measurement::{Fit, Measure};
+use super::options::{FilterForm, Transition};
+use crate::error::{Error, Result};
+use crate::simd::{Level, SimdReal, dispatch};
+use crate::types::Frame;
+use rayon::prelude::*;
+use std::any::Any;
+use std::marker::PhantomData;
+
+/// Blocks of one task: fixed, so that results do not depend on the number of threads.
+const TASK_BLOCKS: usize = 32;
+/// Blocks that go through the three passes together: few, so that their states stay in the first-level cache.
+const PASS_BLOCKS: usize = 2;
+
+/// Takes every block through measurement, prediction and update.
+///
+/// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence functions that are not generic, and the
+/// detour through [`Any`].
+#[allow(clippy::ptr_arg)] // A slice is no `Any`.
+pub(super) fn run<T: SimdReal>(
+    filter: &mut FlowFilter<T>,
+    frame: &Frame<T>,
+    marks: &mut [Mark],
+    results: &mut Vec<T>,
+) -> Result<()> {
+    let (filter, frame, results): (&mut dyn Any, &dyn Any, &mut dyn Any) = (filter, frame, results);
+    if let Some(filter) = filter.downcast_mut::<FlowFilter<f32>>() {
+        if let (Some(frame), Some(results)) = (frame.downcast_ref(), results.downcast_mut::<Vec<f32>>()) {
+            single_precision(filter, frame, marks, results);
+            return Ok(());
+        }
+    } else if let Some(filter) = filter.downcast_mut::<FlowFilter<f64>>()
+        && let (Some(frame), Some(results)) = (frame.downcast_ref(), results.downcast_mut::<Vec<f64>>())
+    {
+        double_precision(filter, frame, marks, results);
+        return Ok(());
+    }
+    Err(Error::Numerical("the flow filter works in single or double precision".into()))
+}
+
+#[inline(never)]
+fn single_precision(filter: &mut FlowFilter<f32>, frame: &Frame<f32>, marks: &mut [Mark], results: &mut [f32]) {
+    every_block(filter, frame, marks, results);
+}
+
+#[inline(never)]
+fn double_precision(filter: &mut FlowFilter<f64>, frame: &Frame<f64>, marks: &mut [Mark], results: &mut [f64]) {
+    every_block(filter, frame, marks, results);
+}
+
+/// Every block through its three passes; results are copied out while they are near.
+fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
+    let rows = filter.rows();
+    let FlowFilter { options, store, constants, decorrelation, fit, .. } = filter;
+    let level = options.simd.unwrap_or_else(Level::detect);
+    let pass = Pass {
+        frame,
+        fit,
+        constants,
+        decorrelation,
+        rows,
+        level,
+        form: options.form,
+        transition: options.transition,
+        scale: T::from_f64(255.0 / options.full_scale),
+    };
+    let states = store.blocks.par_chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
+    let pixels = store.pixels.par_chunks(BLOCK * TASK_BLOCKS);
+    let marks = marks.par_chunks_mut(TASK_BLOCKS);
+    let results = results.par_chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
+    states.zip(pixels).zip(marks).zip(results).for_each(|(((states, pixels), marks), results)| {
+        let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
+        let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);
+        let marks = marks.chunks_mut(PASS_BLOCKS);
+        let results = results.chunks_mut(rows.count * BLOCK * PASS_BLOCKS);
+        for (((states, pixels), marks), results) in states.zip(pixels).zip(marks).zip(results) {
+            pass.run(states, pixels, marks, results);
+        }
+    });
+}
+
+/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows {
+    pub covariance: usize,
+    pub residual: Option<usize>,
+    pub count: usize,
+}
+
+/// The upper triangle of the motion's covariance, row by row.
+pub(super) const PAIRS: [(usize, usize); 21] = {
+    let mut pairs = [(0, 0); 21];
+    let (mut k, mut a) = (0, 0);
+    while a < 6 {
+        let mut b = a;
+        while b < 6 {
+            pairs[k] = (a, b);
+            k += 1;
+            b += 1;
+        }
+        a += 1;
+    }
+    pairs
+};
+
+/// What the blocks of a frame have in common.
+struct Pass<'a, T> {
+    frame: &'a Frame<T>,
+    fit: &'a Fit<T>,
+    constants: &'a Constants<T>,
+    decorrelation: &'a Decorrelation<T>,
+    rows: Rows,
+    level: Level,
+    form: FilterForm,
+    transition: Transition,
+    scale: T,
+}
+
+impl<T: SimdReal> Pass<'_, T> {
+    /// Measurement, prediction, update of a few blocks.
+    fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
+        let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
+        let zero = T::from_f64(0.0);
+        let (mut measured, mut residual) = ([zero; PASS_BLOCKS * MEASURED * BLOCK], [zero; PASS_BLOCKS * BLOCK]);
+        let mut repaired = [0u8; PASS_BLOCKS * BLOCK];
+        let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
+        let repaired = &mut repaired[..pixels.len()];
+        let wanted = rows.residual.map(|_| &mut residual[..pixels.len()]);
+        dispatch(level, Measure { frame, pixels, fit, scale, measured, residual: wanted });
+        match self.transition {
+            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, repaired, constants),
+            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, repaired, constants),
+        }
+        dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
+        for (b, mark) in marks.iter_mut().enumerate() {
+            mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
+            let present = &measured[(b * MEASURED + 6) * BLOCK..][..BLOCK];
+            for k in 0..BLOCK {
+                mark.missing[k] = u8::from(present[k] == zero);
+            }
+            let block = &blocks[b * PLANES * BLOCK..];
+            let out = &mut results[b * rows.count * BLOCK..(b + 1) * rows.count * BLOCK];
+            out[..6 * BLOCK].copy_from_slice(&block[6 * BLOCK..N * BLOCK]);
+            for (row, &(i, j)) in out[6 * BLOCK..].chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
+                let plane = N + packed(6 + i, 6 + j);
+                row.copy_from_slice(&block[plane * BLOCK..(plane + 1) * BLOCK]);
+            }
+            if let Some(row) = rows.residual {
+                out[row * BLOCK..].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
+            }
+        }
+    }
+}
+
+/// What happened to the pixels of a block.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mark {
+    pub repaired: [u8; BLOCK],
+    pub missing: [u8; BLOCK],
+}
+
+fn predict<T: SimdReal, S: Step>(
+    level: Level,
+    form: FilterForm,
+    blocks: &mut [T],
+    repaired: &mut [u8],
+    constants: &Constants<T>,
+) {
+    let step = PhantomData::<S>;
+    match form {
+        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, repaired, constants, step }),
+        FilterForm::NonAugmented => {
+            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, repaired, constants, step });
+        }
+        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, repaired, constants, step }),
+        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, repaired, constants, step }),
+    }
+}
