@@ -299,40 +299,39 @@ fn nees(
     (total / count, about / count * realisations as f64 / (realisations as f64 - 1.0))
 }
 
+/// Over noise realisations the normalised error squared of the six parameters averages 6, and may lie between 5 and 7.5.
+///
+/// With slow motion, whatever discretisation does is small: the whole error is covered, with the noise known and with the noise from the residual.
+/// With the faster reference motion the variance still is; discretisation adds its bias to the error, and its misfit to the residual, which covers it.
 #[test]
 fn covariance_is_calibrated() {
     let region = Some(Rect { x: 18, y: 18, width: 48, height: 48 });
     let common = Common { sites: Sites::Grid { region, stride: 6 }, covariance: true, ..Common::default() };
-    let (some, none) = (Some(1.5), None);
+    let slow = [0.1, 0.05, 0.003, 0.006, -0.006, 0.003];
+    let fair = 5.0..=7.5;
     for (grain, noise, presmooth, sigma, rows) in [
-        (2.0, 4.0, some, 4.0, RowSet::All),
-        (3.0, 4.0, none, 4.0, RowSet::All),
-        (2.0, 4.0, none, 3.0, RowSet::All),
-        (3.0, 2.0, some, 4.0, RowSet::All),
+        (2.0, 4.0, Some(1.5), 4.0, RowSet::All),
+        (3.0, 2.0, Some(1.5), 4.0, RowSet::All),
         (3.0, 4.0, Some(2.0), 6.0, RowSet::Gradient),
-        (2.0, 4.0, some, 4.0, RowSet::Gradient),
+        (2.0, 4.0, Some(1.5), 4.0, RowSet::Gradient),
         (2.0, 4.0, Some(0.7), 4.0, RowSet::Gradient),
-        (2.0, 4.0, none, 4.0, RowSet::Gradient),
-        (2.0, 2.0, none, 3.0, RowSet::Gradient),
-        (3.0, 2.0, some, 4.0, RowSet::Gradient),
-        (3.0, 2.0, none, 4.0, RowSet::Gradient),
-        (3.0, 4.0, none, 4.0, RowSet::Jet),
+        (2.0, 4.0, None, 4.0, RowSet::Gradient),
         (3.0, 4.0, Some(2.0), 6.0, RowSet::Brightness),
-        (3.0, 4.0, none, 4.0, RowSet::Brightness),
+        (3.0, 4.0, None, 4.0, RowSet::Brightness),
     ] {
-        for known in [true, false] {
-            for motion in [REFERENCE, [0.1, 0.05, 0.003, 0.006, -0.006, 0.003]] {
-                let texture = Noise::new(grain, 40.0, 128.0, 5).unwrap();
-                let scene = AffineTexture::with_noise((84, 84), motion, texture);
-                let options = WindowedOptions { rows, sigma, presmooth, ..WindowedOptions::default() };
-                let level = known.then(|| (noise * noise + 1.0 / 12.0_f64).sqrt());
-                let common = Common { noise: level, ..common.clone() };
-                let (total, about) = nees(&scene, &options, &common, noise, 12);
-                println!(
-                    "grain {grain} noise {noise} smooth {presmooth:?} window {sigma} {rows:?} known {known} m {}: {total:.2} about the mean {about:.2}",
-                    motion[0]
-                );
-            }
+        let options = WindowedOptions { rows, sigma, presmooth, ..WindowedOptions::default() };
+        let known = Common { noise: Some((noise * noise + 1.0 / 12.0_f64).sqrt()), ..common.clone() };
+        let scene = |motion| AffineTexture::with_noise((84, 84), motion, Noise::new(grain, 40.0, 128.0, 5).unwrap());
+        let case = format!("grain {grain}, noise {noise}, smoothed {presmooth:?}, window {sigma}, {rows:?}");
+        let (total, about) = nees(&scene(slow), &options, &known, noise, 12);
+        assert!(fair.contains(&total) && fair.contains(&about), "{case}, noise known: {total} {about}");
+        let (total, _) = nees(&scene(slow), &options, &common, noise, 12);
+        assert!(fair.contains(&total), "{case}, noise from the residual: {total}");
+        let (_, about) = nees(&scene(REFERENCE), &options, &known, noise, 12);
+        assert!(fair.contains(&about), "{case}, reference motion: {about}");
+        if presmooth.is_some() {
+            let (total, _) = nees(&scene(REFERENCE), &options, &common, noise, 12);
+            assert!((4.5..=7.5).contains(&total), "{case}, reference motion, noise from the residual: {total}");
         }
     }
 }

@@ -16,17 +16,23 @@
 //! the same bits as without the damage.
 //!
 //! # Covariance
-//! Described in the `covariance` part: first-order propagation of white pixel noise through smoothing, stencils and window, the noise of the coefficients included. On
-//! textures of 1.5 to 3 px with 1 to 4 grey levels of noise, windows of 3 to 6 px and smoothing of 0 to 2 px the normalised
-//! error squared of the six parameters about their mean is 5 to 7. What discretisation adds is a bias that no noise model knows: with a known, small noise on
-//! fine texture (below about 1.5 grey levels of noise, or texture below 2 px) it dominates. Estimating the noise from the residual, the default,
-//! covers most of it, since the misfit shows there too.
+//! First-order propagation of white pixel noise through smoothing, stencils and window, noise of the coefficients included; the noise itself
+//! is [`Common::noise`](crate::flow::Common::noise) or comes from the residual. Measured on textures of 2 and 3 px with 2 and 4 grey levels of noise, rounded to whole grey
+//! levels, windows of 3 to 6 px: the normalised error squared of the six parameters about their mean over noise realisations is 5 to 6.3 (6 is exact) with the noise
+//! known, for every row set, smoothed by 0.7 to 2 px or not. Against the truth it is 5 to 7.2 while motion is slow (0.1 px/frame), with the noise from the residual as well.
+//!
+//! What discretisation adds is a bias that no noise model knows. At 0.3 px/frame and more it shows: 5.3 to 8.4 with the noise known and smoothing, 4.7 to 5.9
+//! with the noise from the residual, where the misfit shows too and widens the covariance. It dominates (8 to 20) without smoothing, most for the rows
+//! that use second derivatives, whose coefficients are then mostly noise ([`RowSet::Jet`], [`RowSet::All`] with 4 grey levels), and wherever a noise of about a
+//! grey level or less is declared on texture of 2 px or finer. Smooth, or leave the noise to the residual.
 //!
 //! # Which rows
-//! Measured at a single level on sequences with known flow of less than a pixel a frame (Middlebury, Yosemite, particle images, speckle; and the same reduced to a
-//! quarter): rows 1-3 were best or near best everywhere in both flow and Jacobian, hence the default. Row 1 alone costs a third and is biased by a few
-//! per cent on fine texture, because brightness and its gradient are smoothed differently by the same stencil. All twelve rows are best on clean band-limited
-//! texture. Smoothing by 1 px halves the error where motion or noise are large.
+//! Measured at a single level where the known flow is below a pixel a frame (Middlebury, Yosemite, particle images, speckle, pairs and triples; and all but the speckle again
+//! reduced to a quarter), frames smoothed by 1 px, window 4 px: rows 1-3 gave the least mean error or one within a sixth of the least, in flow and Jacobian; hence the
+//! default. Row 1 alone is the cheapest and 1.0 to 2.6 times as far off, for one thing because a stencil smooths brightness less than its
+//! gradient. Twelve rows were best on Yosemite (by a sixth) and are best on band-limited texture (by half); they need three frames.
+//! Smoothing by 1 px took the error of rows 1-3 to 0.3-0.9 times that of raw frames on most of these, and to 1.2-1.4 times on
+//! speckle and one Middlebury pair.
 
 mod combine;
 mod covariance;

@@ -186,6 +186,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             reach: self.owner.stencil.reach(),
             support: &self.support,
             second: self.setting.rows == 12,
+            level: self.setting.level,
         };
         let Some(noise) = &self.noise else {
             let strip = Strip::new(&source, &self.setting, rows.to_vec(), columns);
