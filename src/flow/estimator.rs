@@ -196,7 +196,7 @@ impl Estimator {
         match (&self.engine, frames) {
             (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field),
             (Engine::Instantaneous(_), _) => {}
-            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field)?,
+            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field),
             (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.common, field)?,
             (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.common, field)?,
         }

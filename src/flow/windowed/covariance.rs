@@ -180,7 +180,9 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                 }
                 if !self.source.support.is_whole() {
                     let more = self.setting.window.radius() - radius;
-                    centres.iter_mut().for_each(|c| *c += more);
+                    for centre in centres.iter_mut() {
+                        *centre += more;
+                    }
                     usable_sums.sum(level, &self.setting.window, usable, (0, 2, 0), centres);
                 }
                 for g in 0..rows.len() {

@@ -152,13 +152,12 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
                 }
                 trace = trace + b[i][i];
             }
-            let variance = match setting.variance {
-                Some(v) => V::constant(v),
-                None => {
-                    let expected = one_pixel::<V>(noise, &m) * weight;
-                    let left = (expected - trace).max(expected * V::constant(0.05));
-                    residual / left
-                }
+            let variance = if let Some(v) = setting.variance {
+                V::constant(v)
+            } else {
+                let expected = one_pixel::<V>(noise, &m) * weight;
+                let left = (expected - trace).max(expected * V::constant(0.05));
+                residual / left
             };
             // The pull acts on the true motion, which is what is left after undoing it.
             let mut shift = [V::zero(); 6];

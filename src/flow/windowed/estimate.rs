@@ -155,6 +155,14 @@ struct Band<'a, T> {
     status: &'a mut [Status],
 }
 
+impl<T: SimdReal> Band<'_, T> {
+    /// No estimate at this place.
+    fn clear(&mut self, at: usize) {
+        let planes = self.motion.iter_mut().chain(&mut self.inverse).chain(std::iter::once(&mut self.residual));
+        planes.for_each(|plane| plane[at] = T::nan());
+    }
+}
+
 /// Buffers of one thread.
 struct Scratch<T> {
     jets: JetTile<T>,
@@ -234,8 +242,13 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
     fn solve_row(&mut self, j: usize, g: usize, left: usize) {
         let Scratch { moments: sums, solved, .. } = &mut *self.scratch;
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
-        let solve = Solve { plan: Plan::new(self.setting.rows), row, solved, inverse: self.setting.inverse };
-        dispatch(self.setting.level, solve);
+        let (level, inverse) = (self.setting.level, self.setting.inverse);
+        // Rows 1-6 and 1-12 have the same planes.
+        match self.setting.rows {
+            1 => dispatch(level, Solve::<T, 1> { row, solved, inverse }),
+            3 => dispatch(level, Solve::<T, 3> { row, solved, inverse }),
+            _ => dispatch(level, Solve::<T, 6> { row, solved, inverse }),
+        }
         self.keep(j, g, left);
     }
 
@@ -250,6 +263,10 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let down = setting.window.partial(y, inside.start, inside.end)[0];
         let place = |k: usize| (k * GROUP_ROWS + g) * TILE_COLUMNS;
         let solved = &scratch.solved;
+        let planes = band.motion.iter_mut().chain(std::iter::once(&mut band.residual)).chain(&mut band.inverse);
+        for (plane, k) in planes.zip([0, 1, 2, 3, 4, 5, 8].into_iter().chain(9..)) {
+            plane[at..at + count].copy_from_slice(&solved[k * TILE_COLUMNS..k * TILE_COLUMNS + count]);
+        }
         for c in 0..count {
             let (x, out) = (left + c, at + c);
             let weight = if source.support.is_whole() {
@@ -264,6 +281,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             }
             band.status[out] = status;
             if status != Status::Ok {
+                band.clear(out);
                 continue;
             }
             let quality = solved[6 * TILE_COLUMNS + c].to_f64();
@@ -271,13 +289,8 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             let determined = quality >= setting.tolerance && largest > setting.floor;
             if determined {
                 band.rank[out] = 6;
-                for (k, plane) in band.motion.iter_mut().enumerate() {
-                    plane[out] = solved[k * TILE_COLUMNS + c];
-                }
-                band.residual[out] = solved[8 * TILE_COLUMNS + c];
-                for (k, plane) in band.inverse.iter_mut().enumerate() {
-                    plane[out] = solved[(9 + k) * TILE_COLUMNS + c];
-                }
+            } else {
+                band.clear(out);
             }
             if determined && !setting.diagnostics {
                 continue;
@@ -309,19 +322,19 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
 }
 
 /// The normal equations of one row of a tile, solved.
-struct Solve<'a, T> {
-    plan: Plan,
+struct Solve<'a, T, const ROWS: usize> {
     row: MomentRow<'a, T>,
     solved: &'a mut [T],
     inverse: bool,
 }
 
-impl<T: SimdReal> Kernel<T> for Solve<'_, T> {
+impl<T: SimdReal, const ROWS: usize> Kernel<T> for Solve<'_, T, ROWS> {
     type Output = ();
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { plan, row, solved, inverse } = self;
+        let Self { row, solved, inverse } = self;
+        let plan = Plan::new(ROWS);
         let energy = plan.base(plan.planes() - 1);
         let mut c = 0;
         while c < TILE_COLUMNS {

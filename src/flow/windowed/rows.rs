@@ -105,10 +105,9 @@ impl Plan {
     /// Plane of the product of columns `i <= j` of the Jacobian (2 .. 6); `None` where it is zero.
     #[inline(always)]
     pub const fn inner(self, i: usize, j: usize) -> Option<usize> {
-        let first = FLOW_PLANES + self.mixed;
         const THREE: [[usize; 4]; 4] = [[0, 1, 9, 9], [9, 2, 9, 9], [9, 9, 0, 1], [9, 9, 9, 2]];
         const TEN: [[usize; 4]; 4] = [[0, 1, 2, 3], [9, 4, 5, 6], [9, 9, 7, 8], [9, 9, 9, 9]];
-        let (r, c) = (i - 2, j - 2);
+        let (first, r, c) = (FLOW_PLANES + self.mixed, i - 2, j - 2);
         match self.inner {
             0 => None,
             3 => {

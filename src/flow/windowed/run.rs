@@ -54,12 +54,7 @@ impl Windowed {
     }
 
     /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
-    pub fn estimate_into<T: SimdReal>(
-        &self,
-        frames: &[&Frame<T>],
-        common: &Common,
-        field: &mut FlowField<T>,
-    ) -> Result<()> {
+    pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         let sites = field.layout.sites.clone();
         let size = frames[0].size();
         common.threads.install(|| match &sites {
@@ -78,7 +73,6 @@ impl Windowed {
             }
             Sites::Points(points) => self.points(frames, common, points, field),
         });
-        Ok(())
     }
 
     fn points<T: SimdReal>(
@@ -101,7 +95,8 @@ impl Windowed {
                     let job = Job::new(self, frames, common, Rect { x, y, width: 1, height: 1 });
                     let column = job.local_x(x);
                     let results = job.strip(&[job.local_y(y)], column..column + 1);
-                    results.write_site(&job, (x, y), index - band.sites.start, &mut band);
+                    let run = Run { at: (x, y), step: 1, count: 1 };
+                    results.write_run(&job, &run, index - band.sites.start, &mut band);
                 }
             });
         } else {
@@ -186,7 +181,6 @@ impl<'a, T: SimdReal> Job<'a, T> {
             reach: self.owner.stencil.reach(),
             support: &self.support,
             second: self.setting.rows == 12,
-            level: self.setting.level,
         };
         let Some(noise) = &self.noise else {
             let strip = Strip::new(&source, &self.setting, rows.to_vec(), columns);
@@ -253,21 +247,26 @@ struct Covariance<T> {
 impl<T: SimdReal> Results<T> {
     /// Copies the sites that lie in the strip to their bands.
     fn write(&self, job: &Job<'_, T>, sites: &Sites, bands: &mut [FieldBand<'_, T>]) {
-        let width = match sites {
-            Sites::Grid { region, stride } => region.map_or(job.whole.0, |r| r.width).div_ceil(*stride),
-            Sites::Points(points) => points.len(),
-        };
-        bands.par_iter_mut().for_each(|band| {
-            for index in band.sites.clone() {
-                let at = sites.pixel(index % width, index / width);
-                self.write_site(job, at, index - band.sites.start, band);
+        bands.par_iter_mut().for_each(|band| match sites {
+            Sites::Grid { region, stride } => {
+                let width = region.map_or(job.whole.0, |r| r.width).div_ceil(*stride);
+                for row in band.sites.start / width..band.sites.end / width {
+                    let run = Run { at: sites.pixel(0, row), step: *stride, count: width };
+                    self.write_run(job, &run, row * width - band.sites.start, band);
+                }
+            }
+            Sites::Points(points) => {
+                for index in band.sites.clone() {
+                    let run = Run { at: points[index], step: 1, count: 1 };
+                    self.write_run(job, &run, index - band.sites.start, band);
+                }
             }
         });
     }
 
-    /// Copies the results at the frame's pixel `(x, y)`, if they are here, to place `to` of the band.
-    fn write_site(&self, job: &Job<'_, T>, (x, y): (usize, usize), to: usize, band: &mut FieldBand<'_, T>) {
-        let (x, y) = (job.local_x(x), job.local_y(y));
+    /// Copies the results of a run of the frame's pixels, if they are here, to the band from place `to` on.
+    fn write_run(&self, job: &Job<'_, T>, run: &Run, to: usize, band: &mut FieldBand<'_, T>) {
+        let (x, y) = (job.local_x(run.at.0), job.local_y(run.at.1));
         let strip = &self.strip;
         let wanted = self.covariance.as_ref().map_or(&strip.rows, |c| &c.rows);
         if wanted.first().is_none_or(|first| y < *first) || wanted.last().is_none_or(|last| y > *last) {
@@ -275,27 +274,57 @@ impl<T: SimdReal> Results<T> {
         }
         let from = place(&strip.rows, &strip.columns, (x, y));
         let n = strip.rows.len() * strip.columns.len();
-        band.status[to] = strip.status[from];
+        let places = to..to + run.count;
+        run.copy(&strip.status, from, &mut band.status[places.clone()]);
         for (k, plane) in band.motion.iter_mut().enumerate() {
-            let unit = if k < 2 { 1.0 } else { job.setting.scale };
-            plane[to] = strip.motion[k * n + from] * T::from_f64(unit);
+            let target = &mut plane[places.clone()];
+            run.copy(&strip.motion, k * n + from, target);
+            if k >= 2 {
+                let unit = T::from_f64(job.setting.scale);
+                for value in target {
+                    *value *= unit;
+                }
+            }
         }
         if let Some(covariance) = &self.covariance {
             let from = place(&covariance.rows, &covariance.columns, (x, y));
             let n = covariance.rows.len() * covariance.columns.len();
             for (k, plane) in band.covariance.iter_mut().enumerate() {
-                plane[to] = covariance.planes[k * n + from];
+                run.copy(&covariance.planes, k * n + from, &mut plane[places.clone()]);
             }
         }
         if let Some(plane) = &mut band.residual {
-            let count = T::from_f64(job.setting.rows as f64) * strip.weight[from];
-            plane[to] = crate::simd::Lanes::sqrt(strip.residual[from] / count);
+            let rows = T::from_f64(job.setting.rows as f64);
+            let sources = strip.residual[from..].iter().zip(&strip.weight[from..]).step_by(run.step);
+            for (value, (sum, weight)) in plane[places.clone()].iter_mut().zip(sources) {
+                *value = crate::simd::Lanes::sqrt(*sum / (rows * *weight));
+            }
         }
         if let Some(plane) = &mut band.rank {
-            plane[to] = strip.rank[from];
+            run.copy(&strip.rank, from, &mut plane[places.clone()]);
         }
         if let Some(plane) = &mut band.condition {
-            plane[to] = strip.condition[from];
+            run.copy(&strip.condition, from, &mut plane[places]);
+        }
+    }
+}
+
+/// Evenly spaced pixels of one row of the frame.
+struct Run {
+    at: (usize, usize),
+    step: usize,
+    count: usize,
+}
+
+impl Run {
+    /// Copies every `step`-th value of a plane from `from` on.
+    fn copy<S: Copy>(&self, plane: &[S], from: usize, target: &mut [S]) {
+        if self.step == 1 {
+            target.copy_from_slice(&plane[from..from + self.count]);
+        } else {
+            for (value, source) in target.iter_mut().zip(plane[from..].iter().step_by(self.step)) {
+                *value = *source;
+            }
         }
     }
 }
@@ -323,7 +352,7 @@ fn crop(sites: Rect, (width, height): (usize, usize), margin: usize) -> Rect {
 }
 
 /// The part of an image inside a rectangle; nothing is copied where that is all of it.
-fn cut<'a, S: Copy>(frame: &'a Frame<S>, part: Rect) -> Cow<'a, Frame<S>> {
+fn cut<S: Copy>(frame: &Frame<S>, part: Rect) -> Cow<'_, Frame<S>> {
     if (part.width, part.height) == frame.size() {
         return Cow::Borrowed(frame);
     }
@@ -331,12 +360,25 @@ fn cut<'a, S: Copy>(frame: &'a Frame<S>, part: Rect) -> Cow<'a, Frame<S>> {
 }
 
 /// Sums of squared gradients below this are what rounding alone leaves of a constant image.
-fn rounding_floor<T: Real>(frames: &[Cow<'_, Frame<T>>]) -> f64
-where
-    T: Clone,
-{
+fn rounding_floor<T: Real>(frames: &[Cow<'_, Frame<T>>]) -> f64 {
     let epsilon = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
-    let largest =
-        frames.iter().flat_map(|f| f.data()).map(|v| v.to_f64().abs()).filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let largest = frames.iter().map(|f| largest_magnitude(f.data())).fold(0.0, f64::max);
     (8.0 * epsilon * largest).powi(2)
+}
+
+/// Largest finite magnitude.
+fn largest_magnitude<T: Real>(data: &[T]) -> f64 {
+    let mut largest = [T::default(); 16];
+    let mut chunks = data.chunks_exact(16);
+    for chunk in &mut chunks {
+        for (most, v) in largest.iter_mut().zip(chunk) {
+            let magnitude = if *v < T::default() { -*v } else { *v };
+            *most = if magnitude > *most { magnitude } else { *most };
+        }
+    }
+    let most = largest.iter().chain(chunks.remainder()).map(|v| v.to_f64().abs()).fold(0.0, f64::max);
+    if most.is_finite() {
+        return most;
+    }
+    data.iter().map(|v| v.to_f64().abs()).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }

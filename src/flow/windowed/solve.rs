@@ -44,8 +44,8 @@ pub(super) fn normal_matrix<V: Lanes<Scalar = T>, T: SimdReal>(
         let (k, c) = (i / 2, i % 2);
         for j in i..6 {
             let (l, d) = (j / 2, j % 2);
-            let flow = if c < d { c + d } else { d + c };
-            let mut sum = row.load::<V>(plan.base(flow) + POWER[k][l], column);
+            // Planes 0, 1, 2 hold u u, u v, v v.
+            let mut sum = row.load::<V>(plan.base(c + d) + POWER[k][l], column);
             if l > 0
                 && let Some(p) = plan.mixed(c, j)
             {

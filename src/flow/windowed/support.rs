@@ -103,12 +103,15 @@ impl Support {
 /// Whether every sample is finite: a sum of products with zero is zero exactly then.
 fn all_finite<T: Real>(data: &[T]) -> bool {
     let zero = T::default();
-    data.chunks(64).all(|chunk| {
-        let mut sum = zero;
-        for &v in chunk {
-            sum += v * zero;
+    data.chunks(256).all(|chunk| {
+        // Independent sums, so that additions need not wait for one another.
+        let mut sums = [zero; 16];
+        for part in chunk.chunks(16) {
+            for (sum, &v) in sums.iter_mut().zip(part) {
+                *sum += v * zero;
+            }
         }
-        sum == zero
+        sums.iter().all(|s| *s == zero)
     })
 }
 
