@@ -1,5 +1,8 @@
 //! The binary, end to end: real processes, real files, exit codes.
 
+// Printed on purpose: a skipped recording is said.
+#![allow(clippy::print_stdout)]
+
 #[path = "cli/support.rs"]
 mod support;
 

@@ -316,7 +316,9 @@ fn exact_transition_agrees_with_runge_kutta_where_motion_is_small() {
                 ..FlowFilterOptions::patent()
             };
             let mut filter = FlowFilter::<f64>::new((16, 16), options).unwrap();
-            frames.iter().for_each(|f| drop(filter.push(f).unwrap()));
+            for frame in &frames {
+                filter.push(frame).unwrap();
+            }
             filter.state(0).unwrap()
         };
         let (rk4, (x, p)) = (state(Transition::Rk4), state(Transition::Exact));

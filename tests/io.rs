@@ -1,5 +1,8 @@
 //! Frames in and results out: the recorded sequences with truth, where they are there, and files handed from one room to another.
 
+// Printed on purpose: a skipped recording is said.
+#![allow(clippy::print_stdout)]
+
 use jacoflow::image::picture::{FlowColours, Quiver, SignedMap, arrows_on_grid, grey_picture};
 use jacoflow::image::{GaussianSmoother, Preprocess, Quantiser};
 use jacoflow::io::{

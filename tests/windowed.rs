@@ -1,5 +1,8 @@
 //! The windowed estimate against a naive sum over each window, against exact scenes, and its conventions.
 
+// Printed on purpose: the figures reached are part of the answer.
+#![allow(clippy::print_stdout)]
+
 use jacoflow::flow::windowed::{RowSet, WindowedOptions};
 use jacoflow::flow::{Common, Estimator, Method, RankPolicy};
 use jacoflow::image::GaussianSmoother;
@@ -62,7 +65,7 @@ fn naive<T: Real>(
             };
             let (jet, first, second) = match (frames.len(), options.scheme) {
                 (2, _) => {
-                    (zip(jets[0], jets[1], &|a, b| (a + b) / 2.0), zip(jets[1], jets[0], &|a, b| a - b), [0.0; 6])
+                    (zip(jets[0], jets[1], &|a, b| f64::midpoint(a, b)), zip(jets[1], jets[0], &|a, b| a - b), [0.0; 6])
                 }
                 (_, TimeScheme::Central) => (
                     jets[1],

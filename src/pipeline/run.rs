@@ -264,7 +264,7 @@ mod tests {
                 "frames".into()
             }
         }
-        Box::new(Frames(sizes.to_vec().into_iter(), 0))
+        Box::new(Frames(Vec::from(sizes).into_iter(), 0))
     }
 
     #[test]

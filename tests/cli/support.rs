@@ -99,5 +99,8 @@ pub fn names(folder: &Path) -> Vec<String> {
 
 /// Files of temporary names in a folder.
 pub fn temporary(folder: &Path) -> Vec<String> {
-    names(folder).into_iter().filter(|name| name.starts_with('.') || name.ends_with(".part")).collect()
+    names(folder)
+        .into_iter()
+        .filter(|name| name.starts_with('.') || Path::new(name).extension().is_some_and(|e| e == "part"))
+        .collect()
 }
