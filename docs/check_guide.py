@@ -30,6 +30,8 @@ def main() -> int:
         if (ROOT / name).exists():
             shutil.copy(ROOT / name, COPY / name)
     shutil.copytree(ROOT / "src", COPY / "src")
+    # Numbers that unit tests compare with.
+    shutil.copytree(ROOT / "tests" / "golden", COPY / "tests" / "golden")
     # Only the library is built: its benches stay behind, and so must their declarations.
     manifest = (COPY / "Cargo.toml").read_text()
     (COPY / "Cargo.toml").write_text(re.sub(r"\[\[bench\]\]\n(?:[^\[].*\n|\n)*", "", manifest) + "\n[workspace]\n")
