@@ -39,7 +39,7 @@ def main() -> None:
 
     sections: dict[str, Rows] = {
         "Flow per second, 640 x 480": flow_speed.speed(rounds),
-        "Flow filter, microseconds per pixel and frame, 320 x 240": filter_speed.speed(max(2, rounds // 2)),
+        "Flow filter, microseconds per pixel and frame, 640 x 480": filter_speed.speed(max(2, rounds // 2)),
         "Flow filter, agreement with the reference": filter_speed.agreement(60 if options.quick else 400),
     }
     if options.data is not None:

@@ -13,7 +13,7 @@ try:
 except ImportError:
     reference = None  # filterpy or scipy is missing
 
-WIDTH, HEIGHT = 320, 240
+WIDTH, HEIGHT = 640, 480
 FORMS = ("augmented", "non_augmented", "fast")
 
 
