@@ -12,6 +12,7 @@ mod filters;
 mod flow_filter;
 mod image;
 mod io;
+mod keywords;
 mod observability;
 mod options;
 mod progress;

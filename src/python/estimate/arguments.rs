@@ -10,40 +10,34 @@ use crate::image::Preprocess;
 use crate::jet::{Neighbourhood, TimeScheme};
 use crate::python::arrays::{self, ColourRule};
 use crate::python::image::renamed;
+use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Object, Precision};
 use pyo3::prelude::*;
 
-/// The keyword options, as a dictionary when pickled.
-#[derive(FromPyObject, IntoPyObject)]
-#[pyo3(from_item_all)]
-pub struct Arguments {
-    pub method: String,
-    pub model: String,
-    pub time_scheme: Option<String>,
-    pub neighbourhood: Object,
-    pub neighbourhood_sigma: Option<f64>,
-    pub window_sigma: Option<f64>,
-    pub rows: Option<String>,
-    pub smoothness: Option<f64>,
-    pub iterations: Option<i64>,
-    pub rank_deficient: String,
-    pub smooth: Option<f64>,
-    pub quantise: Option<f64>,
-    pub colour: Option<String>,
-    pub points: Object,
-    pub region: Option<(i64, i64, i64, i64)>,
-    pub stride: Option<i64>,
-    pub mask: Object,
-    pub fps: Option<f64>,
-    pub frame_period: Option<f64>,
-    pub pixel_pitch: Object,
-    pub covariance: Option<bool>,
-    pub diagnostics: bool,
-    pub noise: Option<f64>,
-    pub precision: Option<String>,
-    pub threads: Option<i64>,
-    pub simd: Option<String>,
+/// Hands the options of an estimator to `$then!`.
+macro_rules! estimator_options {
+    ($then:ident $target:tt) => {
+        with_common! {
+            $then $target
+            method: String as &str = "windowed",
+            model: String as &str = "affine",
+            time_scheme: Option<String> as Option<String> = None,
+            neighbourhood: Object as Object = None,
+            neighbourhood_sigma: Option<f64> as Option<f64> = None,
+            window_sigma: Option<f64> as Option<f64> = None,
+            rows: Option<String> as Option<String> = None,
+            smoothness: Option<f64> as Option<f64> = None,
+            iterations: Option<i64> as Option<i64> = None,
+            rank_deficient: String as &str = "nan",
+            covariance: Option<bool> as Option<bool> = None,
+            diagnostics: bool as bool = false,
+            noise: Option<f64> as Option<f64> = None,
+        }
+    };
 }
+pub(super) use estimator_options;
+
+estimator_options!(keep_options[Arguments]);
 
 /// The time scheme of two frames.
 pub const PAIR: &str = "pair";
@@ -63,26 +57,6 @@ impl Arguments {
         self.points = options::keep(py, self.points)?;
         self.mask = options::keep(py, self.mask)?;
         Ok(self)
-    }
-
-    /// The same options again.
-    pub fn copy(&self, py: Python<'_>) -> Self {
-        let object = |object: &Object| object.as_ref().map(|o| o.clone_ref(py));
-        Self {
-            method: self.method.clone(),
-            model: self.model.clone(),
-            time_scheme: self.time_scheme.clone(),
-            neighbourhood: object(&self.neighbourhood),
-            rows: self.rows.clone(),
-            rank_deficient: self.rank_deficient.clone(),
-            colour: self.colour.clone(),
-            points: object(&self.points),
-            mask: object(&self.mask),
-            pixel_pitch: object(&self.pixel_pitch),
-            precision: self.precision.clone(),
-            simd: self.simd.clone(),
-            ..*self
-        }
     }
 
     /// The core's options; errors name the arguments as Python knows them.

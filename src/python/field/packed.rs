@@ -46,16 +46,6 @@ impl<T: Real> Packed<T> {
         }
     }
 
-    /// No field yet, of `layout`.
-    pub fn none(layout: FieldLayout, covariance: bool) -> Result<Self> {
-        let mut packed = Self::one(CoreField::empty(layout, covariance)?);
-        packed.count = 0;
-        packed.motion.clear();
-        packed.status.clear();
-        packed.covariance = packed.covariance.map(|_| Vec::new());
-        Ok(packed)
-    }
-
     /// Adds the field of the next frame.
     pub fn append(&mut self, field: CoreField<T>) -> Result<()> {
         if (field.width, field.height) != (self.width, self.height) || field.motion.len() != self.stride() {

@@ -1,131 +1,20 @@
 //! `FlowFilter`: flow filtered in time.
 
+mod arguments;
+
 use super::arrays::{self, ColourRule};
 use super::field::FlowField;
+use super::keywords::{constructor, with_common};
 use super::options::{self, Object, Precision};
 use crate::error::Error;
-use crate::filter::SigmaPoints;
 use crate::image::Preprocess;
 use crate::simd::SimdReal;
-use crate::temporal::{FilterForm, FlowFilter as Core, FlowFilterOptions, Transition};
+use crate::temporal::{FlowFilter as Core, FlowFilterOptions};
 use crate::types::{AnyFrame, Frame, Sample, Sites};
+use arguments::{Arguments, filter_options};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
-
-/// The keyword options, as a dictionary when pickled.
-#[derive(FromPyObject, IntoPyObject)]
-#[pyo3(from_item_all)]
-#[allow(non_snake_case)]
-pub struct Arguments {
-    profile: String,
-    form: Option<String>,
-    transition: Option<String>,
-    neighbourhood: Object,
-    neighbourhood_sigma: Option<f64>,
-    Q: Object,
-    R: Option<f64>,
-    x0: Object,
-    P0: Object,
-    alpha: Option<f64>,
-    beta: Option<f64>,
-    kappa: Option<f64>,
-    full_scale: Option<f64>,
-    smooth: Option<f64>,
-    quantise: Option<f64>,
-    colour: Option<String>,
-    points: Object,
-    region: Option<(i64, i64, i64, i64)>,
-    stride: Option<i64>,
-    mask: Object,
-    fps: Option<f64>,
-    frame_period: Option<f64>,
-    pixel_pitch: Object,
-    covariance: bool,
-    precision: Option<String>,
-    threads: Option<i64>,
-    simd: Option<String>,
-}
-
-/// Twelve numbers, one for each component of the state.
-fn twelve(py: Python<'_>, name: &'static str, value: &Object, default: [f64; 12]) -> PyResult<[f64; 12]> {
-    let Some(value) = value else { return Ok(default) };
-    let (shape, values) = arrays::doubles(name, value.bind(py))?;
-    values
-        .try_into()
-        .map_err(|_| Error::argument(name, "twelve numbers, shape (12,)", format!("shape {shape:?}")).into())
-}
-
-impl Arguments {
-    fn keep(mut self, py: Python<'_>) -> PyResult<Self> {
-        let kept = [&mut self.neighbourhood, &mut self.Q, &mut self.x0, &mut self.P0, &mut self.points, &mut self.mask];
-        for object in kept {
-            *object = options::keep(py, object.take())?;
-        }
-        Ok(self)
-    }
-
-    fn copy(&self, py: Python<'_>) -> Self {
-        let object = |object: &Object| object.as_ref().map(|o| o.clone_ref(py));
-        Self {
-            profile: self.profile.clone(),
-            form: self.form.clone(),
-            transition: self.transition.clone(),
-            neighbourhood: object(&self.neighbourhood),
-            Q: object(&self.Q),
-            x0: object(&self.x0),
-            P0: object(&self.P0),
-            colour: self.colour.clone(),
-            points: object(&self.points),
-            mask: object(&self.mask),
-            pixel_pitch: object(&self.pixel_pitch),
-            precision: self.precision.clone(),
-            simd: self.simd.clone(),
-            ..*self
-        }
-    }
-
-    /// The core's options; `full_scale` stays that of the profile unless it was given.
-    fn options(&self, py: Python<'_>) -> PyResult<FlowFilterOptions> {
-        let base = match self.profile.as_str() {
-            "patent" => FlowFilterOptions::patent(),
-            "measured" => FlowFilterOptions::measured(),
-            other => {
-                let expected = "\"patent\" or \"measured\"";
-                return Err(Error::argument("profile", expected, format!("{other:?}")).into());
-            }
-        };
-        let points = base.sigma_points;
-        Ok(FlowFilterOptions {
-            neighbourhood: options::neighbourhood(
-                py,
-                &self.neighbourhood,
-                self.neighbourhood_sigma,
-                &base.neighbourhood,
-            )?,
-            form: self.form.as_deref().map_or(Ok(base.form), FilterForm::parse)?,
-            transition: self.transition.as_deref().map_or(Ok(base.transition), Transition::parse)?,
-            process_noise: twelve(py, "Q", &self.Q, base.process_noise)?,
-            measurement_noise: self.R.unwrap_or(base.measurement_noise),
-            initial_mean: twelve(py, "x0", &self.x0, base.initial_mean)?,
-            initial_covariance: twelve(py, "P0", &self.P0, base.initial_covariance)?,
-            sigma_points: SigmaPoints::new(
-                self.alpha.unwrap_or(points.alpha),
-                self.beta.unwrap_or(points.beta),
-                self.kappa.unwrap_or(points.kappa),
-            )?,
-            full_scale: self.full_scale.unwrap_or(base.full_scale),
-            sites: options::sites(py, &self.points, self.region, self.stride)?,
-            mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
-            covariance: self.covariance,
-            residual: base.residual,
-            pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(base.pixel_pitch),
-            frame_period: options::frame_period(self.fps, self.frame_period)?,
-            threads: options::threads(self.threads)?,
-            simd: options::simd(self.simd.as_deref())?,
-        })
-    }
-}
 
 /// The filters, once the first frame has told their number and precision.
 enum Engine {
@@ -160,78 +49,10 @@ pub struct FlowFilter {
     engine: Engine,
 }
 
+filter_options!(constructor [FlowFilter from Arguments]);
+
 #[pymethods]
 impl FlowFilter {
-    #[new]
-    #[pyo3(signature = (
-        *, profile="patent", form=None, transition=None, neighbourhood=None, neighbourhood_sigma=None, Q=None, R=None, x0=None, P0=None,
-        alpha=None, beta=None, kappa=None, full_scale=None, smooth=None, quantise=None, colour=None, points=None, region=None,
-        stride=None, mask=None, fps=None, frame_period=None, pixel_pitch=None, covariance=true, precision=None, threads=None, simd=None
-    ))]
-    fn new(
-        py: Python<'_>,
-        profile: &str,
-        form: Option<String>,
-        transition: Option<String>,
-        neighbourhood: Object,
-        neighbourhood_sigma: Option<f64>,
-        Q: Object,
-        R: Option<f64>,
-        x0: Object,
-        P0: Object,
-        alpha: Option<f64>,
-        beta: Option<f64>,
-        kappa: Option<f64>,
-        full_scale: Option<f64>,
-        smooth: Option<f64>,
-        quantise: Option<f64>,
-        colour: Option<String>,
-        points: Object,
-        region: Option<(i64, i64, i64, i64)>,
-        stride: Option<i64>,
-        mask: Object,
-        fps: Option<f64>,
-        frame_period: Option<f64>,
-        pixel_pitch: Object,
-        covariance: bool,
-        precision: Option<String>,
-        threads: Option<i64>,
-        simd: Option<String>,
-    ) -> PyResult<Self> {
-        Self::from_arguments(
-            py,
-            Arguments {
-                profile: profile.into(),
-                form,
-                transition,
-                neighbourhood,
-                neighbourhood_sigma,
-                Q,
-                R,
-                x0,
-                P0,
-                alpha,
-                beta,
-                kappa,
-                full_scale,
-                smooth,
-                quantise,
-                colour,
-                points,
-                region,
-                stride,
-                mask,
-                fps,
-                frame_period,
-                pixel_pitch,
-                covariance,
-                precision,
-                threads,
-                simd,
-            },
-        )
-    }
-
     /// Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
     ///
     /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status NON_FINITE. ValueError for a frame of another
@@ -291,7 +112,7 @@ impl FlowFilter {
     /// The options as a dictionary, in the units of the constructor.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.arguments.copy(py).into_pyobject(py)
+        (&self.arguments).into_pyobject(py)
     }
 
     /// Writes the states (one file, .npz) so that `load` goes on bit for bit, in the units of `state`.

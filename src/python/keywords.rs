@@ -1,0 +1,55 @@
+//! Keyword options, declared once each.
+//!
+//! A list of options is a macro that hands `name: kept as taken = default,` to another macro: [`keep_options`] makes the struct that holds and pickles
+//! them, [`constructor`] the `__new__` of a class that takes them. Python thereby sees the full signature, and an option is added in one line.
+
+/// Hands `$then!` its `[$target]`, the options `$own`, and those that whatever works on frames has.
+macro_rules! with_common {
+    ($then:ident [$($target:tt)*] $($own:tt)*) => {
+        $then! {
+            [$($target)*]
+            $($own)*
+            smooth: Option<f64> as Option<f64> = None,
+            quantise: Option<f64> as Option<f64> = None,
+            colour: Option<String> as Option<String> = None,
+            points: Object as Object = None,
+            region: Option<(i64, i64, i64, i64)> as Option<(i64, i64, i64, i64)> = None,
+            stride: Option<i64> as Option<i64> = None,
+            mask: Object as Object = None,
+            fps: Option<f64> as Option<f64> = None,
+            frame_period: Option<f64> as Option<f64> = None,
+            pixel_pitch: Object as Object = None,
+            precision: Option<String> as Option<String> = None,
+            threads: Option<i64> as Option<i64> = None,
+            simd: Option<String> as Option<String> = None,
+        }
+    };
+}
+
+/// The struct of the options: as a dictionary when pickled.
+macro_rules! keep_options {
+    ([$name:ident] $($option:ident: $kept:ty as $taken:ty = $default:tt,)*) => {
+        /// The keyword options, as a dictionary when pickled.
+        #[derive(FromPyObject, IntoPyObjectRef)]
+        #[pyo3(from_item_all)]
+        pub struct $name {
+            $(pub $option: $kept,)*
+        }
+    };
+}
+
+/// `__new__` with the options as keywords; `$class::from_arguments` makes the object.
+macro_rules! constructor {
+    ([$class:ident from $name:ident] $($option:ident: $kept:ty as $taken:ty = $default:tt,)*) => {
+        #[pymethods]
+        impl $class {
+            #[new]
+            #[pyo3(signature = (*, $($option = $default),*))]
+            fn new(py: Python<'_>, $($option: $taken),*) -> PyResult<Self> {
+                Self::from_arguments(py, $name { $($option: $option.into()),* })
+            }
+        }
+    };
+}
+
+pub(super) use {constructor, keep_options, with_common};
