@@ -7,6 +7,9 @@ use std::sync::{Arc, Mutex, OnceLock};
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
 
+/// Most threads for each processor.
+pub const USEFUL: usize = 4;
+
 /// How many threads a computation may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Threads(Option<usize>);
@@ -23,14 +26,17 @@ impl Threads {
         }
     }
 
-    /// The number of threads this resolves to.
+    /// The number of threads this resolves to: what was asked for, but never more than [`USEFUL`] for each processor.
+    ///
+    /// More would only cost memory, and thousands can bring a machine to its knees.
     pub fn count(self) -> usize {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
         self.0
             .or_else(|| std::env::var("JACOFLOW_THREADS").ok()?.parse().ok().filter(|&n| n > 0))
-            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+            .map_or(processors, |asked| asked.min(USEFUL * processors))
     }
 
-    /// Runs `work` where rayon's parallel iterators use exactly this many threads. One thread runs in place.
+    /// Runs `work` where rayon's parallel iterators use exactly this many threads.
     pub fn install<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
         pool(self.count()).install(work)
     }
@@ -112,6 +118,13 @@ mod tests {
             });
             assert!(buffer.iter().all(|&v| v == 1));
         }
+    }
+
+    #[test]
+    fn a_million_threads_are_not_started() {
+        let processors = std::thread::available_parallelism().unwrap().get();
+        assert_eq!(Threads::new(Some(1_000_000)).unwrap().count(), USEFUL * processors);
+        assert_eq!(Threads::new(Some(1)).unwrap().count(), 1);
     }
 
     #[test]
