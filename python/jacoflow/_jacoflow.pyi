@@ -197,7 +197,7 @@ class FlowField:
         """One number for a region: (value, standard deviation, number of sites) of the derived quantity `name`, in its unit.
 
         `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-        A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        The standard deviation allows for the correlation of neighbouring estimates. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
         """
     def unit(self, /, name: str) -> str:
         """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name."""
@@ -216,6 +216,9 @@ class FlowField:
     @property
     def pixel_pitch(self) -> tuple[float, float]:
         """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
+    @property
+    def correlation_length(self) -> float:
+        """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0 where they are independent or it is not known."""
     @property
     def model(self) -> str:
         """Name of the motion model (no unit)."""
@@ -736,6 +739,11 @@ class Scene:
         """
     def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
         """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth."""
+    def displacement(self, /, x: float, y: float, t: float, duration: float = 1.0) -> tuple[float, float] | None:
+        """How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later; None where the scene does not know.
+
+        It differs from `duration` times the velocity wherever paths are curved.
+        """
     def __getnewargs_ex__(self, /) -> tuple[tuple[str], dict[str, Any]]: ...
 
 @final

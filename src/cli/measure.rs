@@ -69,8 +69,7 @@ impl MeasureCommand {
         if matches!(method, Method::HornSchunck(_)) {
             return Err(Error::argument("method", "one with a covariance", method.name()));
         }
-        let window = MethodArguments::reach(method, self.input.smooth);
-        let sink = Measurements::open(&target, quantities, window)?;
+        let sink = Measurements::open(&target, quantities)?;
         if in_double(self.compute.precision, &opened.first, false) {
             self.run::<f64>(opened, prepared.estimator, sink, watch)
         } else {

@@ -140,6 +140,7 @@ impl Estimator {
             frame_period: self.common.frame_period,
             pixel_pitch: self.common.pixel_pitch,
             frame_index: first_index + self.reference_frame(),
+            correlation_length: self.method.correlation_length(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! What every estimator of this room is told.
 
-use super::baseline::{HornSchunckOptions, LucasKanadeOptions};
+use super::baseline::{HornSchunckOptions, LucasKanadeOptions, Window};
 use super::instantaneous::InstantaneousOptions;
 use super::windowed::WindowedOptions;
 use crate::error::{Error, Result};
@@ -140,6 +140,23 @@ impl Method {
             Self::Windowed(_) => "windowed",
             Self::LucasKanade(_) => "lucas_kanade",
             Self::HornSchunck(_) => "horn_schunck",
+        }
+    }
+
+    /// How far errors of neighbouring estimates go together, px (see [`FieldLayout::correlation_length`](crate::types::FieldLayout)): the
+    /// standard deviation of everything that an estimate is a weighted sum over.
+    pub fn correlation_length(&self) -> f64 {
+        match self {
+            Self::Instantaneous(o) => o.neighbourhood.spread(),
+            Self::Windowed(o) => {
+                let smoothing = o.presmooth.or(o.already_smoothed).unwrap_or(0.0);
+                o.sigma.hypot(o.neighbourhood.spread()).hypot(smoothing)
+            }
+            Self::LucasKanade(o) => match o.window {
+                Window::Gaussian(sigma) => sigma,
+                Window::Box(side) => ((side * side - 1) as f64 / 12.0).sqrt(),
+            },
+            Self::HornSchunck(_) => 0.0,
         }
     }
 }

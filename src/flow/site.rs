@@ -118,6 +118,7 @@ mod tests {
                 frame_period: None,
                 pixel_pitch: (1.0, 1.0),
                 frame_index: 0,
+                correlation_length: 0.0,
             };
             let mut field = FlowField::<f32>::empty(layout, true).unwrap();
             let n = field.len();

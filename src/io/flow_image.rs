@@ -64,6 +64,7 @@ impl FlowImage {
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: 0,
+            correlation_length: 0.0,
         };
         let mut field = FlowField::empty(layout, false)?;
         field.motion = [self.u.as_slice(), &self.v].concat();
@@ -109,6 +110,7 @@ mod tests {
             frame_period: None,
             pixel_pitch: (0.5, 0.25),
             frame_index: 0,
+            correlation_length: 0.0,
         };
         FlowField::empty(layout, false).unwrap()
     }

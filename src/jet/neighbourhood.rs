@@ -48,6 +48,19 @@ impl Neighbourhood {
         }
     }
 
+    /// Root mean square distance along one axis of the (weighted) pixels from their mean, px: how wide a Gaussian blurs as the fit does.
+    pub fn spread(&self) -> f64 {
+        let weigh = |&(x, y): &(i32, i32)| {
+            let squared = f64::from(x).powi(2) + f64::from(y).powi(2);
+            (f64::from(x), f64::from(y), self.sigma().map_or(1.0, |sigma| (-0.5 * squared / (sigma * sigma)).exp()))
+        };
+        let pixels: Vec<_> = self.offsets().iter().map(weigh).collect();
+        let total: f64 = pixels.iter().map(|p| p.2).sum();
+        let mean = |value: &dyn Fn(&(f64, f64, f64)) -> f64| pixels.iter().map(|p| p.2 * value(p)).sum::<f64>() / total;
+        let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+        (0.5 * mean(&|p| (p.0 - x).powi(2) + (p.1 - y).powi(2))).sqrt()
+    }
+
     /// Offsets of the pixels, row by row for a rectangle.
     pub fn offsets(&self) -> Vec<(i32, i32)> {
         match self {

@@ -6,14 +6,12 @@
 
 mod output;
 mod prefetch;
-mod region_motion;
 mod run;
 mod sink;
 mod stage;
 
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
-pub use region_motion::{RegionMotion, fit_region};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};
 pub use stage::{EstimatorStage, FilterStage, Output, Stage};

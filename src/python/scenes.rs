@@ -100,6 +100,14 @@ impl Scene {
         motion.map(|m| Ok(arrays::owned(py, &[6], m.to_array().to_vec())?.into_any())).transpose()
     }
 
+    /// How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later; None where the scene does not know.
+    ///
+    /// It differs from `duration` times the velocity wherever paths are curved.
+    #[pyo3(signature = (x, y, t, duration=1.0))]
+    fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
+        self.core.displacement(x, y, t, duration)
+    }
+
     fn __repr__(&self) -> String {
         let (width, height) = self.core.size();
         format!("Scene({:?}, width={width}, height={height}, seed={})", self.kind, self.options.seed)

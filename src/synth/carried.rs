@@ -45,12 +45,10 @@ impl<X: Texture, M: Motion> Scene for Carried<X, M> {
         self.texture.value(x, y)
     }
     fn motion(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>> {
-        let motion = self.motion.velocity(x, y, t);
-        motion.to_array().iter().all(|value| value.is_finite()).then_some(motion)
+        self.motion.truth(x, y, t)
     }
     fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
-        let (there_x, there_y) = self.motion.path_map(t, t + duration)(x, y);
-        Some((there_x - x, there_y - y))
+        Some(self.motion.displacement(x, y, t, duration))
     }
     fn frame(&self, t: f64) -> Frame<f64> {
         let back = self.motion.path_map(t, 0.0);

@@ -67,6 +67,7 @@ pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
         frame_period: None,
         pixel_pitch: (1.0, 1.0),
         frame_index: t.max(0.0).round() as usize,
+        correlation_length: 0.0,
     };
     let mut field = FlowField::<f64>::empty(layout, false)?;
     let (n, width, origin) = (field.len(), field.width, scene.origin());

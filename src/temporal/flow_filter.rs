@@ -157,6 +157,7 @@ impl<T: SimdReal> FlowFilter<T> {
             frame_period: options.frame_period,
             pixel_pitch: options.pixel_pitch,
             frame_index: self.frames - 1,
+            correlation_length: options.neighbourhood.spread(),
         };
         let mut field = FlowField::<T>::empty(layout, options.covariance)?;
         let n = field.len();

@@ -21,6 +21,9 @@ pub struct FieldLayout {
     pub pixel_pitch: (f64, f64),
     /// Index of the frame the estimate belongs to, counted from the first frame of the sequence.
     pub frame_index: usize,
+    /// How far errors of neighbouring estimates go together, px: about `exp(-d^2 / (4 l^2))` at distance `d`, as with estimates from Gaussian windows of
+    /// standard deviation `l` that overlap. 0: independent, or not known.
+    pub correlation_length: f64,
 }
 
 /// Flow with its Jacobian at `width x height` sites (points: one row), as planes.
@@ -161,6 +164,7 @@ mod tests {
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: 1,
+            correlation_length: 0.0,
         };
         let mut field = FlowField::<f32>::empty(layout, true).unwrap();
         assert!(field.affine(0).u.is_nan() && field.plane("u_x").is_none());

@@ -86,6 +86,24 @@ def test_rotation_centre():
     assert abs(median - 30) < 0.01
 
 
+@pytest.mark.parametrize("smooth", [None, 1.5])
+def test_the_deviation_of_a_regions_mean_holds_its_error(smooth):
+    """Neighbouring estimates share pixels: 1,600 of them are not 1,600 independent ones."""
+    truth = dict(u=0.1, v=0.05, u_x=0.003, v_x=0.006, u_y=-0.006, v_y=0.003)
+    scene = scenes.Scene("affine", width=72, height=72, seed=7, **truth)
+    clean = [scene.frame(t) for t in (-1.0, 0.0, 1.0)]
+    ratios = []
+    for seed in range(24):
+        camera = scenes.Sensor(noise=3.0, seed=seed)
+        frames = [camera.apply(frame, index) for index, frame in enumerate(clean)]
+        seen = jacoflow.estimate(frames, smooth=smooth)
+        for name, true in (("divergence", 0.006), ("curl", 0.012)):
+            value, std, count = seen.region_mean(name, (16, 16, 40, 40))
+            assert count == 1600
+            ratios.append((value - true) / std)
+    assert 0.2 < np.sqrt(np.mean(np.square(ratios))) < 1.2
+
+
 def test_what_cannot_be_asked(field):
     with pytest.raises(ValueError, match="name: expected one of u, v, "):
         field.value("beauty")

@@ -71,6 +71,8 @@ def test_the_scene_is_the_patents():
     assert_allclose(scene.frame(t)[80, 60], 0.2 * (60 * np.cos(OMEGA * t) + 80 * np.sin(OMEGA * t)) + 128, rtol=1e-12)
     assert_allclose(scene.motion(60, 80, t), TRUTH, atol=1e-12)
     assert_allclose([TRUTH[0], TRUTH[1]], [-2.513274, 1.884956], atol=1e-6)
+    # A quarter turn takes (60, 80) to (-80, 60), not along the velocity.
+    assert_allclose(scene.displacement(60, 80, t, 50), (-140, -20), atol=1e-9)
 
 
 @pytest.mark.parametrize("start", [0.0, 37.0, 250.0])

@@ -135,25 +135,6 @@ impl MethodArguments {
         }
     }
 
-    /// Standard deviation (px) of the area that one estimate draws on, for estimates from frames smoothed by `smoothed` px.
-    pub fn reach(method: &Method, smoothed: Option<f64>) -> f64 {
-        let of = |neighbourhood: &Neighbourhood| {
-            let offsets = neighbourhood.offsets();
-            let square: f64 = offsets.iter().map(|(x, y)| f64::from(x * x + y * y)).sum();
-            square / (2.0 * offsets.len().max(1) as f64)
-        };
-        let variance = match method {
-            Method::Windowed(options) => options.sigma.powi(2) + of(&options.neighbourhood),
-            Method::Instantaneous(options) => of(&options.neighbourhood),
-            Method::LucasKanade(options) => match options.window {
-                Window::Gaussian(sigma) => sigma * sigma,
-                Window::Box(side) => (side as f64).powi(2) / 12.0,
-            },
-            Method::HornSchunck(_) => 0.0,
-        };
-        (variance + smoothed.unwrap_or(0.0).powi(2)).sqrt()
-    }
-
     /// How fields are made, for the metadata of files.
     pub fn describe(&self, method: &Method) -> Value {
         json!({"method": method.name(), "options": format!("{method:?}"), "noise": self.noise})

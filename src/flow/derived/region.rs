@@ -1,5 +1,6 @@
 //! Derived quantities over a field, and their mean over a region.
 
+use super::sharing::sharing_among;
 use super::{Quantity, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::Real;
@@ -21,7 +22,7 @@ pub enum Aggregate {
 pub struct Mean {
     /// The value; NaN when no site has one.
     pub value: f64,
-    /// Its standard deviation, as if the sites were independent; at least what their scatter shows.
+    /// Its standard deviation, with the correlation of neighbouring estimates ([`sharing`](super::sharing())); at least what their scatter shows.
     pub std: f64,
     /// Sites that took part.
     pub count: usize,
@@ -94,19 +95,22 @@ pub fn region_mean<T: Real>(
             "a field without covariance",
         ));
     }
-    let inside = |index: usize| {
+    let inside = |&index: &usize| {
         let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
         region.is_none_or(|r| x >= r.x && y >= r.y && x - r.x < r.width && y - r.y < r.height)
     };
-    let sites: Vec<(f64, Option<f64>)> = (0..field.len())
-        .filter(|&i| field.status[i].is_valid() && inside(i))
-        .map(|i| at_site(field, quantity, i))
-        .filter(|(value, _)| value.is_finite())
-        .collect();
-    Ok(match aggregate {
+    let known = |&index: &usize| field.status[index].is_valid();
+    let (used, sites): (Vec<usize>, Vec<(f64, Option<f64>)>) = (0..field.len())
+        .filter(inside)
+        .filter(known)
+        .map(|index| (index, at_site(field, quantity, index)))
+        .filter(|(_, (value, _))| value.is_finite())
+        .unzip();
+    let mean = match aggregate {
         Aggregate::InverseVariance => weighted(&sites),
         Aggregate::Median => median_of(sites.into_iter().map(|s| s.0).collect()),
-    })
+    };
+    Ok(Mean { std: mean.std * sharing_among(&field.layout, field.width, &used).sqrt(), ..mean })
 }
 
 fn weighted(sites: &[(f64, Option<f64>)]) -> Mean {
@@ -157,6 +161,7 @@ mod tests {
             frame_period: period,
             pixel_pitch: (1.0, 1.0),
             frame_index: 0,
+            correlation_length: 0.0,
         };
         let mut field = FlowField::empty(layout, sd.is_some()).unwrap();
         field.motion.fill(0.0);
@@ -186,6 +191,11 @@ mod tests {
         let mean = region_mean(&f, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
         assert!((mean.value - 0.2).abs() < 1e-12 && mean.count == 3);
         assert!((mean.std - 0.3 / 3f64.sqrt()).abs() < 1e-12);
+        // Estimates that share their pixels are worth one.
+        let mut overlapping = f.clone();
+        overlapping.layout.correlation_length = 1e4;
+        let mean = region_mean(&overlapping, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
+        assert!((mean.std - 0.3).abs() < 1e-6);
         // Claimed errors far below the scatter are not believed.
         let tight =
             region_mean(&field(Some(1e-6), None), Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();

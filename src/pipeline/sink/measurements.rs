@@ -3,10 +3,9 @@
 use super::table::{Table, TableTarget};
 use super::{Ending, Sink, Step};
 use crate::error::{Error, Result};
-use crate::flow::derived::{Quantity, value_and_std};
+use crate::flow::derived::{Quantity, fit_region, value_and_std};
 use crate::io::cell;
 use crate::math::Real;
-use crate::pipeline::region_motion::fit_region;
 use crate::types::{FlowField, Sites};
 use std::path::PathBuf;
 
@@ -21,16 +20,15 @@ const HEADER: [&str; 9] = ["frame", "time_s", "x", "y", "quantity", "value", "st
 pub struct Measurements {
     table: Table,
     quantities: Vec<Quantity>,
-    window: f64,
 }
 
 impl Measurements {
-    /// Opens the table. `window` is the standard deviation (px) of the area that one estimate draws on.
+    /// Opens the table.
     ///
     /// # Errors
     /// As [`Table::create`].
-    pub fn open(target: &TableTarget, quantities: Vec<Quantity>, window: f64) -> Result<Self> {
-        Ok(Self { table: Table::create(target, &HEADER)?, quantities, window })
+    pub fn open(target: &TableTarget, quantities: Vec<Quantity>) -> Result<Self> {
+        Ok(Self { table: Table::create(target, &HEADER)?, quantities })
     }
 
     fn check<T>(&self, field: &FlowField<T>) -> Result<()> {
@@ -90,7 +88,7 @@ impl<T: Real> Sink<T> for Measurements {
                 self.rows(step, m, field.covariance_at(site).as_ref(), (x as f64, y as f64), share)?;
             }
         } else {
-            let fit = fit_region(field, self.window);
+            let fit = fit_region(field);
             self.rows(step, fit.motion, Some(&fit.covariance), fit.centre, fit.valid_share())?;
         }
         self.table.flush()

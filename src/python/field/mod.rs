@@ -1,6 +1,7 @@
 //! `FlowField`: flow, Jacobian, covariance and status of one frame or of a stack, as arrays that share the core's memory.
 
 mod derived;
+mod measures;
 mod packed;
 mod properties;
 mod state;

@@ -1,6 +1,6 @@
 //! What Python sees of a `FlowField`.
 
-use super::{FlowField, Slice, Store, derived, each, state};
+use super::{FlowField, Slice, Store, each, state};
 use crate::python::{arrays, io};
 use crate::types::{Sites, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
@@ -113,124 +113,6 @@ impl FlowField {
         each!(slf.get().store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
     }
 
-    /// Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn divergence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "divergence")
-    }
-
-    /// Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns clockwise on the screen.
-    #[getter]
-    fn curl<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "curl")
-    }
-
-    /// Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn shear_magnitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "shear_magnitude")
-    }
-
-    /// Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in (-pi/2, pi/2], from x towards y.
-    #[getter]
-    fn shear_axis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "shear_axis")
-    }
-
-    /// Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period.
-    #[getter]
-    fn angular_velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "angular_velocity")
-    }
-
-    /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or frame_period.
-    #[getter]
-    fn rpm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "rpm")
-    }
-
-    /// Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch.
-    #[getter]
-    fn centre_distance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "centre_distance")
-    }
-
-    /// Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W), frames, or s with a frame period; negative while it recedes.
-    #[getter]
-    fn time_to_contact<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "time_to_contact")
-    }
-
-    /// Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period.
-    #[getter]
-    fn speed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "speed")
-    }
-
-    /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
-    ///
-    /// It need not be in the picture. NaN where there is none.
-    #[getter]
-    fn rotation_centre<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let both = (self.value(py, "rotation_centre_x")?, self.value(py, "rotation_centre_y")?);
-        py.import("numpy")?.call_method1("stack", (both, -1))
-    }
-
-    /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)` tells.
-    ///
-    /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm without a frame period.
-    fn value<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        each!(self.store, packed => {
-            let mut data = Vec::new();
-            for index in 0..self.count {
-                let field = self.core(packed, index);
-                data.extend(py.detach(|| derived::value(&field, name))?);
-            }
-            Ok(arrays::owned(py, &self.shape(), data)?.into_any())
-        })
-    }
-
-    /// Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its unit: sqrt(g^T Cov g) with its gradient g.
-    ///
-    /// ValueError for another name and for a field without covariance.
-    fn std<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        each!(self.store, packed => {
-            let mut data = Vec::new();
-            for index in 0..self.count {
-                let field = self.core(packed, index);
-                data.extend(py.detach(|| derived::std(&field, name))?);
-            }
-            Ok(arrays::owned(py, &self.shape(), data)?.into_any())
-        })
-    }
-
-    /// One number for a region: (value, standard deviation, number of sites) of the derived quantity `name`, in its unit.
-    ///
-    /// `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-    /// A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
-    #[pyo3(signature = (name, region=None, aggregate=None))]
-    fn region_mean(
-        &self,
-        py: Python<'_>,
-        name: &str,
-        region: Option<(i64, i64, i64, i64)>,
-        aggregate: Option<&str>,
-    ) -> PyResult<(f64, f64, usize)> {
-        if self.stack {
-            return Err(PyTypeError::new_err("region_mean: expected a single field, got a stack; index it first"));
-        }
-        let region = crate::python::options::region(region)?;
-        each!(self.store, packed => {
-            let field = self.core(packed, 0);
-            Ok(py.detach(|| derived::region(&field, name, region, aggregate))?)
-        })
-    }
-
-    /// Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name.
-    fn unit(&self, name: &str) -> PyResult<&'static str> {
-        Ok(derived::unit(self.layout(), name)?)
-    }
-
     /// Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2).
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -264,6 +146,12 @@ impl FlowField {
     #[getter]
     fn pixel_pitch(&self) -> (f64, f64) {
         self.layout().pixel_pitch
+    }
+
+    /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0 where they are independent or it is not known.
+    #[getter]
+    fn correlation_length(&self) -> f64 {
+        self.layout().correlation_length
     }
 
     /// Name of the motion model (no unit).

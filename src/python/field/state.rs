@@ -15,6 +15,7 @@ pub fn save<'py>(field: &FlowField, py: Python<'py>) -> PyResult<Bound<'py, PyDi
     state.set_item("stack", field.stack)?;
     state.set_item("count", field.count)?;
     each!(field.store, packed => {
+        state.set_item("correlation_length", packed.layout.correlation_length)?;
         state.set_item("frame_index", packed.layout.frame_index + field.start)?;
         let part = |total: usize| {
             let length = total / packed.count.max(1);
@@ -78,6 +79,7 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> PyResult<FlowField> {
         frame_period: required(state, "frame_period")?.extract()?,
         pixel_pitch: required(state, "pixel_pitch")?.extract()?,
         frame_index: required(state, "frame_index")?.extract()?,
+        correlation_length: required(state, "correlation_length")?.extract()?,
     };
     let (width, height) = layout.sites.shape(layout.frame_size)?;
     let count: usize = required(state, "count")?.extract()?;

@@ -24,6 +24,18 @@ pub trait Motion: Send + Sync {
 
     /// The map that takes matter from its place at time `from` to its place at time `to`.
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_>;
+
+    /// Velocity and its Jacobian where they are finite, as a scene tells its truth.
+    fn truth(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>> {
+        let motion = self.velocity(x, y, t);
+        motion.to_array().iter().all(|value| value.is_finite()).then_some(motion)
+    }
+
+    /// How far the matter at `(x, y)` at time `t` has gone `duration` frames later, px.
+    fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> (f64, f64) {
+        let (there_x, there_y) = self.path_map(t, t + duration)(x, y);
+        (there_x - x, there_y - y)
+    }
 }
 
 impl<M: Motion + ?Sized> Motion for Box<M> {

@@ -1,5 +1,6 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
+use super::sharing;
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
@@ -32,13 +33,12 @@ impl RegionMotion {
 /// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of a field's valid sites:
 /// `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine motion from the centre to the site.
 ///
-/// Estimates of neighbouring sites share pixels: with a window of standard deviation `window` px their errors are correlated by
-/// `exp(-d^2 / (4 window^2))` at distance d, and the covariance is enlarged by the sum of these correlations. Where the estimates
+/// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing). Where the estimates
 /// scatter more than their covariances allow, it is enlarged by that ratio too (R. T. Birge, "The calculation of errors by the method of least squares", 1932), so that a region
 /// that does not move as one affine motion shows in the standard deviation.
 ///
 /// The motion is NaN where the field has no covariance or the sites do not determine six parameters.
-pub fn fit_region<T: Real>(field: &FlowField<T>, window: f64) -> RegionMotion {
+pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
     let centre = centre_of(field);
     let (dx, dy) = field.layout.pixel_pitch;
     let observed: Vec<usize> = observed_parameters(field);
@@ -62,7 +62,7 @@ pub fn fit_region<T: Real>(field: &FlowField<T>, window: f64) -> RegionMotion {
     let motion = inverse * right;
     let freedom = (count * observed.len()) as f64 - 6.0;
     let scatter = if freedom > 0.0 { ((square - right.dot(&motion)) / freedom).max(1.0) } else { 1.0 };
-    let covariance = inverse * (scatter * shared(field, window));
+    let covariance = inverse * (scatter * sharing(&field.layout));
     RegionMotion { motion: motion.into(), covariance: covariance.transpose().into(), ..unknown }
 }
 
@@ -115,19 +115,6 @@ fn centre_of<T>(field: &FlowField<T>) -> (f64, f64) {
     }
 }
 
-/// How many sites share one independent estimate, for a grid: the mean over the sites of their summed correlations.
-fn shared<T>(field: &FlowField<T>, window: f64) -> f64 {
-    let Sites::Grid { stride, .. } = field.layout.sites else { return 1.0 };
-    let along = |n: usize| -> f64 {
-        let pairs = (1..n).map(|lag| {
-            let distance = (lag * stride) as f64;
-            2.0 * (n - lag) as f64 * (-distance * distance / (4.0 * window * window)).exp()
-        });
-        1.0 + if window > 0.0 { pairs.sum::<f64>() / n as f64 } else { 0.0 }
-    };
-    along(field.width.max(1)) * along(field.height.max(1))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,6 +132,7 @@ mod tests {
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: 1,
+            correlation_length: 0.0,
         };
         let mut field = FlowField::empty(layout, true).unwrap();
         let (n, rng) = (field.len(), CounterRng::new(seed));
@@ -165,7 +153,7 @@ mod tests {
 
     #[test]
     fn an_affine_region_is_recovered_exactly() {
-        let fit = fit_region(&field(0.0, 0.01, 1), 0.0);
+        let fit = fit_region(&field(0.0, 0.01, 1));
         assert_eq!((fit.centre, fit.count, fit.sites), ((20.0, 10.0), 66, 66));
         for (got, want) in fit.motion.iter().zip(TRUTH) {
             assert!((got - want).abs() < 1e-9, "{got} {want}");
@@ -176,7 +164,7 @@ mod tests {
     fn normalised_errors_have_the_size_they_should() {
         let mut nees = 0.0;
         for seed in 0..200 {
-            let fit = fit_region(&field(0.05, 0.05, seed), 0.0);
+            let fit = fit_region(&field(0.05, 0.05, seed));
             let error = Vector6::from(fit.motion) - Vector6::from(TRUTH);
             let covariance = Matrix6::from(fit.covariance);
             nees += (error.transpose() * covariance.try_inverse().unwrap() * error)[0] / 200.0;
@@ -186,10 +174,12 @@ mod tests {
 
     #[test]
     fn scatter_and_shared_windows_enlarge_the_deviation() {
-        let honest = fit_region(&field(0.05, 0.05, 3), 0.0).covariance[2][2];
-        let boastful = fit_region(&field(0.05, 0.005, 3), 0.0).covariance[2][2];
+        let honest = fit_region(&field(0.05, 0.05, 3)).covariance[2][2];
+        let boastful = fit_region(&field(0.05, 0.005, 3)).covariance[2][2];
         assert!((0.5..2.0).contains(&(boastful / honest)), "{}", boastful / honest);
-        let overlapping = fit_region(&field(0.05, 0.05, 3), 4.0).covariance[2][2];
+        let mut overlapping = field(0.05, 0.05, 3);
+        overlapping.layout.correlation_length = 4.0;
+        let overlapping = fit_region(&overlapping).covariance[2][2];
         assert!(overlapping > 10.0 * honest);
     }
 
@@ -197,10 +187,10 @@ mod tests {
     fn too_few_sites_give_nan_not_a_guess() {
         let mut none = field(0.0, 0.01, 1);
         none.status.fill(Status::Border);
-        let fit = fit_region(&none, 0.0);
+        let fit = fit_region(&none);
         assert!(fit.motion.iter().all(|value| value.is_nan()) && fit.count == 0 && fit.valid_share() == 0.0);
         let mut bare = field(0.0, 0.01, 1);
         bare.covariance = None;
-        assert!(fit_region(&bare, 0.0).motion[0].is_nan());
+        assert!(fit_region(&bare).motion[0].is_nan());
     }
 }
