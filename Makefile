@@ -28,10 +28,6 @@ rustdoc:
 rust-test:
 	cargo test
 
-# The guide for newcomers, followed literally in a scratch copy.
-guide:
-	$(PYTHON) docs/check_guide.py
-
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
 	$(PYTHON) docs/check_guide.py
@@ -65,28 +61,16 @@ examples: install
 develop: $(BIN)/maturin
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --extras test
 
-# API reference of the Python package (target/docs) and of the crate (target/doc), generated from the docstrings; and README's picture.
-docs: install
-	$(BIN)/python -m pip install -q "pdoc>=15"
-	$(BIN)/python -m pdoc -o target/docs jacoflow
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
-	$(BIN)/python docs/overview_picture.py
-
-# Dated table of accuracy and speed against OpenCV and filterpy, measured in one process; JACOFLOW_DATA names a folder of recordings with truth.
-compare: install
-	$(BIN)/python -m pip install -q "opencv-python-headless>=4.10" "filterpy>=1.4.5"
-	$(BIN)/python benchmarks/compare.py
-
 # Ours and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
 compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 	$(BIN)/python benchmarks/compare.py $(if $(DATA),--data $(DATA))
 
-# API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python).
-docs: install
-	cargo doc --no-deps
+# API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python); and README's picture.
+docs: rustdoc install
 	$(BIN)/python -m pip install -q "pdoc>=15"
 	$(BIN)/python -m pdoc --docformat numpy --output-directory target/doc/python jacoflow
+	$(BIN)/python docs/overview_picture.py
 
 clean:
 	rm -rf target $(VENV) dist
