@@ -425,6 +425,13 @@ fn broken_states_are_refused_with_words() {
     let message = |bytes: &[u8]| FlowFilter::<f64>::from_bytes(bytes).unwrap_err().to_string();
     assert!(message(b"PK nothing").contains("filter state"));
     assert!(message(&[]).contains("filter state"));
+    for at in (0..good.len()).step_by(7) {
+        let mut bytes = good.clone();
+        bytes[at] ^= 0x20;
+        if let Ok(filter) = FlowFilter::<f64>::from_bytes(&bytes) {
+            assert_eq!(filter.to_bytes().unwrap(), good, "byte {at} is wrong and not noticed");
+        }
+    }
     for cut in [10, good.len() / 2, good.len() - 3] {
         assert!(FlowFilter::<f64>::from_bytes(&good[..cut]).is_err());
     }

@@ -50,6 +50,9 @@ pub(super) struct Metadata {
     statuses: BTreeMap<u8, String>,
     /// How the field was made, in the caller's words.
     options: String,
+    /// The arrays that only some fields have: a damaged name does not hide one.
+    #[serde(default)]
+    optional: Vec<String>,
 }
 
 /// Highest layout version this library reads.
@@ -78,6 +81,7 @@ impl Metadata {
             stride,
             statuses: Status::ALL.iter().map(|s| (*s as u8, s.name().into())).collect(),
             options: options.into(),
+            optional: Vec::new(),
         }
     }
 
@@ -159,7 +163,9 @@ fn write_arrays<T: Real + Element, W: Write + Seek>(
     options: &str,
 ) -> Result<()> {
     let (w, h, p) = (field.width, field.height, field.layout.parameters.len());
-    npz.text("metadata", &Metadata::new(&field.layout, options).to_json(path)?)?;
+    let mut metadata = Metadata::new(&field.layout, options);
+    metadata.optional = optional_arrays(field);
+    npz.text("metadata", &metadata.to_json(path)?)?;
     npz.array("motion", &[p, h, w], &field.motion)?;
     npz.array("flow", &[h, w, 2], &interleaved(field, &["u", "v"]))?;
     npz.array("jacobian", &[h, w, 2, 2], &interleaved(field, &["u_x", "u_y", "v_x", "v_y"]))?;
@@ -181,6 +187,17 @@ fn write_arrays<T: Real + Element, W: Write + Seek>(
         npz.array("points", &[points.len(), 2], &pairs)?;
     }
     Ok(())
+}
+
+/// Names of the planes that this field has and another might not.
+fn optional_arrays<T>(field: &FlowField<T>) -> Vec<String> {
+    let present = [
+        ("covariance", field.covariance.is_some()),
+        ("residual", field.residual.is_some()),
+        ("rank", field.rank.is_some()),
+        ("condition", field.condition.is_some()),
+    ];
+    present.into_iter().filter(|(_, present)| *present).map(|(name, _)| name.to_string()).collect()
 }
 
 /// The planes called `names`, interleaved site by site. Where the estimate is missing so are the parameters that the model assumes zero.
@@ -220,6 +237,9 @@ pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<
             metadata.format, metadata.version
         );
         return Err(npz.wrong("metadata", &what));
+    }
+    if let Some(lost) = metadata.optional.iter().find(|name| !npz.contains(name)) {
+        return Err(npz.wrong(lost, "is missing"));
     }
     let points = if metadata.stride.is_none() { Some(read_points(npz)?) } else { None };
     let layout = metadata.layout(points);

@@ -161,7 +161,7 @@ impl<R: Read + Seek> NpzReader<R> {
     /// The array `name`, which must have elements of type `T`.
     ///
     /// # Errors
-    /// [`Error::Format`] when it is missing, damaged or of another type.
+    /// [`Error::Format`] when it is missing, damaged (each array has a checksum) or of another type.
     pub fn array<T: Element>(&mut self, name: &str) -> Result<NpyArray<T>> {
         let (header, bytes) = self.read(name)?;
         if header.element != T::TYPE {
@@ -213,9 +213,14 @@ impl<R: Read + Seek> NpzReader<R> {
             header.byte_count().ok_or_else(|| wrong(format!("has an impossible shape {:?}", header.shape)))?;
         // Grown as the bytes come: what the header claims is not taken on trust.
         let mut bytes = Vec::new();
-        entry.take(expected as u64).read_to_end(&mut bytes).map_err(|e| wrong(format!("is damaged: {e}")))?;
+        let damaged = |e| wrong(format!("is damaged: {e}"));
+        entry.by_ref().take(expected as u64).read_to_end(&mut bytes).map_err(damaged)?;
         if bytes.len() < expected {
             return Err(wrong(format!("is cut off: {} of {expected} bytes", bytes.len())));
+        }
+        // The checksum is compared when the end is met, which the array's own length does not reach.
+        if entry.read(&mut [0]).map_err(damaged)? > 0 {
+            return Err(wrong(format!("goes on after its {expected} bytes")));
         }
         Ok((header, bytes))
     }

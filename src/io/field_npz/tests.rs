@@ -57,6 +57,30 @@ fn every_plane_and_the_layout_come_back() {
 }
 
 #[test]
+fn a_field_with_flipped_bytes_is_refused_or_the_same() {
+    let field = numbered(Sites::default());
+    let good = write_npz_to(Cursor::new(Vec::new()), "x.npz", &field, "").unwrap().into_inner();
+    let rng = crate::math::random::CounterRng::new(4);
+    let mut refused = 0;
+    for case in 0..2000 {
+        let mut bytes = good.clone();
+        for k in 0..3 {
+            let at = (rng.uniform(3 * case + k) * bytes.len() as f64) as usize;
+            bytes[at] ^= 0x40;
+        }
+        let back = NpzReader::new(Cursor::new(bytes), "x.npz").and_then(|mut npz| read_npz_from::<f32, _>(&mut npz));
+        match back {
+            Ok(back) => assert!(back.field == field, "case {case} is wrong and not noticed"),
+            Err(error) => {
+                assert!(matches!(error, Error::Format { .. }) && error.to_string().contains("x.npz"), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 1500, "{refused}");
+}
+
+#[test]
 fn flow_and_jacobian_are_arranged_for_numpy() {
     let mut npz = stored(&numbered(Sites::default()));
     let n = 35.0;

@@ -71,6 +71,46 @@ fn a_header_that_promises_too_much_is_cut_off_not_allocated() {
     assert!(npz.array::<f64>("a").unwrap_err().to_string().contains("cut off"));
 }
 
+#[test]
+fn any_changed_byte_gives_an_error_or_the_same_content() {
+    let good = sample();
+    type Content = (Vec<u32>, Vec<f64>, Vec<u8>, Vec<u32>, Vec<i64>, String);
+    let content = |bytes: Vec<u8>| -> Result<Content> {
+        let mut npz = reader(bytes)?;
+        Ok((
+            npz.array::<f32>("planes")?.values.iter().map(|v| v.to_bits()).collect(),
+            npz.array::<f64>("exact")?.values,
+            npz.array::<u8>("codes")?.values,
+            npz.array::<u32>("counts")?.values,
+            npz.array::<i64>("index")?.values,
+            npz.text("metadata")?,
+        ))
+    };
+    let whole = content(good.clone()).unwrap();
+    let mut refused = 0;
+    for at in 0..good.len() {
+        let mut bytes = good.clone();
+        bytes[at] ^= 0x15;
+        match content(bytes) {
+            Ok(read) => assert_eq!(read, whole, "byte {at}"),
+            Err(error) => {
+                assert!(error.to_string().contains("memory.npz"), "byte {at}: {error}");
+                refused += 1;
+            }
+        }
+    }
+    // What may be changed unnoticed is only what the archive says twice or not of the content, such as times.
+    assert!(refused > good.len() / 2, "{refused} of {}", good.len());
+}
+
+#[test]
+fn an_array_longer_than_it_says_is_refused() {
+    let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+    npz.array_from("a", &NpyHeader::new(ElementType::U8, &[2]), |out| out.write_all(&[1, 2, 3])).unwrap();
+    let mut npz = reader(npz.into_inner().unwrap().into_inner()).unwrap();
+    assert!(npz.array::<u8>("a").unwrap_err().to_string().contains("goes on"));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
     #[test]
