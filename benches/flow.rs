@@ -66,6 +66,18 @@ fn instantaneous(c: &mut Criterion) {
             }
         }
     }
+    for (name, covariance, diagnostics) in [("3x3_covariance", true, false), ("3x3_diagnostics", false, true)] {
+        for level in Level::available() {
+            let common =
+                Common { threads: one_thread(), simd: Some(level), covariance, diagnostics, ..Common::default() };
+            let method = Method::Instantaneous(InstantaneousOptions::default());
+            let estimator = Estimator::new(method, common).expect("the options are valid");
+            let mut field = estimator.estimate(&three, 0).expect("the frames are valid");
+            group.bench_function(BenchmarkId::new(name, level.name()), |b| {
+                b.iter(|| estimator.estimate_into(black_box(&three), 0, &mut field).expect("the frames are valid"));
+            });
+        }
+    }
     group.finish();
 }
 

@@ -130,7 +130,8 @@ impl Estimator {
         self.fill(frames, field)
     }
 
-    fn layout(&self, frame_size: (usize, usize), first_index: usize) -> FieldLayout {
+    /// What a field from these frames holds.
+    pub(crate) fn layout(&self, frame_size: (usize, usize), first_index: usize) -> FieldLayout {
         let model = self.model();
         FieldLayout {
             frame_size,

@@ -1,5 +1,6 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
+use super::spare;
 use crate::error::Error;
 use crate::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
@@ -35,12 +36,12 @@ fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
 }
 
 /// The elements in row-major order, whatever the strides.
-fn elements<T: Element + Copy>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
+fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
     let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
     if let Ok(slice) = typed.as_slice() {
         // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it lies.
         if array.is_c_contiguous() {
-            return Some(slice.to_vec());
+            return Some(spare::copy(slice));
         }
     }
     Some(typed.as_array().iter().copied().collect())
@@ -115,7 +116,7 @@ macro_rules! wrapped {
 wrapped!(u8 => U8, u16 => U16, f32 => F32, f64 => F64);
 
 /// A frame of samples `T`; `None` where the array holds another type.
-fn grey<T: Element + Copy + Wrapped>(
+fn grey<T: Element + Copy + Wrapped + 'static>(
     array: &Bound<'_, PyUntypedArray>,
     (width, height): (usize, usize),
 ) -> Option<PyResult<AnyFrame>> {

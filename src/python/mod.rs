@@ -17,6 +17,7 @@ mod observability;
 mod options;
 mod progress;
 mod scenes;
+mod spare;
 
 use pyo3::prelude::*;
 

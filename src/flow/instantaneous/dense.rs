@@ -1,5 +1,6 @@
 //! The affine model over rows of pixels, in lanes.
 
+use super::detail::RatesRow;
 use super::normal::{LaneRates, noise_square, solve_affine};
 use crate::jet::{JetRows, TimeScheme, starts};
 use crate::simd::{Kernel, Lanes, SimdReal};
@@ -23,9 +24,33 @@ pub(super) struct RowKernel<'a, T> {
     pub columns: Range<usize>,
     /// Working memory, [`scratch_len`] values.
     pub scratch: &'a mut [T],
-    /// A slice a parameter, and one for the trust, each as long as `columns`.
-    pub motion: [&'a mut [T]; 6],
-    pub trust: &'a mut [T],
+    pub target: Target<'a, T>,
+}
+
+/// What a row is computed for.
+pub(super) enum Target<'a, T> {
+    /// The estimate: a slice a parameter, and one for the trust, each as long as the row's columns.
+    Motion([&'a mut [T]; 6], &'a mut [T]),
+    /// The equations' coefficients, for a kernel that tells more of them.
+    Rates(RatesRow<&'a mut [T]>),
+}
+
+impl<T: SimdReal> Target<'_, T> {
+    /// Takes what belongs to the lanes from `x` on.
+    #[inline(always)]
+    fn put<V: Lanes<Scalar = T>>(&mut self, x: usize, rates: &LaneRates<V>, brightness: V) {
+        match self {
+            Self::Motion(motion, trust) => {
+                let noise = V::constant(noise_square::<T>());
+                let solution = solve_affine::<T, V>(rates, brightness * brightness * noise);
+                for (out, m) in motion.iter_mut().zip(solution.motion) {
+                    m.store(&mut out[x..]);
+                }
+                solution.trust.store(&mut trust[x..]);
+            }
+            Self::Rates(row) => row.put(x, rates, brightness),
+        }
+    }
 }
 
 /// Values of working memory for frames of this width.
@@ -91,7 +116,6 @@ impl<T: SimdReal> RowKernel<'_, T> {
         let [s0, d0, c0, s1, d1, c1, s2, d2, c2] = nine;
         let centre = if central { middle[1] } else { new[1] };
         let half = V::constant(if central { 0.5 } else { 1.0 });
-        let noise = V::constant(noise_square::<T>());
         for x in starts(0..span - 2, V::LANES) {
             let [_, ix, iy, ixx, ixy, iyy] = across::<T, V>(s0, d0, c0, x);
             let rates = LaneRates {
@@ -99,12 +123,7 @@ impl<T: SimdReal> RowKernel<'_, T> {
                 minus_first: across::<T, V>(s1, d1, c1, x).map(|v| v * half),
                 second: across::<T, V>(s2, d2, c2, x),
             };
-            let brightness = V::load(&centre[x + 1..]);
-            let solution = solve_affine::<T, V>(&rates, brightness * brightness * noise);
-            for (out, m) in self.motion.iter_mut().zip(solution.motion) {
-                m.store(&mut out[x..]);
-            }
-            solution.trust.store(&mut self.trust[x..]);
+            self.target.put(x, &rates, V::load(&centre[x + 1..]));
         }
     }
 
@@ -119,7 +138,6 @@ impl<T: SimdReal> RowKernel<'_, T> {
         }
         let central = self.scheme == TimeScheme::Central;
         let first = self.columns.start;
-        let noise = V::constant(noise_square::<T>());
         for x in starts(0..self.columns.len(), V::LANES) {
             let load = |f: usize, k: usize| V::load(&jets[(6 * f + k) * w + first + x..]);
             let mut still = [V::zero(); 6];
@@ -133,11 +151,7 @@ impl<T: SimdReal> RowKernel<'_, T> {
             }
             let [brightness, jet @ ..] = still;
             let rates = LaneRates { jet, minus_first, second };
-            let solution = solve_affine::<T, V>(&rates, brightness * brightness * noise);
-            for (out, m) in self.motion.iter_mut().zip(solution.motion) {
-                m.store(&mut out[x..]);
-            }
-            solution.trust.store(&mut self.trust[x..]);
+            self.target.put(x, &rates, brightness);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! gives each frame's jet the covariance `s2 C`, so `Cov(e) = s2 sum_f G_f C G_f^T` with `G_f = de / d(jet of frame f)`,
 //! and `Cov(m) = A^+ Cov(e) A^+T` to first order.
 
+use super::lane_noise::LaneNoise;
 use crate::flow::least_squares::Solution;
 use crate::flow::model::MotionModel;
 use crate::jet::{JetRates, JetStencil, TimeScheme};
@@ -27,6 +28,11 @@ impl NoiseModel {
         let mut place = [0.0; 3];
         place[scheme.frame()] = 1.0;
         Self { jet: stencil.covariance(), weights: [place, scheme.first_weights(), [1.0, -2.0, 1.0]], pixel }
+    }
+
+    /// The same for the affine model in lanes.
+    pub fn lanes(&self) -> LaneNoise<f64> {
+        LaneNoise::new(&self.jet, &self.weights, self.pixel)
     }
 
     /// Variance of the pixel noise from what the quadratics leave in the three frames; NaN when they leave nothing to judge by.

@@ -4,6 +4,7 @@
 //! `[g 0 0], [h1 g 0], [h2 0 g], [0 2h1 0], [0 h2 h1], [0 0 2h2]`, so `J^T J` is made of fifteen products. It is solved by block elimination, pair by pair:
 //! three divisions, and short chains between them.
 
+use super::blocks::{Mat, Sym};
 use crate::math::Real;
 use crate::simd::{Lanes, SimdReal};
 
@@ -19,6 +20,7 @@ pub(super) struct LaneRates<V> {
 }
 
 /// A solution in lanes.
+#[derive(Clone, Copy)]
 pub(super) struct LaneSolution<V> {
     /// `u, v, u_x, v_x, u_y, v_y`.
     pub motion: [V; 6],
@@ -39,91 +41,67 @@ pub(super) fn noise_square<T: Real>() -> f64 {
     12.0 * 64.0 * spacing * spacing
 }
 
-/// Symmetric 2x2: `[[a, b], [b, c]]`.
+/// The normal equations `J^T J m = r` in blocks, as far eliminated as their solution and their inverse need.
 #[derive(Clone, Copy)]
-struct Sym<V> {
-    a: V,
-    b: V,
-    c: V,
+pub(super) struct Normal<V> {
+    ff: Sym<V>,
+    xx: Sym<V>,
+    yy: Sym<V>,
+    fx: Mat<V>,
+    fy: Mat<V>,
+    xy: Mat<V>,
+    /// Inverses of the blocks that elimination leaves on the diagonal.
+    ff_inverse: Sym<V>,
+    xx_inverse: Sym<V>,
+    yy_inverse: Sym<V>,
+    /// `ff^-1 fx`, `ff^-1 fy`, and the same of what is left of xx and xy.
+    wx: Mat<V>,
+    wy: Mat<V>,
+    wxy: Mat<V>,
+    /// What they were made for.
+    pub solution: LaneSolution<V>,
 }
 
-/// General 2x2, row by row.
-#[derive(Clone, Copy)]
-struct Mat<V> {
-    a: V,
-    b: V,
-    c: V,
-    d: V,
-}
-
-impl<V: Lanes> Sym<V> {
-    /// The inverse, and how far the determinant is above what is trusted, for columns of squared lengths `n0`, `n1`.
+impl<V: Lanes> Normal<V> {
+    /// The inverse of the normal matrix.
     #[inline(always)]
-    fn invert(self, n0: V, n1: V, tolerance: V, noise: V) -> (Self, V) {
-        let det = self.b.neg_mul_add(self.b, self.a * self.c);
-        let one = V::constant(1.0);
-        let r = one / det;
-        // det = product of the two pivots; noise may explain neither of them.
-        let limit = (n0 * n1).mul_add(tolerance, (n0 + n1) * noise);
-        (Self { a: self.c * r, b: -(self.b * r), c: self.a * r }, det - limit)
+    pub fn inverse(&self) -> [[V; 6]; 6] {
+        let Self { ff_inverse, xx_inverse, yy_inverse: zyy, wx, wy, wxy, .. } = *self;
+        let zxy = wxy.times_symmetric(zyy).negative();
+        let zxx = xx_inverse.less_product(zxy, wxy);
+        let zfx = wx.times_symmetric(zxx).plus_product_transposed(wy, zxy).negative();
+        let zfy = wy.times_symmetric(zyy).plus_product(wx, zxy).negative();
+        let zff = ff_inverse.less_product(zfx, wx).less_product(zfy, wy);
+        [
+            [zff.a, zff.b, zfx.a, zfx.b, zfy.a, zfy.b],
+            [zff.b, zff.c, zfx.c, zfx.d, zfy.c, zfy.d],
+            [zfx.a, zfx.c, zxx.a, zxx.b, zxy.a, zxy.b],
+            [zfx.b, zfx.d, zxx.b, zxx.c, zxy.c, zxy.d],
+            [zfy.a, zfy.c, zxy.a, zxy.c, zyy.a, zyy.b],
+            [zfy.b, zfy.d, zxy.b, zxy.d, zyy.b, zyy.c],
+        ]
     }
 
-    /// `self * m`.
+    /// The upper triangle of the normal matrix, row by row.
     #[inline(always)]
-    fn times(self, m: Mat<V>) -> Mat<V> {
-        Mat {
-            a: self.a.mul_add(m.a, self.b * m.c),
-            b: self.a.mul_add(m.b, self.b * m.d),
-            c: self.b.mul_add(m.a, self.c * m.c),
-            d: self.b.mul_add(m.b, self.c * m.d),
-        }
-    }
-
-    /// `self * (x, y)`.
-    #[inline(always)]
-    fn apply(self, x: V, y: V) -> (V, V) {
-        (self.a.mul_add(x, self.b * y), self.b.mul_add(x, self.c * y))
-    }
-
-    /// `self - m^T w`, known to be symmetric.
-    #[inline(always)]
-    fn less(self, m: Mat<V>, w: Mat<V>) -> Self {
-        Self {
-            a: m.a.neg_mul_add(w.a, m.c.neg_mul_add(w.c, self.a)),
-            b: m.a.neg_mul_add(w.b, m.c.neg_mul_add(w.d, self.b)),
-            c: m.b.neg_mul_add(w.b, m.d.neg_mul_add(w.d, self.c)),
-        }
-    }
-}
-
-impl<V: Lanes> Mat<V> {
-    /// `self - m^T w`.
-    #[inline(always)]
-    fn less(self, m: Self, w: Self) -> Self {
-        Self {
-            a: m.a.neg_mul_add(w.a, m.c.neg_mul_add(w.c, self.a)),
-            b: m.a.neg_mul_add(w.b, m.c.neg_mul_add(w.d, self.b)),
-            c: m.b.neg_mul_add(w.a, m.d.neg_mul_add(w.c, self.c)),
-            d: m.b.neg_mul_add(w.b, m.d.neg_mul_add(w.d, self.d)),
-        }
-    }
-
-    /// `(p, q) - self^T (x, y)`.
-    #[inline(always)]
-    fn less_transposed(self, (p, q): (V, V), (x, y): (V, V)) -> (V, V) {
-        (self.a.neg_mul_add(x, self.c.neg_mul_add(y, p)), self.b.neg_mul_add(x, self.d.neg_mul_add(y, q)))
-    }
-
-    /// `(p, q) - self (x, y)`.
-    #[inline(always)]
-    fn less_applied(self, (p, q): (V, V), (x, y): (V, V)) -> (V, V) {
-        (self.a.neg_mul_add(x, self.b.neg_mul_add(y, p)), self.c.neg_mul_add(x, self.d.neg_mul_add(y, q)))
+    pub fn triangle(&self) -> [V; 21] {
+        let Self { ff, xx, yy, fx, fy, xy, .. } = *self;
+        [
+            ff.a, ff.b, fx.a, fx.b, fy.a, fy.b, ff.c, fx.c, fx.d, fy.c, fy.d, //
+            xx.a, xx.b, xy.a, xy.b, xx.c, xy.c, xy.d, yy.a, yy.b, yy.c,
+        ]
     }
 }
 
 /// Solves the twelve equations of each lane. `noise`: [`noise_square`] times the squared brightness.
 #[inline(always)]
 pub(super) fn solve_affine<T: SimdReal, V: Lanes<Scalar = T>>(rates: &LaneRates<V>, noise: V) -> LaneSolution<V> {
+    eliminate::<T, V>(rates, noise).solution
+}
+
+/// As [`solve_affine`], keeping what the inverse is made of.
+#[inline(always)]
+pub(super) fn eliminate<T: SimdReal, V: Lanes<Scalar = T>>(rates: &LaneRates<V>, noise: V) -> Normal<V> {
     let tolerance = V::constant(pivot_tolerance::<T>());
     let [a, b, p, q, r] = rates.jet;
     let [e1, e2, e3, e4, e5, e6] = rates.minus_first;
@@ -192,7 +170,8 @@ pub(super) fn solve_affine<T: SimdReal, V: Lanes<Scalar = T>>(rates: &LaneRates<
 
     // Zero times something that is not finite is NaN, which no comparison trusts.
     let trust = t0.min(t1).min(t2) + f.0 * V::zero();
-    LaneSolution { motion: [f.0, f.1, x.0, x.1, y.0, y.1], trust }
+    let solution = LaneSolution { motion: [f.0, f.1, x.0, x.1, y.0, y.1], trust };
+    Normal { ff, xx, yy, fx, fy, xy, ff_inverse, xx_inverse, yy_inverse, wx, wy, wxy, solution }
 }
 
 #[cfg(test)]

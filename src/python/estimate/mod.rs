@@ -66,7 +66,7 @@ fn run(py: Python<'_>, frames: &Frames<'_>, plan: &Plan, progress: &Reporter<'_>
     }
     let (mut memory, mut fields) = (Memory::Empty, Growing::None);
     for index in 0..frames.count {
-        let field = memory.push(py, "frames", plan, &frames.get(index)?)?;
+        let field = memory.push(py, "frames", plan, frames.get(index)?)?;
         progress.step(index + 1, frames.count)?;
         if let Some(field) = field {
             if !frames.is_array && frames.count == needed {

@@ -3,6 +3,7 @@
 use super::arguments::{Arguments, Plan, estimator_options};
 use super::memory::{AnyField, Memory, Ring};
 use crate::error::Error;
+use crate::math::Real;
 use crate::python::arrays;
 use crate::python::field::FlowField;
 use crate::python::keywords::{constructor, with_common};
@@ -33,7 +34,7 @@ impl FlowEstimator {
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<Option<FlowField>> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, self.plan.colour)?;
-        Ok(self.memory.push(py, "frame", &self.plan, &frame)?.map(AnyField::single))
+        Ok(self.memory.push(py, "frame", &self.plan, frame)?.map(AnyField::single))
     }
 
     /// Forgets every frame (H, W); the next one begins a new sequence, frame index 0.
@@ -89,7 +90,7 @@ impl FlowEstimator {
     }
 }
 
-fn save<T: numpy::Element + Clone>(memory: &Bound<'_, PyDict>, ring: &Ring<T>) -> PyResult<()> {
+fn save<T: numpy::Element + Real>(memory: &Bound<'_, PyDict>, ring: &Ring<T>) -> PyResult<()> {
     let py = memory.py();
     let frames = ring.frames.iter().map(|frame| arrays::from_frame(py, frame.clone()));
     memory.set_item("frames", PyList::new(py, frames.collect::<PyResult<Vec<_>>>()?)?)?;

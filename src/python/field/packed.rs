@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::python::spare;
 use crate::types::{FieldLayout, FlowField as CoreField, Status};
 
 /// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1, and so on.
 #[derive(Debug, Clone)]
-pub struct Packed<T> {
+pub struct Packed<T: Real> {
     /// Layout of the first field; the frame index counts up from it.
     pub layout: FieldLayout,
     /// Columns.
@@ -38,7 +39,8 @@ impl<T: Real> Packed<T> {
             count: 1,
             motion: field.motion,
             covariance: field.covariance,
-            status: field.status.iter().map(|&s| s as u8).collect(),
+            // In place: the codes are as large as the status.
+            status: field.status.into_iter().map(|s| s as u8).collect(),
             residual: field.residual,
             rank: field.rank,
             condition: field.condition,
@@ -51,7 +53,7 @@ impl<T: Real> Packed<T> {
         if (field.width, field.height) != (self.width, self.height) || field.motion.len() != self.stride() {
             return Err(Error::argument("frames", "fields of one size and model", "fields that differ"));
         }
-        self.motion.extend(field.motion);
+        extend_from(&mut self.motion, field.motion);
         self.status.extend(field.status.iter().map(|&s| s as u8));
         extend(&mut self.covariance, field.covariance);
         extend(&mut self.residual, field.residual);
@@ -97,9 +99,24 @@ impl<T: Real> Packed<T> {
     }
 }
 
-fn extend<T>(planes: &mut Option<Vec<T>>, more: Option<Vec<T>>) {
+impl<T: Real> Drop for Packed<T> {
+    fn drop(&mut self) {
+        spare::give(std::mem::take(&mut self.motion));
+        spare::give(std::mem::take(&mut self.status));
+        if let Some(planes) = self.covariance.take() {
+            spare::give(planes);
+        }
+    }
+}
+
+fn extend_from<T: Copy + Send + 'static>(planes: &mut Vec<T>, more: Vec<T>) {
+    planes.extend_from_slice(&more);
+    spare::give(more);
+}
+
+fn extend<T: Copy + Send + 'static>(planes: &mut Option<Vec<T>>, more: Option<Vec<T>>) {
     match (planes, more) {
-        (Some(planes), Some(more)) => planes.extend(more),
+        (Some(planes), Some(more)) => extend_from(planes, more),
         (planes, _) => *planes = None,
     }
 }
