@@ -2,10 +2,14 @@
 
 use crate::error::{Error, Result};
 use rayon::prelude::*;
+use std::ffi::OsString;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
+
+/// The environment variable that sets the number of threads.
+const VARIABLE: &str = "JACOFLOW_THREADS";
 
 /// Most threads for each processor.
 pub const USEFUL: usize = 4;
@@ -15,15 +19,26 @@ pub const USEFUL: usize = 4;
 pub struct Threads(Option<usize>);
 
 impl Threads {
-    /// `None`: the environment variable `JACOFLOW_THREADS` where it holds a positive number, else every processor.
+    /// `None`: the number in the environment variable `JACOFLOW_THREADS`; where that is unset or empty, every processor.
     ///
     /// # Errors
-    /// [`Error::Argument`] for zero.
+    /// [`Error::Argument`] for zero, or naming `JACOFLOW_THREADS` where that decides and is no positive number.
     pub fn new(count: Option<usize>) -> Result<Self> {
-        match count {
-            Some(0) => Err(Error::argument("threads", "a positive integer", 0)),
-            other => Ok(Self(other)),
+        if count == Some(0) {
+            return Err(Error::argument("threads", "a positive integer", 0));
         }
+        Self(count).check()
+    }
+
+    /// The same, once it is certain that the environment does not ask for nonsense: a mistake there must not go unnoticed.
+    ///
+    /// # Errors
+    /// As [`Threads::new`].
+    pub fn check(self) -> Result<Self> {
+        if self.0.is_none() {
+            from_environment(std::env::var_os(VARIABLE))?;
+        }
+        Ok(self)
     }
 
     /// The number of threads this resolves to: what was asked for, but never more than [`USEFUL`] for each processor.
@@ -32,7 +47,7 @@ impl Threads {
     pub fn count(self) -> usize {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         self.0
-            .or_else(|| std::env::var("JACOFLOW_THREADS").ok()?.parse().ok().filter(|&n| n > 0))
+            .or_else(|| from_environment(std::env::var_os(VARIABLE)).ok()?)
             .map_or(processors, |asked| asked.min(USEFUL * processors))
     }
 
@@ -40,6 +55,13 @@ impl Threads {
     pub fn install<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
         pool(self.count()).install(work)
     }
+}
+
+/// The number that the value of [`VARIABLE`] asks for; nothing when it is unset or empty.
+fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
+    let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(None) };
+    let number = value.to_str().and_then(|text| text.trim().parse().ok()).filter(|&n: &usize| n > 0);
+    number.map(Some).ok_or_else(|| Error::argument(VARIABLE, "a positive integer", format!("{value:?}")))
 }
 
 /// The shared pool of `count` threads; made on first use and kept.
@@ -125,6 +147,16 @@ mod tests {
         let processors = std::thread::available_parallelism().unwrap().get();
         assert_eq!(Threads::new(Some(1_000_000)).unwrap().count(), USEFUL * processors);
         assert_eq!(Threads::new(Some(1)).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_environment_is_believed_or_refused_never_ignored() {
+        let of = |text: &str| from_environment(Some(text.into()));
+        assert_eq!((from_environment(None).unwrap(), of("").unwrap(), of("3").unwrap()), (None, None, Some(3)));
+        for wrong in ["abc", "0", "-1", "1.5", " "] {
+            let message = of(wrong).unwrap_err().to_string();
+            assert!(message.starts_with("JACOFLOW_THREADS: ") && message.contains(wrong), "{message}");
+        }
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub fn preprocess(arguments: &InputArguments) -> Result<Preprocess> {
 
 /// Number of threads and instruction set.
 pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)> {
-    Ok((Threads::new(arguments.threads)?, arguments.simd.as_deref().map(Level::parse).transpose()?))
+    Ok((Threads::new(arguments.threads)?, Level::check(arguments.simd.as_deref().map(Level::parse).transpose()?)?))
 }
 
 /// Whether to compute in double precision for frames of this type; `demanding` work does so unless told otherwise.

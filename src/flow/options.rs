@@ -80,7 +80,7 @@ impl Default for Common {
 }
 
 impl Common {
-    /// Refuses lengths, times and noise levels that are not positive and finite, naming the field.
+    /// Refuses lengths, times and noise levels that are not positive and finite, naming the field, and a useless environment where that decides.
     pub(super) fn check(&self) -> Result<()> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let (dx, dy) = self.pixel_pitch;
@@ -96,6 +96,8 @@ impl Common {
         if let Sites::Grid { stride: 0, .. } = self.sites {
             return Err(Error::argument("stride", "a positive integer", 0));
         }
+        self.threads.check()?;
+        Level::check(self.simd)?;
         Ok(())
     }
 

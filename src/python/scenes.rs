@@ -70,7 +70,8 @@ impl Scene {
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped.
     fn frame<'py>(&self, py: Python<'py>, t: f64) -> PyResult<Bound<'py, PyAny>> {
-        let frame = py.detach(|| Threads::default().install(|| self.core.frame(t)));
+        let threads = Threads::new(None)?;
+        let frame = py.detach(|| threads.install(|| self.core.frame(t)));
         arrays::from_frame(py, frame)
     }
 
@@ -78,10 +79,11 @@ impl Scene {
     #[pyo3(signature = (count, start=0.0))]
     fn frames<'py>(&self, py: Python<'py>, count: usize, start: f64) -> PyResult<Bound<'py, PyAny>> {
         let (width, height) = self.core.size();
+        let threads = Threads::new(None)?;
         let mut data = Vec::new();
         for index in 0..count {
             py.check_signals()?;
-            let frame = py.detach(|| Threads::default().install(|| self.core.frame(start + index as f64)));
+            let frame = py.detach(|| threads.install(|| self.core.frame(start + index as f64)));
             data.extend(frame.into_data());
         }
         Ok(arrays::owned(py, &[count, height, width], data)?.into_any())

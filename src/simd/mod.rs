@@ -18,6 +18,9 @@ pub(crate) use precision::{same, same_mut};
 use crate::error::{Error, Result};
 use std::sync::OnceLock;
 
+/// The environment variable that sets the level.
+const VARIABLE: &str = "JACOFLOW_SIMD";
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Inner {
     Scalar,
@@ -60,14 +63,35 @@ impl Level {
         [Some(Self::SCALAR), Self::avx2(), Self::avx512()].into_iter().flatten().collect()
     }
 
-    /// The level used unless told otherwise: the environment variable `JACOFLOW_SIMD`
-    /// (`scalar`, `avx2`, `avx512`) where it names one that the processor has, else the best. Read once.
+    /// The level used unless told otherwise: that of [`Level::from_environment`], else the best. Read once.
     pub fn detect() -> Self {
         static LEVEL: OnceLock<Level> = OnceLock::new();
         *LEVEL.get_or_init(|| {
             let best = *Self::available().last().unwrap_or(&Self::SCALAR);
-            std::env::var("JACOFLOW_SIMD").ok().and_then(|name| Self::parse(&name).ok()).unwrap_or(best)
+            Self::from_environment().ok().flatten().unwrap_or(best)
         })
+    }
+
+    /// The level that the environment variable `JACOFLOW_SIMD` names (`scalar`, `avx2`, `avx512`); none when it is unset or empty.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `JACOFLOW_SIMD` for another word or a level that this processor lacks.
+    pub fn from_environment() -> Result<Option<Self>> {
+        match std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) {
+            Some(name) => Self::named(VARIABLE, &name.to_string_lossy()).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// `choice`, after making sure that without one the environment does not ask for nonsense: a mistake there must not go unnoticed.
+    ///
+    /// # Errors
+    /// As [`Level::from_environment`].
+    pub fn check(choice: Option<Self>) -> Result<Option<Self>> {
+        if choice.is_none() {
+            Self::from_environment()?;
+        }
+        Ok(choice)
     }
 
     /// The level called `name` (`scalar`, `avx2`, `avx512`).
@@ -75,6 +99,11 @@ impl Level {
     /// # Errors
     /// [`Error::Argument`] for another word or a level that this processor lacks.
     pub fn parse(name: &str) -> Result<Self> {
+        Self::named("simd", name)
+    }
+
+    /// As [`Level::parse`]; errors blame `argument`.
+    fn named(argument: &'static str, name: &str) -> Result<Self> {
         let level = match name {
             "scalar" => Some(Self::SCALAR),
             "avx2" => Self::avx2(),
@@ -83,7 +112,7 @@ impl Level {
         };
         level.ok_or_else(|| {
             let have: Vec<_> = Self::available().iter().map(|l| l.name()).collect();
-            Error::argument("simd", format!("one of {}", have.join(", ")), name)
+            Error::argument(argument, format!("one of {}", have.join(", ")), name)
         })
     }
 
@@ -179,5 +208,7 @@ mod tests {
     fn unknown_level_is_refused_by_name() {
         let message = Level::parse("sse9").unwrap_err().to_string();
         assert!(message.contains("simd") && message.contains("scalar") && message.contains("sse9"));
+        let message = Level::named(VARIABLE, "sse9").unwrap_err().to_string();
+        assert!(message.starts_with("JACOFLOW_SIMD: ") && message.contains("sse9"), "{message}");
     }
 }

@@ -189,6 +189,8 @@ impl FlowFilterOptions {
             all("frame_period", &[period], "a finite time > 0", &|v| v > 0.0)?;
         }
         self.sigma_points.check(12)?;
+        self.threads.check()?;
+        Level::check(self.simd)?;
         if let Some(mask) = &self.mask
             && mask.size() != frame_size
         {
