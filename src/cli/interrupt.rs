@@ -1,6 +1,7 @@
-//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once.
+//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once, without its temporary files.
 
 use crate::error::{Error, Result};
+use crate::io::write::remove_temporaries;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -42,6 +43,7 @@ impl Drop for Watch {
 fn on_signal() {
     let again = ASKED.swap(true, Ordering::SeqCst);
     if again || RUNNING.load(Ordering::SeqCst) == 0 {
+        let _no_new_ones = remove_temporaries();
         std::process::exit(EXIT_INTERRUPTED);
     }
 }

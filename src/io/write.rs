@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
 
 /// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it without that removes it.
@@ -18,8 +19,68 @@ pub struct AtomicFile {
 
 #[derive(Debug)]
 enum Inner {
-    Temporary(NamedTempFile),
+    Temporary(Temporary),
     Direct(File),
+}
+
+/// A temporary file that [`remove_temporaries`] knows of as long as it has its temporary name.
+#[derive(Debug)]
+struct Temporary(Option<NamedTempFile>);
+
+/// Names of the temporary files that this process has now.
+static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every temporary file of this process, for whoever ends it without unwinding (a second Ctrl-C).
+///
+/// While the returned guard lives no other thread can begin or name a file: keep it to the end.
+#[must_use = "files made after the guard is dropped are not removed"]
+pub(crate) fn remove_temporaries() -> impl Drop {
+    let mut names = temporaries();
+    for name in names.drain(..) {
+        // What cannot be removed cannot be helped any more.
+        let _ = std::fs::remove_file(name);
+    }
+    names
+}
+
+impl Temporary {
+    fn beside(target: &Path) -> io::Result<Self> {
+        let mut names = temporaries();
+        let file = temporary_beside(target)?;
+        names.push(file.path().to_path_buf());
+        Ok(Self(Some(file)))
+    }
+
+    fn file(&mut self) -> io::Result<&mut NamedTempFile> {
+        self.0.as_mut().ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+
+    /// Renames the file to `target`.
+    fn persist(mut self, target: &Path) -> io::Result<()> {
+        self.end(|file| file.persist(target).map(drop).map_err(|e| e.error))
+    }
+
+    /// Ends the life under the temporary name by `how`.
+    fn end(&mut self, how: impl FnOnce(NamedTempFile) -> io::Result<()>) -> io::Result<()> {
+        let Some(file) = self.0.take() else { return Ok(()) };
+        let mut names = temporaries();
+        names.retain(|name| name != file.path());
+        how(file)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // Dropping removes the file.
+        let _ = self.end(|file| {
+            drop(file);
+            Ok(())
+        });
+    }
 }
 
 impl AtomicFile {
@@ -37,7 +98,7 @@ impl AtomicFile {
             Ok(meta) if !meta.is_file() => {
                 Inner::Direct(File::options().write(true).open(&target).map_err(|e| Error::io(path, e))?)
             }
-            _ => Inner::Temporary(temporary_beside(&target).map_err(|e| Error::io(path, e))?),
+            _ => Inner::Temporary(Temporary::beside(&target).map_err(|e| Error::io(path, e))?),
         };
         Ok(Self { target, inner: BufWriter::with_capacity(1 << 16, inner) })
     }
@@ -56,7 +117,7 @@ impl AtomicFile {
         let inner = inner.into_inner().map_err(|e| Error::io(&target, e.into_error()))?;
         match inner {
             Inner::Direct(_) => Ok(()),
-            Inner::Temporary(file) => file.persist(&target).map(|_| ()).map_err(|e| Error::io(&target, e.error)),
+            Inner::Temporary(file) => file.persist(&target).map_err(|e| Error::io(&target, e)),
         }
     }
 }
@@ -90,7 +151,7 @@ impl Seek for AtomicFile {
 impl Write for Inner {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Temporary(file) => file.write(bytes),
+            Self::Temporary(file) => file.file()?.write(bytes),
             Self::Direct(file) => file.write(bytes),
         }
     }
@@ -102,7 +163,7 @@ impl Write for Inner {
 impl Seek for Inner {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match self {
-            Self::Temporary(file) => file.seek(to),
+            Self::Temporary(file) => file.file()?.seek(to),
             Self::Direct(file) => file.seek(to),
         }
     }
