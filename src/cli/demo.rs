@@ -10,13 +10,15 @@ use crate::flow::windowed::WindowedOptions;
 use crate::flow::{Common, Estimator, Method};
 use crate::io::{FieldFormat, MemorySource, open_sink};
 use crate::parallel::Threads;
-use crate::pipeline::PictureRanges;
-use crate::pipeline::{Collect, EstimatorStage, Numbering, OutputPlan, OutputWish, Pipeline};
+use crate::pipeline::{
+    Collect, EstimatorStage, Numbering, OutputPlan, OutputWish, PictureKind, PictureRanges, Pipeline, is_folder,
+};
 use crate::synth::{Scene, SceneOptions, Sensor, build, truth};
 use crate::types::{AnyFrame, FlowField};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::fs::DirEntry;
+use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 /// Frames of the scene.
@@ -32,10 +34,10 @@ const RATE: f64 = 25.0;
     Example:\n  jacoflow demo -o demo"
 )]
 pub struct DemoCommand {
-    /// A new folder
+    /// A new folder, or one that holds nothing but the results of an earlier demo, which are then replaced
     #[arg(long, short, value_name = "FOLDER", default_value = "jacoflow-demo")]
     pub output: PathBuf,
-    /// Write into a folder that exists
+    /// Write into any folder that exists
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
@@ -56,21 +58,23 @@ impl DemoCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let (threads, simd) = compute(&self.compute)?;
-        if self.output.extension().is_some() {
-            return Err(Error::argument("output", "a folder", self.output.display()));
+        if !is_folder(&self.output) {
+            let got = format!("{0}; for a new folder of this name write {0}/", self.output.display());
+            return Err(Error::argument("output", "a folder", got));
         }
+        let replace = self.force || is_own_work(&self.output);
         let scene = build("vortex", &SceneOptions { width: 256, height: 192, seed: 1, ..SceneOptions::default() })?;
         let plan = OutputPlan::decide(&OutputWish {
             path: Some(&self.output.join("flow")),
             formats: &[],
-            pictures: &["colour", "quiver", "divergence", "curl"].map(String::from),
-            replace: self.force,
+            pictures: &PictureKind::ALL.map(|kind| kind.name().to_string()),
+            replace,
             fields: None,
         })?;
         let options = WindowedOptions::default();
         let common = Common { covariance: true, threads, simd, frame_period: Some(1.0 / RATE), ..Common::default() };
         let estimator = Estimator::new(Method::Windowed(options), common)?;
-        let frames = self.write_frames(&*scene, threads, watch)?;
+        let frames = self.write_frames(&*scene, threads, replace, watch)?;
         let kept = Collect::<f32>::default();
         let fields = kept.handle();
         let mut pipeline = Pipeline::<f32>::new(Box::new(EstimatorStage::new(estimator)))
@@ -99,11 +103,12 @@ impl DemoCommand {
     }
 
     /// Makes the frames and keeps a copy on disk for the user's own trials.
-    fn write_frames(&self, scene: &dyn Scene, threads: Threads, watch: &Watch) -> Result<Vec<AnyFrame>> {
+    fn write_frames(&self, scene: &dyn Scene, threads: Threads, replace: bool, watch: &Watch) -> Result<Vec<AnyFrame>> {
         let folder = self.output.join("frames");
-        let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-        if occupied && !self.force {
-            return Err(Error::argument("output", "a new folder (--force writes into it)", self.output.display()));
+        let occupied = self.output.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+        if occupied && !replace {
+            let wanted = "a new folder, or one that holds nothing but an earlier demo (--force writes into any)";
+            return Err(Error::argument("output", wanted, self.output.display()));
         }
         let mut sink = open_sink(&folder.to_string_lossy(), RATE)?;
         let sensor = Sensor::eight_bit(1.0, 7);
@@ -113,11 +118,7 @@ impl DemoCommand {
             let exact = threads.install(|| scene.frame(index as f64));
             let frame = AnyFrame::U8(sensor.apply_u8(&exact, index as u64));
             sink.write(&frame)?;
-            FieldFormat::Npz.write(
-                self.output.join(format!("truth_{index:06}.npz")),
-                &truth(scene, index as f64)?,
-                "",
-            )?;
+            FieldFormat::Npz.write(self.output.join(truth_name(index)), &truth(scene, index as f64)?, "")?;
             frames.push(frame);
         }
         sink.finish()?;
@@ -135,6 +136,32 @@ impl DemoCommand {
             self.output.display()
         )
     }
+}
+
+fn truth_name(index: usize) -> String {
+    format!("truth_{index:06}.npz")
+}
+
+/// Whether a folder holds what an earlier (or stopped) run of this command left there, and nothing else: then the next run may replace it.
+fn is_own_work(folder: &Path) -> bool {
+    let frames = |name: &str| (0..FRAMES).any(|k| name == format!("frame_{k:06}.png"));
+    let results = |name: &str| {
+        let pictures = |k: usize| PictureKind::ALL.map(|kind| format!("{k:06}_{}.png", kind.name()));
+        (0..FRAMES).any(|k| name == format!("{k:06}.npz") || pictures(k).iter().any(|picture| name == picture))
+    };
+    let own = |name: &str| match name {
+        "frames" => holds_only(&folder.join(name), frames),
+        "flow" => holds_only(&folder.join(name), results),
+        _ => (0..FRAMES).any(|k| name == truth_name(k)) && folder.join(name).is_file(),
+    };
+    // A folder of frames alone may be anybody's.
+    folder.join(truth_name(0)).is_file() && holds_only(folder, own)
+}
+
+/// Whether `known` knows every name in a folder.
+fn holds_only(folder: &Path, known: impl Fn(&str) -> bool) -> bool {
+    let own = |entry: std::io::Result<DirEntry>| entry.is_ok_and(|e| e.file_name().to_str().is_some_and(&known));
+    folder.read_dir().is_ok_and(|mut entries| entries.all(own))
 }
 
 /// Root mean square errors over every valid site of every field, 12 px from the edge.

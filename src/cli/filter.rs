@@ -4,7 +4,7 @@ use super::arguments::{
     ComputeArguments, FilterArguments, InputArguments, OutputArguments, Precision, SiteArguments, TellArguments,
     describe_filter,
 };
-use super::flow::plan_output;
+use super::flow::{expect_output, plan_output};
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
 use super::report::{Report, tell};
@@ -108,6 +108,7 @@ impl FilterCommand {
             details.insert("save_state".into(), serde_json::json!(self.save_state));
         }
         let plan: OutputPlan = plan_output(&self.output, &options.sites, self.tell.json, opened.frames)?;
+        expect_output(&plan, self.tell.json, self.save_state.is_some())?;
         let mut pipeline = Pipeline::<T>::new(Box::new(stage))
             .with_preprocess(preprocess(&self.input)?)
             .with_threads(threads)

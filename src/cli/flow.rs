@@ -106,6 +106,16 @@ pub fn plan_output(output: &OutputArguments, sites: &Sites, json: bool, fields: 
     Ok(plan)
 }
 
+/// Refuses to compute what nobody would see: without a place for results only the summary of `--json` is left, or what `besides` is there for.
+pub fn expect_output(plan: &OutputPlan, json: bool, besides: bool) -> Result<()> {
+    if plan.writes_nothing() && !json && !besides {
+        let wanted =
+            "a folder or a file for the results (- for CSV on standard output), or --json for the summary alone";
+        return Err(Error::argument("output", wanted, "none"));
+    }
+    Ok(())
+}
+
 impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
@@ -114,6 +124,7 @@ impl FlowCommand {
         let needed = prepared.estimator.frames_needed();
         let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(needed));
         let plan = plan_output(&self.output, &prepared.sites, self.tell.json, fields)?;
+        expect_output(&plan, self.tell.json, false)?;
         plan.check_parameters(prepared.estimator.model().parameters().iter().map(|parameter| parameter.name))?;
         if in_double(self.compute.precision, &opened.first, false) {
             self.run::<f64>(opened, prepared, &plan, watch)

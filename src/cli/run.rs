@@ -7,7 +7,7 @@ use super::progress::Bar;
 use super::report::{Report, tell};
 use crate::error::Error;
 use crate::io::FrameSource;
-use crate::pipeline::{Pipeline, Summary};
+use crate::pipeline::{Pipeline, Summary, is_folder};
 use crate::simd::SimdReal;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -38,8 +38,9 @@ pub fn run_pipeline<T: SimdReal>(
 /// The report of a run, told in words on standard error unless asked not to.
 pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -> Report {
     let interrupted = matches!(failure, Some(Error::Interrupted));
+    let output = place(summary, telling.output);
     if !telling.tell.quiet && (failure.is_none() || interrupted) {
-        tell(&in_words(summary, telling.output));
+        tell(&in_words(summary, output));
     }
     let mut object = json!({
         "command": telling.command,
@@ -49,13 +50,21 @@ pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -
         "repairs": summary.repairs,
         "files": summary.files,
         "seconds": summary.seconds,
-        "output": telling.output,
+        "output": output,
         "interrupted": interrupted,
     });
     if let (Some(object), Value::Object(details)) = (object.as_object_mut(), telling.details) {
         object.extend(details);
     }
     Report { summary: object, failure }
+}
+
+/// Where the results are: the place asked for, or the other name of the one file of a run that was stopped.
+fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>) -> Option<&'a Path> {
+    match (&summary.latest, asked) {
+        (Some(file), Some(asked)) if summary.files == 1 && !is_folder(asked) => Some(file),
+        _ => asked,
+    }
 }
 
 fn in_words(summary: &Summary, output: Option<&Path>) -> String {
@@ -69,7 +78,8 @@ fn in_words(summary: &Summary, output: Option<&Path>) -> String {
         parts.push(format!("{} repairs", summary.repairs));
     }
     if let Some(output) = output.filter(|_| summary.files > 0) {
-        parts.push(format!("{} files: {}", summary.files, output.display()));
+        let files = if summary.files == 1 { "file" } else { "files" };
+        parts.push(format!("{} {files}: {}", summary.files, output.display()));
     }
     parts.join(", ")
 }

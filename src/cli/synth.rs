@@ -2,13 +2,14 @@
 
 use super::arguments::{ComputeArguments, TellArguments, parse_not_negative, parse_rate, parse_size};
 use super::interrupt::Watch;
+use super::open::compute;
 use super::progress::Bar;
 use super::report::{Report, tell};
 use super::scene_list;
 use crate::error::{Error, Result};
-use crate::io::{FieldFormat, open_sink};
+use crate::io::{FieldFormat, check_sink, open_sink};
 use crate::parallel::{Progress, Threads};
-use crate::pipeline::check_target;
+use crate::pipeline::{check_target, is_folder};
 use crate::synth::{Rounding, Scene, SceneOptions, Sensor, build, truth};
 use crate::types::{AnyFrame, Frame};
 use clap::{Args, ValueEnum};
@@ -33,7 +34,7 @@ pub struct SynthCommand {
     /// List the scenes, what they can carry and what they can be given
     #[arg(long)]
     pub list: bool,
-    /// A folder, a .npy or a .y4m file
+    /// A folder (with / at the end where a new one has a dot in its name), a .npy or a .y4m file, or - for Y4M on standard output
     #[arg(long, short, value_name = "OUT", required_unless_present = "list")]
     pub output: Option<PathBuf>,
     /// Number of frames
@@ -125,9 +126,13 @@ impl SynthCommand {
             },
         )?;
         let formats = self.truth_formats()?;
+        let (threads, _) = compute(&self.compute)?;
         self.check_output(output)?;
-        let written = self.write(&*scene, output, &formats, &Bar::new(watch, "synth", self.tell.quiet));
-        if !self.tell.quiet {
+        let bar = Bar::new(watch, "synth", self.tell.quiet);
+        let written = self.write(&*scene, output, &formats, threads, &bar);
+        drop(bar);
+        let told = matches!(written.1, Ok(()) | Err(Error::Interrupted)) || written.0 > 0;
+        if told && !self.tell.quiet {
             tell(&format!("{} of {} frames written to {}", written.0, self.frames, output.display()));
         }
         let summary = json!({
@@ -138,10 +143,16 @@ impl SynthCommand {
     }
 
     /// Writes the frames and their truth; how many frames are in place, and what stopped it.
-    fn write(&self, scene: &dyn Scene, output: &Path, formats: &[FieldFormat], bar: &Bar<'_>) -> (usize, Result<()>) {
+    fn write(
+        &self,
+        scene: &dyn Scene,
+        output: &Path,
+        formats: &[FieldFormat],
+        threads: Threads,
+        bar: &Bar<'_>,
+    ) -> (usize, Result<()>) {
         let mut done = 0;
         let result = (|| {
-            let threads = Threads::new(self.compute.threads)?;
             let mut recording = open_sink(&output.to_string_lossy(), self.rate)?;
             if let Some(folder) = &self.truth {
                 std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
@@ -162,7 +173,7 @@ impl SynthCommand {
             recording.finish()
         })();
         // One file appears whole or not at all; of a folder what was complete stays.
-        let kept = if result.is_err() && output.extension().is_some() { 0 } else { done };
+        let kept = if result.is_err() && !is_folder(output) { 0 } else { done };
         (kept, result)
     }
 
@@ -190,14 +201,14 @@ impl SynthCommand {
 
     /// Refuses what could only fail after work has been done.
     fn check_output(&self, output: &Path) -> Result<()> {
-        let extension = output.extension().and_then(|extension| extension.to_str());
-        if self.depth == Depth::Float && extension != Some("npy") {
+        check_sink(&output.to_string_lossy())?;
+        if self.depth == Depth::Float && (is_folder(output) || output.extension().is_none_or(|e| e != "npy")) {
             return Err(Error::argument("output", "a .npy file for --depth float", output.display()));
         }
-        if extension.is_some() {
+        if !is_folder(output) {
             check_target(output, self.force)?;
         }
-        for folder in [(extension.is_none()).then_some(output), self.truth.as_deref()].into_iter().flatten() {
+        for folder in [is_folder(output).then_some(output), self.truth.as_deref()].into_iter().flatten() {
             let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
             if occupied && !self.force {
                 let wanted = "an empty or new folder (--force writes into it)";

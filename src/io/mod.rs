@@ -30,7 +30,7 @@ pub use npy::{Element, ElementType, NpyHeader};
 pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_frame_png, write_picture};
-pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, open_sink};
+pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_sink};
 pub use source::{
     Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, Y4mSource, kind_of,
     open,

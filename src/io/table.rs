@@ -78,7 +78,9 @@ impl TableWriter {
         if cells.len() != self.columns {
             return Err(Error::argument("row", format!("{} cells", self.columns), cells.len()));
         }
-        self.csv.write_record(cells.iter().map(|c| c.as_ref().as_bytes())).map_err(|e| Error::io(&self.path, e.into()))
+        self.csv
+            .write_record(cells.iter().map(|c| c.as_ref().as_bytes()))
+            .map_err(|e| Error::io(&self.path, system_error(e)))
     }
 
     /// Pushes the rows so far to where they go: for a reader that follows a stream.
@@ -115,6 +117,15 @@ impl TableWriter {
             },
             Target::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
         }
+    }
+}
+
+/// The system's own error, whose kind (a closed pipe, a full disk) callers look at.
+fn system_error(error: csv::Error) -> std::io::Error {
+    let words = error.to_string();
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        _ => std::io::Error::other(words),
     }
 }
 

@@ -10,7 +10,7 @@ mod run;
 mod sink;
 mod stage;
 
-pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target};
+pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_folder};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};

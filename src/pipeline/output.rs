@@ -139,6 +139,11 @@ impl OutputPlan {
         }
     }
 
+    /// Whether a run would leave nothing behind.
+    pub fn writes_nothing(&self) -> bool {
+        self.formats.is_empty() && self.pictures.is_empty() && self.table.is_none()
+    }
+
     /// Refuses what a list of points has no place in: formats and pictures of a whole grid.
     ///
     /// # Errors
@@ -217,8 +222,9 @@ impl OutputPlan {
 
     fn into_file(mut self, path: &Path, formats: &[Format], fields: Option<usize>) -> Result<Self> {
         let Some(format) = format_of(path) else {
-            let wanted = "a folder, or a file ending in .npz, .flo, .png, .pfm or .csv";
-            return Err(Error::argument("output", wanted, path.display()));
+            let wanted = "a file ending in .npz, .flo, .png, .pfm or .csv, or a folder";
+            let got = format!("{0}; for a new folder of this name write {0}/", path.display());
+            return Err(Error::argument("output", wanted, got));
         };
         if formats.iter().any(|other| *other != format) {
             let got = format!("{} with another format beside it", path.display());
@@ -307,7 +313,8 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn is_folder(path: &Path) -> bool {
+/// Whether a path means a folder: it exists as one, ends in a separator or has no extension.
+pub fn is_folder(path: &Path) -> bool {
     let ends_in_separator = path.to_string_lossy().ends_with(std::path::is_separator);
     path.is_dir() || ends_in_separator || path.extension().is_none()
 }

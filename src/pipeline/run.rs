@@ -9,6 +9,7 @@ use crate::io::FrameSource;
 use crate::parallel::{Progress, Threads};
 use crate::simd::SimdReal;
 use crate::types::Status;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -45,7 +46,7 @@ impl Numbering {
 }
 
 /// What a run did.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Summary {
     /// Frames read.
     pub frames: usize,
@@ -59,6 +60,8 @@ pub struct Summary {
     pub repairs: usize,
     /// Files written.
     pub files: usize,
+    /// The last of them, under the name that it really has: the rows of a run that was stopped have another one than was asked for.
+    pub latest: Option<PathBuf>,
     /// Wall-clock seconds.
     pub seconds: f64,
 }
@@ -116,7 +119,7 @@ impl<T: SimdReal> Pipeline<T> {
 
     /// What was done so far; valid after a failed or interrupted run too.
     pub fn summary(&self) -> Summary {
-        self.summary
+        self.summary.clone()
     }
     /// The stage, for its state after the run.
     pub fn stage(&self) -> &dyn Stage<T> {
@@ -140,7 +143,9 @@ impl<T: SimdReal> Pipeline<T> {
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending));
         }
-        self.summary.files = self.sinks.iter().map(|sink| sink.files().0).sum();
+        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
+        self.summary.files = files.iter().map(|(number, _)| number).sum();
+        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
         self.summary.repairs = self.stage.repairs();
         self.summary.seconds = start.elapsed().as_secs_f64();
         result

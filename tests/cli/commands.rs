@@ -210,7 +210,22 @@ fn the_demo_measures_its_scene() {
     assert!(summary["jacobian_rms_error"].as_f64().unwrap() < 0.02, "{summary}");
     assert!(place.path("demo/frames/frame_000000.png").is_file());
     assert!(place.path("demo/flow/000001_curl.png").is_file());
-    assert_eq!(place.line("demo -o demo").code, 2);
+    // Its own results it replaces, anybody else's it does not touch.
+    fs::write(place.path("demo/flow/000001_curl.png"), b"old").unwrap();
+    place.good("demo -o demo --quiet");
+    assert!(fs::read(place.path("demo/flow/000001_curl.png")).unwrap().len() > 3);
+    for (mine, words) in
+        [("demo/flow/000009.npz", "mine"), ("demo/notes.txt", "mine"), ("other/frames/frame_000000.png", "")]
+    {
+        let mine = place.path(mine);
+        fs::create_dir_all(mine.parent().unwrap()).unwrap();
+        fs::write(&mine, words).unwrap();
+        let folder = if words.is_empty() { "other" } else { "demo" };
+        let refused = place.line(&format!("demo -o {folder}"));
+        assert!(refused.code == 2 && refused.err.contains("--force"), "{mine:?}: {}", refused.err);
+        assert_eq!(fs::read_to_string(&mine).unwrap(), words);
+        fs::remove_file(mine).unwrap();
+    }
 }
 
 #[test]

@@ -46,7 +46,10 @@ fn unusable_arguments_are_named() {
         ("flow s.npy -o out.xyz", &["output", ".npz"]),
         ("flow s.npy -o one.npz", &["output", "folder"]),
         ("flow s.npy -o p --points 1,1 --format flo", &["format"]),
-        ("flow s.npy --limit 1", &["frames", "1"]),
+        ("flow s.npy --limit 1 -o one.npz", &["frames", "1"]),
+        ("flow s.npy", &["output", "--json"]),
+        ("filter s.npy", &["output", "--json"]),
+        ("flow s.npy -o v1.2", &["output", "v1.2/"]),
         ("flow s.npy --first 9", &["input"]),
         ("measure s.npy --quantity rpm", &["fps"]),
         ("measure s.npy --quantity beauty", &["quantity", "divergence"]),
@@ -58,7 +61,10 @@ fn unusable_arguments_are_named() {
         ("filter s.npy --process-noise 1,2", &["--process-noise"]),
         ("synth nowhere -o x", &["scene", "ramp"]),
         ("synth affine -o x --set spin=1", &["spin"]),
-        ("synth affine -o x.avi", &["output"]),
+        ("synth affine -o x.avi", &["output", ".y4m"]),
+        ("synth affine -o v1.2", &["output", "v1.2/"]),
+        ("synth affine -o x.npy --simd mmx", &["simd"]),
+        ("demo -o v1.2", &["output", "v1.2/"]),
         ("synth affine -o x --depth float", &["output", ".npy"]),
         ("synth affine -o s.npy", &["output", "--force"]),
         ("frobnicate", &["frobnicate"]),
@@ -108,7 +114,7 @@ fn colour_is_refused_with_the_way_out() {
     let image = "out/000001_colour.png";
     let ended = place.line(&format!("flow {image} {image} {image}"));
     assert!(ended.code != 0 && ended.err.contains("luminance"), "{}", ended.err);
-    place.good(&format!("flow {image} {image} {image} --luminance"));
+    place.good(&format!("flow {image} {image} {image} --luminance --json"));
 }
 
 #[test]
@@ -138,4 +144,52 @@ fn quiet_runs_say_nothing() {
     assert_eq!((ended.out.as_str(), ended.err.as_str()), ("", ""));
     let told = place.good("flow s.npy -o out2");
     assert!(told.out.is_empty() && told.err.contains("1 fields"));
+}
+
+#[test]
+fn a_useless_environment_is_named_unless_an_option_overrides_it() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32");
+    for (variable, value) in [("THREADS", "abc"), ("THREADS", "0"), ("THREADS", "-1"), ("SIMD", "abc")] {
+        let variable = format!("JACOFLOW_{variable}");
+        let run =
+            |line: &str| place.command(&line.split(' ').collect::<Vec<_>>()).env(&variable, value).output().unwrap();
+        for line in [
+            "flow s.npy -o out",
+            "filter s.npy -o out",
+            "measure s.npy --quantity curl -o out.csv",
+            "synth affine -o out",
+            "demo -o out",
+        ] {
+            let output = run(line);
+            let words = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(2), "{line} {variable}={value}: {words}");
+            assert!(words.contains(&format!("error: {variable}: expected")) && words.contains(value), "{words}");
+        }
+        assert_eq!(place.names("."), ["s.npy"]);
+        assert!(run("flow s.npy --json --threads 1 --simd scalar").status.success());
+    }
+    for variable in ["JACOFLOW_THREADS", "JACOFLOW_SIMD"] {
+        let output = place.command(&["flow", "s.npy", "--json"]).env(variable, "").output().unwrap();
+        assert!(output.status.success(), "an empty {variable} is as good as none");
+    }
+}
+
+#[test]
+fn files_are_named_as_they_were_asked_for() {
+    let place = Place::new();
+    let refused = place.line("synth affine -o z.bmp");
+    assert!(refused.code == 2 && refused.err.starts_with("error: output"), "{}", refused.err);
+    place.good("synth affine -o frames.v1/ --frames 5 --size 40x32");
+    place.good("flow frames.v1 -o flow.v1/ --limit 3");
+    assert_eq!(place.names("flow.v1"), ["000001.npz"]);
+    let again = place.line("synth affine -o frames.v1/ --frames 5 --size 40x32");
+    assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
+    // A stream does not tell beforehand how many fields will come.
+    place.good("synth affine -o s.y4m --frames 5 --size 40x32");
+    let stream = fs::read(place.path("s.y4m")).unwrap();
+    for (output, name) in [("one.npz", "one.npz"), ("one.csv --picture curl", "one_curl.png")] {
+        let ended = place.fed(&format!("flow - -o {output}"), &stream);
+        assert!(ended.code == 2 && ended.err.contains(&format!("the file {name} ")), "{}", ended.err);
+    }
 }

@@ -101,12 +101,15 @@ fn an_interrupted_run_leaves_no_half_file_and_loses_nothing() {
 #[test]
 fn an_interrupted_single_file_does_not_appear() {
     let place = Place::new();
-    let mut child = start(&place, "flow - -o one.npz --limit 3");
+    let mut child = start(&place, "flow - -o one.npz");
     let mut pipe = child.stdin.take().unwrap();
-    pipe.write_all(&header()).unwrap();
-    (0..2).for_each(|index| pipe.write_all(&frame(index)).unwrap());
-    pipe.flush().unwrap();
-    std::thread::sleep(Duration::from_millis(300));
+    // Two frames are more than a pipe holds: once they are written, the run is reading them, and a signal finds it at work.
+    let (width, height) = (512, 512);
+    pipe.write_all(format!("YUV4MPEG2 W{width} H{height} F25:1 Ip A1:1 Cmono\n").as_bytes()).unwrap();
+    for _ in 0..2 {
+        pipe.write_all(b"FRAME\n").unwrap();
+        pipe.write_all(&vec![128; width * height]).unwrap();
+    }
     interrupt(&child);
     wait_until("the end", || child.try_wait().unwrap().is_some());
     assert_eq!(child.wait().unwrap().code(), Some(130));
@@ -114,9 +117,57 @@ fn an_interrupted_single_file_does_not_appear() {
 }
 
 #[test]
+fn rows_of_an_interrupted_run_are_told_by_the_name_they_have() {
+    for tell in ["", " --json"] {
+        let place = Place::new();
+        let mut child = start(&place, &format!("flow - -o t.csv --points 20,20{tell}"));
+        let mut pipe = child.stdin.take().unwrap();
+        pipe.write_all(&header()).unwrap();
+        (0..4).for_each(|index| pipe.write_all(&frame(index)).unwrap());
+        pipe.flush().unwrap();
+        wait_until("the table", || !temporary(&place.path(".")).is_empty());
+        interrupt(&child);
+        let output = child.wait_with_output().unwrap();
+        drop(pipe);
+        assert_eq!((output.status.code(), place.names(".")), (Some(130), vec!["t.partial.csv".to_string()]));
+        let words = String::from_utf8(output.stderr).unwrap();
+        assert!(words.contains("1 file: t.partial.csv"), "{words}");
+        if !tell.is_empty() {
+            let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(summary["output"], "t.partial.csv");
+        }
+    }
+}
+
+#[test]
+fn a_second_interrupt_ends_at_once_and_leaves_no_temporary_file() {
+    for line in [
+        "synth turbulence -o s.npy --size 1500x1500 --frames 2",
+        "synth turbulence -o s.y4m --size 1500x1500 --frames 2",
+    ] {
+        let place = Place::new();
+        let mut child = start(&place, line);
+        wait_until("the file", || !temporary(&place.path(".")).is_empty());
+        // A frame takes long enough for many signals.
+        wait_until("the end", || {
+            interrupt(&child);
+            child.try_wait().unwrap().is_some()
+        });
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert!(place.names(".").is_empty(), "{:?}", place.names("."));
+    }
+}
+
+#[test]
 fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
+    // Few rows a frame, which are flushed; and more than any buffer holds.
+    follow("flow - --points 20,20 --quiet", "1,20,20,ok");
+    follow("flow - -o - --quiet", "1,0,0,border");
+}
+
+fn follow(command: &str, first: &str) {
     let place = Place::new();
-    let mut child = start(&place, "flow - --points 20,20 --quiet");
+    let mut child = start(&place, command);
     let mut pipe = child.stdin.take().unwrap();
     pipe.write_all(&header()).unwrap();
     (0..3).for_each(|index| pipe.write_all(&frame(index)).unwrap());
@@ -128,7 +179,7 @@ fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() 
     line.clear();
     // The first row is there although the input is not at its end.
     rows.read_line(&mut line).unwrap();
-    assert!(line.starts_with("1,20,20,ok"), "{line}");
+    assert!(line.starts_with(first), "{line}");
     drop(rows);
     let mut index = 3;
     while index < 2000 && pipe.write_all(&frame(index)).is_ok() {

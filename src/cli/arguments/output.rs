@@ -10,7 +10,8 @@ use std::path::PathBuf;
 #[command(next_help_heading = "Output")]
 pub struct OutputArguments {
     /// A folder for numbered files (one per field: 000001.npz, ...), or one file (.npz .flo .png .pfm .csv) when exactly one field
-    /// comes; a .csv takes any number of fields, and `-` is CSV on standard output
+    /// comes; a .csv takes any number of fields, and `-` is CSV on standard output. Needed, except with --points (then `-`), for the summary of
+    /// --json alone, or where a filter's state is all that is saved. A new folder with a dot in its name needs a / at its end
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Formats in a folder: npz (everything), flo, kitti (PNG), pfm, csv [default: npz]

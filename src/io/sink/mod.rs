@@ -43,11 +43,22 @@ pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
     if !(frame_rate > 0.0 && frame_rate.is_finite()) {
         return Err(Error::argument("frame_rate", "a positive number of frames per second", frame_rate));
     }
-    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec));
-    let kind = kind.ok_or_else(|| {
-        Error::argument("output", "a folder (for PNG files), *.npy, *.y4m or - for Y4M on standard output", spec)
-    })?;
-    (kind.open)(spec, frame_rate)
+    (kind_of(spec)?.open)(spec, frame_rate)
+}
+
+/// Whether [`open_sink`] knows what to make of a specification; nothing is made yet.
+///
+/// # Errors
+/// [`Error::Argument`] named `output` for an extension that no sink has.
+pub fn check_sink(spec: &str) -> Result<()> {
+    kind_of(spec).map(drop)
+}
+
+fn kind_of(spec: &str) -> Result<&'static Kind> {
+    KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| {
+        let wanted = "*.npy, *.y4m, - for Y4M on standard output, or a folder (for PNG files)";
+        Error::argument("output", wanted, format!("{spec}; for a new folder of this name write {spec}/"))
+    })
 }
 
 /// What every later frame must be like.

@@ -42,7 +42,8 @@ impl<T: Real + Element> Sink<T> for Fields<T> {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let Place::Single(stem) = &self.plan.place else { return self.write(step.field) };
         if self.waiting.is_some() {
-            return Err(too_many(stem, "several"));
+            let path = self.plan.formats.first().and_then(|format| self.plan.field_path(0, *format));
+            return Err(too_many(path.as_ref().unwrap_or(stem), "several"));
         }
         self.waiting = Some(step.field.clone());
         Ok(())

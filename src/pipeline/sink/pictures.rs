@@ -127,7 +127,7 @@ impl<T: Real> Sink<T> for Pictures {
             let picture = self.draw(kind, step.field, step.frame)?;
             let Some(path) = self.plan.picture_path(step.field.layout.frame_index, kind) else { continue };
             match &self.plan.place {
-                Place::Single(stem) if self.seen > 1 => return Err(too_many(stem, "several")),
+                Place::Single(_) if self.seen > 1 => return Err(too_many(&path, "several")),
                 Place::Single(_) => self.waiting.push((path, picture)),
                 _ => self.write(path, &picture)?,
             }
