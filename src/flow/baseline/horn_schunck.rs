@@ -4,7 +4,7 @@
 //! the inverse of each pixel's 2x2 block as preconditioner. Sums run over fixed bands in a fixed order, so the result does not depend on the
 //! number of threads.
 
-use super::pair::{Crop, Differences, Gradients};
+use super::pair::{Crop, Differences, Gradients, magnitude};
 use crate::error::{Error, Result};
 use crate::flow::options::Common;
 use crate::flow::site::{MaskCounts, bands};
@@ -120,14 +120,17 @@ impl HornSchunck {
                 data.push(if ok { [g.ix.get(x, y), g.iy.get(x, y), g.it.get(x, y)] } else { [0.0; 3] });
             }
         }
+        // Squares of squares are to come: without the gain they neither overflow nor vanish.
+        let gain = magnitude(data.iter().flatten().fold(0.0, |largest: f64, d| largest.max(d.abs())));
+        data.iter_mut().flatten().for_each(|d| *d /= gain);
         let structure = Structure::new(&data);
         let spacing = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
-        let rank = structure.rank((g.brightness * spacing).powi(2) * data.len() as f64);
+        let rank = structure.rank((g.brightness / gain * spacing).powi(2) * data.len() as f64);
         let solution = if rank == 0 {
             None
         } else {
             let weight = match self.options.smoothness {
-                Smoothness::Absolute(weight) => weight,
+                Smoothness::Absolute(weight) => weight / gain,
                 Smoothness::Relative(factor) => factor * structure.mean_square.sqrt(),
             };
             let system = System { width: n, height: m, data: &data, square: weight * weight };
@@ -276,7 +279,7 @@ impl System<'_> {
             return Ok(f);
         }
         Err(Error::Numerical(format!(
-            "Horn-Schunck reached a relative residual of {:.1e} in {iterations} iterations, not the tolerance of {tolerance:.1e}; allow more              iterations or less smoothness",
+            "Horn-Schunck reached a relative residual of {:.1e} in {iterations} iterations, not the tolerance of {tolerance:.1e}; allow more iterations or less smoothness",
             (rz / target).sqrt() * tolerance
         )))
     }

@@ -1,6 +1,10 @@
 //! Lucas and Kanade (1981): flow constant in a window, least squares.
+//!
+//! At the frame's edge the window is cut off and normalised by the weight that remains, as that of the windowed method: only the outermost pixels,
+//! which have no gradient, get status `Border`, and what has less than a tenth of the window's weight around it (in frames smaller than the window).
+//! Masked and bad pixels, in contrast, take every window with them that touches them.
 
-use super::pair::{Crop, Differences, Gradients};
+use super::pair::{Crop, Differences, Gradients, magnitude};
 use crate::error::{Error, Result};
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, MaskCounts, bands};
@@ -10,6 +14,7 @@ use crate::parallel::Threads;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, Sites, Status};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The weights of the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +43,9 @@ impl Default for LucasKanadeOptions {
 /// Smallest eigenvalue of the window's gradient matrix, relative to its largest, that counts as two-dimensional structure.
 const RANK_TOLERANCE: f64 = 1e-9;
 
+/// Least share of the window's weight that must lie inside the frame; that of the windowed method.
+const LEAST_WEIGHT: f64 = 0.1;
+
 /// The estimator behind the options.
 #[derive(Debug)]
 pub(in crate::flow) struct LucasKanade {
@@ -49,8 +57,16 @@ pub(in crate::flow) struct LucasKanade {
 /// Weighted sums over one window.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    /// `w Ix^2, w Ix Iy, w Iy^2, w Ix It, w Iy It, w It^2`, then the first three with squared weights, and the sum of the weights' squares apart.
+    /// `w Ix^2, w Ix Iy, w Iy^2, w Ix It, w Iy It, w It^2`, then the first three with squared weights.
     values: [f64; 9],
+    /// Sum of the weights.
+    weight: f64,
+}
+
+/// The taps of a kernel centred at `centre` that fall on pixels with a gradient: all of a crop of `n` but its outermost.
+fn taps(kernel: &[f64], centre: usize, n: usize) -> Range<usize> {
+    let radius = kernel.len() / 2;
+    (radius + 1).saturating_sub(centre)..kernel.len().min((n + radius).saturating_sub(centre + 1))
 }
 
 impl LucasKanade {
@@ -80,13 +96,19 @@ impl LucasKanade {
     fn radius(&self) -> usize {
         self.kernel.len() / 2
     }
-    /// The window, and one pixel more for its gradients.
-    fn reach(&self) -> Reach {
+    /// The window's part inside the frame, and one pixel more for its gradients.
+    fn reach(&self, (x, y): (usize, usize), (w, h): (usize, usize)) -> Reach {
         let r = self.radius() + 1;
-        Reach { left: r, right: r, up: r, down: r }
+        Reach { left: r.min(x), right: r.min(w - 1 - x), up: r.min(y), down: r.min(h - 1 - y) }
     }
 
-    /// Fills `field`, in px and frames. A window that leaves the frame has no estimate.
+    /// Share of the window's weight that lies inside the frame.
+    fn share(&self, (x, y): (usize, usize), (w, h): (usize, usize)) -> f64 {
+        let sum = |centre, n| self.kernel[taps(&self.kernel, centre, n)].iter().sum::<f64>();
+        sum(x, w) * sum(y, h) / self.kernel.iter().sum::<f64>().powi(2)
+    }
+
+    /// Fills `field`, in px and frames.
     pub fn estimate_into<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
@@ -94,7 +116,7 @@ impl LucasKanade {
         field: &mut FlowField<T>,
     ) -> Result<()> {
         let (w, h) = frames[0].size();
-        let (width, sites, r) = (field.width, field.layout.sites.clone(), self.reach().left);
+        let (width, sites, r) = (field.width, field.layout.sites.clone(), self.radius() + 1);
         let counts = common.mask.as_ref().map(MaskCounts::new);
         let around = |x0: usize, y0: usize, x1: usize, y1: usize| Crop {
             x0: x0.saturating_sub(r),
@@ -103,10 +125,11 @@ impl LucasKanade {
             y1: (y1 + r).min(h),
         };
         let obstacle = |at: (usize, usize)| {
-            if !self.reach().fits(at, (w, h)) {
+            let rim = Reach { left: 1, right: 1, up: 1, down: 1 };
+            if !rim.fits(at, (w, h)) || self.share(at, (w, h)) < LEAST_WEIGHT {
                 return Some(Status::Border);
             }
-            counts.as_ref().is_some_and(|c| c.touches(at, self.reach())).then_some(Status::Masked)
+            counts.as_ref().is_some_and(|c| c.touches(at, self.reach(at, (w, h)))).then_some(Status::Masked)
         };
         let gradients = |crop: Crop, threads: Threads| {
             Gradients::new(frames, self.options.differences, crop, threads, common.level())
@@ -139,10 +162,11 @@ impl LucasKanade {
                         columns.prepare(g, at.1 - crop.y0, &self.kernel);
                         (columns.window(at.0 - crop.x0, &self.kernel), g.brightness)
                     } else {
-                        let g = gradients(around(at.0, at.1, at.0 + 1, at.1 + 1), one)?;
+                        let crop = around(at.0, at.1, at.0 + 1, at.1 + 1);
+                        let g = gradients(crop, one)?;
                         columns.row = None;
-                        columns.prepare(&g, r, &self.kernel);
-                        (columns.window(r, &self.kernel), g.brightness)
+                        columns.prepare(&g, at.1 - crop.y0, &self.kernel);
+                        (columns.window(at.0 - crop.x0, &self.kernel), g.brightness)
                     };
                     self.solve::<T>(&mut band, local, &sums, brightness, noise);
                 }
@@ -160,16 +184,18 @@ impl LucasKanade {
         brightness: f64,
         noise: Option<f64>,
     ) {
-        let [xx, xy, yy, xt, yt, tt, sxx, sxy, syy] = sums.values;
+        // Without the gain in intensity, whose fourth power may be beyond any number.
+        let gain = magnitude(sums.values[0] + sums.values[2]);
+        let [xx, xy, yy, xt, yt, tt, sxx, sxy, syy] = sums.values.map(|v| v / gain);
         let mut none = [[f64::NAN; 2]; 2];
         if !sums.values.iter().all(|v| v.is_finite()) {
             return put(band, local, Err(Status::NonFinite), &mut none, f64::NAN);
         }
-        let weight: f64 = self.kernel.iter().sum::<f64>().powi(2);
+        let weight = sums.weight;
         let det = xx * yy - xy * xy;
         let largest = 0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
         let spacing = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
-        let floor = weight * (brightness * spacing).powi(2);
+        let floor = weight * (brightness * spacing).powi(2) / gain;
         if !(largest > 0.0 && det / largest > floor.max(RANK_TOLERANCE * largest)) {
             return put(band, local, Err(Status::Unobservable), &mut none, f64::NAN);
         }
@@ -190,9 +216,9 @@ impl LucasKanade {
             }
         }
         let used = inverse[0][0] * sxx + 2.0 * inverse[0][1] * sxy + inverse[1][1] * syy;
-        let variance = noise.unwrap_or(left / (weight - used));
+        let variance = noise.map_or(left / (weight - used), |variance| variance / gain);
         covariance.iter_mut().flatten().for_each(|c| *c *= variance);
-        put(band, local, Ok((u, v)), &mut covariance, (left / weight).sqrt());
+        put(band, local, Ok((u, v)), &mut covariance, (left * gain / weight).sqrt());
         let smallest = det / largest;
         if let Some(p) = &mut band.condition {
             p[local] = T::from_f64((largest / smallest).sqrt());
@@ -205,6 +231,8 @@ impl LucasKanade {
 struct Columns {
     row: Option<usize>,
     sums: Vec<[f64; 9]>,
+    /// Sum of the weights down a column.
+    weight: f64,
 }
 
 impl Columns {
@@ -215,8 +243,10 @@ impl Columns {
         self.row = Some(y);
         self.sums.clear();
         self.sums.resize(g.ix.width(), [0.0; 9]);
-        for (k, &w) in kernel.iter().enumerate() {
-            let row = y + k - kernel.len() / 2;
+        let taps = taps(kernel, y, g.ix.height());
+        self.weight = kernel[taps.clone()].iter().sum();
+        for k in taps {
+            let (w, row) = (kernel[k], y + k - kernel.len() / 2);
             let lines = g.ix.row(row).iter().zip(g.iy.row(row)).zip(g.it.row(row));
             for (sum, ((&x, &y), &t)) in self.sums.iter_mut().zip(lines) {
                 let products = [x * x, x * y, y * y, x * t, y * t, t * t];
@@ -232,7 +262,9 @@ impl Columns {
 
     fn window(&self, x: usize, kernel: &[f64]) -> Sums {
         let mut out = Sums::default();
-        for (&w, column) in kernel.iter().zip(&self.sums[x - kernel.len() / 2..]) {
+        let taps = taps(kernel, x, self.sums.len());
+        out.weight = self.weight * kernel[taps.clone()].iter().sum::<f64>();
+        for (&w, column) in kernel[taps.clone()].iter().zip(&self.sums[x + taps.start - kernel.len() / 2..]) {
             for (k, (o, c)) in out.values.iter_mut().zip(column).enumerate() {
                 *o += c * if k < 6 { w } else { w * w };
             }

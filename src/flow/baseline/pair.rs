@@ -72,6 +72,13 @@ pub(super) struct Gradients {
     pub brightness: f64,
 }
 
+/// The power of two just below a positive number: dividing by it brings any gain in intensity near 1, and loses no bit. 1 for what has none.
+pub(super) fn magnitude(value: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    let power = f64::from_bits(value.to_bits() & EXPONENT);
+    if power > 0.0 && power.is_finite() { power } else { 1.0 }
+}
+
 /// A rectangle of pixels `x0 .. x1`, `y0 .. y1`.
 #[derive(Clone, Copy)]
 pub(super) struct Crop {

@@ -70,3 +70,54 @@ fn masks_and_bad_samples_touch_only_their_windows() {
     }
     assert_eq!(field.status[20 * 48 + 24], Status::NonFinite);
 }
+
+#[test]
+fn a_window_is_cut_off_at_the_edge_and_only_the_rim_has_no_estimate() {
+    let f = frames(0.3, -0.2);
+    let common = Common { covariance: true, ..Common::default() };
+    let dense = estimate(LucasKanadeOptions::default(), common.clone(), &f);
+    for (i, status) in dense.status.iter().enumerate() {
+        let (x, y) = (i % 48, i / 48);
+        let rim = x == 0 || y == 0 || x == 47 || y == 39;
+        assert_eq!(*status, if rim { Status::Border } else { Status::Ok }, "{x} {y}");
+        let m = dense.affine(i);
+        assert!(rim || (m.u - 0.3).abs() < 0.02 && (m.v + 0.2).abs() < 0.02, "{x} {y} {m:?}");
+    }
+    // Half the window, half the knowledge: the variance of both components is about twice that of the middle.
+    let known = Common { noise: Some(1.0), ..common.clone() };
+    let variance = estimate(LucasKanadeOptions::default(), known, &f).covariance.unwrap();
+    let mean = |columns: &[usize]| {
+        let sites = columns.iter().flat_map(|x| (13..27).map(move |y| y * 48 + x));
+        sites.map(|i| variance[i] + variance[2 * 48 * 40 + i]).sum::<f64>() / (14 * columns.len()) as f64
+    };
+    let ratio = mean(&[1, 46]) / mean(&(16..32).collect::<Vec<_>>());
+    assert!((1.7..2.2).contains(&ratio), "{ratio}");
+    let places = vec![(1, 1), (46, 38), (3, 20), (24, 37)];
+    let points = Common { sites: Sites::Points(places.clone()), ..common };
+    let points = estimate(LucasKanadeOptions::default(), points, &f);
+    for (k, (x, y)) in places.into_iter().enumerate() {
+        assert!((points.motion[k] - dense.motion[y * 48 + x]).abs() < 1e-12);
+    }
+    // A frame that holds less than a tenth of its windows knows too little.
+    let wide = LucasKanadeOptions { window: Window::Gaussian(40.0), ..LucasKanadeOptions::default() };
+    assert!(estimate(wide, Common::default(), &f).status.iter().all(|s| *s == Status::Border));
+}
+
+#[test]
+fn gain_in_intensity_changes_nothing() {
+    let f = frames(0.3, -0.2);
+    let of = |gain: f64| {
+        let brighter: Vec<_> = f.iter().map(|frame| frame.map(|v| v * gain)).collect();
+        let common = Common { covariance: true, noise: Some(gain), ..Common::default() };
+        estimate(LucasKanadeOptions::default(), common, &brighter)
+    };
+    let one = of(1.0);
+    for gain in [1e-100, 3.0, 1e100] {
+        let other = of(gain);
+        assert_eq!(one.status, other.status, "{gain}");
+        let planes = one.motion.iter().chain(one.covariance.as_ref().unwrap());
+        for (a, b) in planes.zip(other.motion.iter().chain(other.covariance.as_ref().unwrap())) {
+            assert!(a.is_nan() && b.is_nan() || (a - b).abs() < 1e-9 * (1.0 + a.abs()), "{gain}: {a} {b}");
+        }
+    }
+}
