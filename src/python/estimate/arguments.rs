@@ -143,7 +143,7 @@ impl Arguments {
     fn horn_schunck(&self, o: &mut HornSchunckOptions) -> Result<()> {
         self.refuse(&["neighbourhood", "window_sigma", "rows", "rank_deficient"])?;
         self.expect_model("translational")?;
-        o.smoothness = self.smoothness.map_or(o.smoothness, Smoothness::Absolute);
+        o.smoothness = self.smoothness.map_or(o.smoothness, Smoothness::Relative);
         if let Some(iterations) = self.iterations {
             let count = usize::try_from(iterations).ok().filter(|&n| n > 0);
             o.iterations = count.ok_or_else(|| Error::argument("iterations", "a positive integer", iterations))?;

@@ -107,8 +107,8 @@ macro_rules! define_estimate {
         ///     Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
         /// rows : "brightness", "gradient", "jet" or "all"
         ///     Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel.
-        /// smoothness : float, grey levels per px
-        ///     Weight of "horn_schunck"; default the root mean square gradient.
+        /// smoothness : float, in units of the root mean square gradient of the frame
+        ///     Weight of "horn_schunck", so that the intensity gain does not change the flow; default 1.
         /// iterations : int
         ///     Most iterations of "horn_schunck".
         /// rank_deficient : "nan" or "min_norm"
