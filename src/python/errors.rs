@@ -34,7 +34,8 @@ impl From<Error> for PyErr {
             Error::Type { .. } => PyTypeError::new_err(message),
             Error::Io { path, source } => {
                 let code = source.raw_os_error().unwrap_or_else(|| errno(source.kind()));
-                PyOSError::new_err((code, describe(&source), path))
+                // A plain string, as in Python's own errors: their text shows it with repr().
+                PyOSError::new_err((code, describe(&source), path.into_os_string()))
             }
             Error::Format { .. } => FormatError::new_err(message),
             Error::NotObservable(_) => NotObservableError::new_err(message),

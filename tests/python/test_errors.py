@@ -190,7 +190,8 @@ def test_files_that_are_not_there(call, kind, code, tmp_path):
     with pytest.raises(kind) as caught:
         call(tmp_path)
     assert caught.value.errno == code
-    assert str(tmp_path) in str(caught.value.filename)
+    assert isinstance(caught.value.filename, str) and str(tmp_path) in caught.value.filename
+    assert "PosixPath" not in str(caught.value)
 
 
 def test_damaged_files_are_format_errors(tmp_path):
@@ -220,3 +221,17 @@ def test_unknown_scenes_are_listed(what):
         scenes.Sensor(noise=-1.0)
     with pytest.raises(ValueError, match="rounding: "):
         scenes.Sensor(rounding="up")
+
+
+@pytest.mark.parametrize(("variable", "value"), [("THREADS", "abc"), ("THREADS", "0"), ("THREADS", "-1"), ("SIMD", "abc")])
+def test_a_useless_environment_is_named_unless_an_option_overrides_it(monkeypatch, variable, value):
+    frames = list(np.zeros((3, 8, 10), np.uint8))
+    monkeypatch.setenv(f"JACOFLOW_{variable}", value)
+    message = f"JACOFLOW_{variable}: expected .*{value}"
+    with pytest.raises(ValueError, match=message):
+        jacoflow.estimate(frames)
+    with pytest.raises(ValueError, match=message):
+        FlowFilter().push(frames[0])
+    jacoflow.estimate(frames, threads=1, simd="scalar")
+    monkeypatch.setenv(f"JACOFLOW_{variable}", "")
+    jacoflow.estimate(frames)

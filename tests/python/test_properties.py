@@ -28,6 +28,17 @@ def test_intensity_gain_never_changes_the_flow(seed, method, gain):
 
 
 @settings(max_examples=15, deadline=None)
+@given(seeds, st.floats(0.1, 10.0), st.sampled_from([1e-100, 1e-3, 1e3, 1e100]))
+def test_smoothness_is_relative_to_the_gradient(seed, smoothness, gain):
+    frames = pictures(seed)
+    one, other = (
+        jacoflow.estimate(list(frames * factor), method="horn_schunck", smoothness=smoothness) for factor in (1.0, gain)
+    )
+    assert (other.status == one.status).all() and one.status[18, 20] == jacoflow.Status.OK
+    assert_allclose(other.flow, one.flow, rtol=1e-4, atol=1e-5)
+
+
+@settings(max_examples=15, deadline=None)
 @given(seeds, st.integers(-3, 3))
 def test_powers_of_two_change_no_bit_of_the_instantaneous_flow(seed, power):
     frames = pictures(seed)
