@@ -2,16 +2,24 @@
 //!
 //! To first order the error of `m = N^-1 sum_p w T_p^T A_p^T b_p` is `N^-1 sum_p w T_p^T A_p^T r_p`, `r_p` what noise leaves in the pixel's equations. Stencils and smoothing
 //! spread the noise of one sample over many pixels, so `s2 N^-1` would be far off. Instead the sum is turned round, to run over the noisy samples q:
-//! `sum_q w_q T_q^T h(q) e(q)` with `h = sum_j L_j^T d_j`, `d_j(p)` the weight of the jet's component j in `A_p^T r_p` and `L_j^T` the adjoint of the smoothed stencil
-//! (window and transport hardly change within its reach). Then `Cov = s2 N^-1 S N^-1`, `S = sum_q w_q^2 T_q^T h h^T T_q`: one more pass of moments.
+//! `sum_q w_q T_q^T h(q) e(q)` with `h = sum_j L_j^T d_j`, `d_j(p)` the weight of the jet's component j in `A_p^T r_p` and `L_j^T` the adjoint of the
+//! stencil. Then `Cov = s2 N^-1 S N^-1`, `S = sum_q w_q^2 T_q^T h h^T T_q`: one more pass of moments.
 //!
-//! The same noise in the coefficients draws the estimate towards zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own `E[dA^T dA]`. That pull is not subtracted; its
-//! outer product is added, so that the covariance is that of the whole error. Unless the noise is given, its variance is the
-//! residual's sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which makes it unbiased for white noise, rounding included; what discretisation
-//! leaves in the residual widens it.
+//! Smoothing by a Gaussian of variance t2 comes in between. The product of the window, of variance w2, and of the kernel about the sample q is the Gaussian of variance
+//! `w2 + t2` at q times a kernel of variance `a t2` about `a q`, `a = w2 / (w2 + t2)`. So h is smoothed by `a t2` instead of t2, samples count at the place
+//! `a q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The stencil's few pixels are taken to be one place.
+//!
+//! Two things draw the estimate away from the truth in a known direction: noise in the coefficients towards zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own
+//! `E[dA^T dA]`, and truncation ([`super::misfit`]). Neither is subtracted; the outer product of their sum is added, so that the covariance is that of the whole error.
+//!
+//! Unless the noise is given, its variance is read from the highest frequencies of the frames ([`super::detail`]), where motion and misfit hardly show. The residual gives
+//! another, its sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more than [`CHANCE`]
+//! times that, and where the residual is that much larger than noise and truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
 
 use super::covariance_kernels::{Outer, Pass, Sandwich, Scatter, Weigh};
+use super::detail::Detail;
 use super::estimate::Strip;
+use super::misfit::{self, Ring, Truncation};
 use super::noise::PixelNoise;
 use super::rows::Plan;
 use super::solve::{ENTRIES, MomentRow};
@@ -33,11 +41,11 @@ pub(super) struct NoiseSetting<T> {
     pub taps: Vec<((isize, isize), [T; 6])>,
     /// Largest offset of the stencil, px.
     pub reach: usize,
-    /// Kernel of the smoothing, or of radius 0.
+    /// Kernel of the smoothing as the window sees it, or of radius 0.
     pub smoothing: Window<T>,
-    /// The window of the normal equations, and its square.
+    /// The window of the normal equations.
     pub window: Window<T>,
-    /// Squared weights.
+    /// Squared weights of the noisy samples.
     pub squared: Window<T>,
     /// 1 / sigma of the window.
     pub scale: f64,
@@ -45,6 +53,10 @@ pub(super) struct NoiseSetting<T> {
     pub rows: usize,
     /// Variance of the pixel noise; `None`: from the residual.
     pub variance: Option<f64>,
+    /// What truncation leaves.
+    pub truncation: Truncation,
+    /// Energy of the detail per variance of the noise.
+    pub detail_gain: f64,
     /// Instruction set.
     pub level: Level,
 }
@@ -68,14 +80,14 @@ impl<T: SimdReal> NoiseSetting<T> {
 
     /// How far beyond a site estimates of the motion are used, px.
     pub fn margin(&self) -> usize {
-        self.squared.radius() + self.smoothing.radius() + self.reach
+        (self.squared.radius() + self.smoothing.radius() + self.reach).max(self.window.radius())
     }
 
     /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with the margin around them
     /// (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and frames.
     pub fn covariance(
         &self,
-        source: &Source<'_, T>,
+        (source, detail): (&Source<'_, T>, Option<&Detail<T>>),
         strip: &Strip<T>,
         rows: &[usize],
         columns: &Range<usize>,
@@ -93,7 +105,7 @@ impl<T: SimdReal> NoiseSetting<T> {
         }
         bands.into_par_iter().for_each_init(Scratch::new, |scratch, (rows, out)| {
             let columns = columns.clone();
-            BandTask { setting: self, source, strip, scratch, rows, columns, out }.run();
+            BandTask { setting: self, source, detail, strip, scratch, rows, columns, out }.run();
         });
         planes
     }
@@ -115,6 +127,10 @@ struct Scratch<T> {
     sums: Moments<T>,
     usable: Planes<T>,
     usable_sums: Moments<T>,
+    ring: Ring<T>,
+    /// Planes of the misfit, and two of the detail.
+    misfit: Planes<T>,
+    misfit_sums: Moments<T>,
     /// Inverse, motion, residual, weight, moments of the usable pixels at one row of the tile; then the result.
     pixel: Vec<T>,
 }
@@ -132,6 +148,9 @@ impl<T: SimdReal> Scratch<T> {
             sums: Moments::new(),
             usable: Planes::new(),
             usable_sums: Moments::new(),
+            ring: Ring::new(),
+            misfit: Planes::new(),
+            misfit_sums: Moments::new(),
             pixel: Vec::new(),
         }
     }
@@ -142,12 +161,19 @@ pub(super) const PULL_STEPS: usize = 3;
 /// Rows of `Scratch::pixel`.
 const PIXEL: usize = PIXEL_RESULT + ENTRIES;
 /// Where the result begins among them.
-pub(super) const PIXEL_RESULT: usize = ENTRIES + 6 + 2 + 6;
+pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 6 + 3;
+/// Where the misfit's score begins: six entries, its energy, the energy of the detail and the weight of the pixels that have detail.
+pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
+/// The truncation is known to leading order; only a residual beyond so many times its energy is laid to anything else.
+pub(super) const MISFIT_SLACK: f64 = 2.0;
+/// Two estimates of the noise from one window may differ by so much by chance.
+pub(super) const CHANCE: f64 = 1.5;
 
 /// The covariance of a band of rows.
 struct BandTask<'a, 'b, T> {
     setting: &'a NoiseSetting<T>,
     source: &'a Source<'a, T>,
+    detail: Option<&'a Detail<T>>,
     strip: &'a Strip<T>,
     scratch: &'a mut Scratch<T>,
     rows: &'a [usize],
@@ -165,6 +191,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         for left in self.columns.clone().step_by(TILE_COLUMNS) {
             self.scores(left, (top, bottom));
             self.products((top, bottom));
+            self.misfit(left, (top, bottom));
             if !self.source.support.is_whole() {
                 self.usable(left, (top, bottom));
             }
@@ -174,16 +201,20 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                     *centre = y - top + radius;
                 }
                 let centres = &mut centres[..rows.len()];
-                let Scratch { sums, planes, usable, usable_sums, .. } = &mut *self.scratch;
+                let Scratch { sums, planes, usable, usable_sums, misfit, misfit_sums, .. } = &mut *self.scratch;
                 for p in 0..plan.planes() {
                     sums.sum(level, &self.setting.squared, planes, (p, plan.order(p), plan.base(p)), centres);
                 }
+                let (window, more) = (&self.setting.window, self.setting.window.radius() - radius);
+                for centre in centres.iter_mut() {
+                    *centre += more;
+                }
                 if !self.source.support.is_whole() {
-                    let more = self.setting.window.radius() - radius;
-                    for centre in centres.iter_mut() {
-                        *centre += more;
-                    }
-                    usable_sums.sum(level, &self.setting.window, usable, (0, 2, 0), centres);
+                    usable_sums.sum(level, window, usable, (0, 2, 0), centres);
+                }
+                for p in 0..misfit::PLANES + if self.detail.is_some() { 2 } else { 0 } {
+                    let (order, base) = misfit::place(p);
+                    misfit_sums.sum(level, window, misfit, (p, order, base), centres);
                 }
                 for g in 0..rows.len() {
                     self.finish_row(group * GROUP_ROWS + g, g, left);
@@ -267,6 +298,27 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         }
     }
 
+    /// The planes of the misfit and the detail, with the margin of the window.
+    fn misfit(&mut self, left: usize, (top, bottom): (usize, usize)) {
+        let Self { setting, source, detail, strip, scratch, .. } = self;
+        let Scratch { jets, ring, misfit, .. } = &mut **scratch;
+        let radius = setting.window.radius();
+        let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
+        misfit.resize(misfit::PLANES + if detail.is_some() { 2 } else { 0 }, width, height);
+        let corner = (left as isize - radius as isize, top as isize - radius as isize);
+        let kind = (setting.level, setting.rows);
+        ring.fill(kind, &setting.truncation, (source, strip), jets, (corner, setting.scale), misfit);
+        let Some(detail) = detail else { return };
+        for r in 0..height {
+            let y = corner.1 + r as isize;
+            let at = misfit.at(misfit::PLANES, r, 0);
+            source.support.weights(corner.0, y, &mut misfit.data[at..at + width]);
+            let other = misfit.at(misfit::PLANES + 1, r, 0);
+            let (energy, known) = misfit.data.split_at_mut(other);
+            detail.row(corner.0, y, &mut energy[at..at + width], &mut known[..width]);
+        }
+    }
+
     /// Covariance of row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that begins at `left`.
     fn finish_row(&mut self, j: usize, g: usize, left: usize) {
         self.gather(j, g, left);
@@ -284,7 +336,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
 
     /// Copies what the strip and the window know of row `j` of the band to `Scratch::pixel`.
     fn gather(&mut self, j: usize, g: usize, left: usize) {
-        let Self { setting, source, strip, scratch, rows, columns, .. } = self;
+        let Self { setting, source, detail, strip, scratch, rows, columns, .. } = self;
         let y = rows[j];
         let count = (columns.end - left).min(TILE_COLUMNS);
         let n = strip.rows.len() * strip.columns.len();
@@ -306,6 +358,19 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             for (k, one) in ones.into_iter().enumerate() {
                 scratch.pixel[(ENTRIES + 8 + k) * TILE_COLUMNS + c] = one;
             }
+        }
+        // With u = u0 + x u_x + y u_y the entry of u_x is that of u times x, and its own.
+        let Scratch { misfit_sums, pixel, .. } = &mut **scratch;
+        let moment = |k: usize| &misfit_sums.data[(k * GROUP_ROWS + g) * TILE_COLUMNS..][..TILE_COLUMNS];
+        for i in 0..6 {
+            let target = &mut pixel[(PIXEL_MISFIT + i) * TILE_COLUMNS..][..TILE_COLUMNS];
+            target.copy_from_slice(moment(3 * (i % 2) + i / 2));
+            if i > 1 {
+                target.iter_mut().zip(moment(4 + i)).for_each(|(sum, own)| *sum += *own);
+            }
+        }
+        for p in 6..misfit::PLANES + if detail.is_some() { 2 } else { 0 } {
+            pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS].copy_from_slice(moment(misfit::place(p).1));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The steps of the covariance, each a kernel over one row of a tile.
 
-use super::covariance::{NoiseSetting, PIXEL_RESULT, PULL_STEPS};
+use super::covariance::{CHANCE, MISFIT_SLACK, NoiseSetting, PIXEL_MISFIT, PIXEL_RESULT, PULL_STEPS};
 use super::noise::{PixelNoise, columns, pulled_back};
 use super::rows::Plan;
 use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
@@ -138,6 +138,7 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
             let m: [V; 6] = std::array::from_fn(|k| at(ENTRIES + k));
             let (residual, weight) = (at(ENTRIES + 6), at(ENTRIES + 7));
             let ones: [V; 6] = std::array::from_fn(|k| at(ENTRIES + 8 + k));
+            let misfit: [V; 6] = std::array::from_fn(|k| at(PIXEL_MISFIT + k));
             let score = normal_matrix::<V, T>(plan, &row, c);
             // B = N^-1 S, then B N^-1.
             let mut b = [[V::zero(); 6]; 6];
@@ -157,19 +158,26 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
             } else {
                 let expected = one_pixel::<V>(noise, &m) * weight;
                 let left = (expected - trace).max(expected * V::constant(0.05));
-                residual / left
+                let [truncated, energy, known] = std::array::from_fn(|k| at(PIXEL_MISFIT + 6 + k));
+                let whole = residual / left;
+                let fine = energy / (known * V::constant(setting.detail_gain));
+                let chance = V::constant(CHANCE);
+                let unexplained = (residual - truncated * V::constant(MISFIT_SLACK)) / (left * chance);
+                let enough = (weight * V::constant(0.5)).lt(known);
+                V::select(enough, (whole * chance).min(fine.max(unexplained)), whole)
             };
             // The pull acts on the true motion, which is what is left after undoing it.
             let mut shift = [V::zero(); 6];
             for _ in 0..PULL_STEPS {
                 let whole: [V; 6] = std::array::from_fn(|k| m[k] + shift[k]);
                 let pull = pull::<V>(noise, &ones, &whole);
+                let pull: [V; 6] = std::array::from_fn(|k| pull[k].mul_add(variance, misfit[k]));
                 for i in 0..6 {
                     let mut sum = V::zero();
                     for k in 0..6 {
                         sum = symmetric(&inverse, i, k).mul_add(pull[k], sum);
                     }
-                    shift[i] = sum * variance;
+                    shift[i] = sum;
                 }
             }
             for i in 0..6 {
@@ -252,11 +260,11 @@ fn one_pixel<V: Lanes>(noise: &PixelNoise, m: &[V; 6]) -> V {
     sum
 }
 
-/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels: minus the pull of unit noise on the score.
+/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, Q being [`PixelNoise::pull`]: minus the pull of unit noise on the score.
 #[inline(always)]
 fn pull<V: Lanes>(noise: &PixelNoise, ones: &[V; 6], m: &[V; 6]) -> [V; 6] {
     const POWER: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-    let q = |i: usize, j: usize| V::constant(noise.quadratic[if i <= j { upper(i, j) } else { upper(j, i) }]);
+    let q = |i: usize, j: usize| V::constant(noise.pull[i][j]);
     std::array::from_fn(|i| {
         let (k, c) = (i / 2, i % 2);
         let mut sum = V::constant(noise.linear[c]) * ones[k];

@@ -4,6 +4,7 @@
 //! coefficients. `P(i) m` is linear in the jet i and linear in m; both views are needed.
 
 use super::combine::Combination;
+use super::misfit::{DERIVATIVES, Truncation};
 use super::solve::{ENTRIES, upper};
 use super::window::weights;
 use crate::jet::JetStencil;
@@ -59,13 +60,22 @@ pub(super) struct PixelNoise {
     pub linear: [f64; 6],
     /// `E[dP^T dP]`, upper triangle.
     pub quadratic: [f64; ENTRIES],
+    /// `E[dP^T dP - dP^T dr]`, r being the residual that [`Truncation`] reads from the image, per unit of the motion: noise passes for texture there.
+    pub pull: [[f64; 6]; 6],
     /// `mixing[q]`: amounts of the three ways in which noise enters (through i, i', i'') in the q-th of as many independent noises.
     pub mixing: Vec<[f64; 3]>,
 }
 
 impl PixelNoise {
     /// For `rows` equations, frames combined so, smoothed by `smooth` px first, and a window of `sigma` px.
-    pub fn new(stencil: &JetStencil, combination: Combination, rows: usize, smooth: Option<f64>, sigma: f64) -> Self {
+    pub fn new(
+        stencil: &JetStencil,
+        combination: Combination,
+        rows: usize,
+        smooth: Option<f64>,
+        sigma: f64,
+        truncation: &Truncation,
+    ) -> Self {
         let gram = smoothed_covariance(stencil, smooth);
         let w = combination.weights();
         let dot = |a: usize, b: usize| w[a].iter().zip(&w[b]).map(|(x, y)| x * y).sum::<f64>();
@@ -92,18 +102,35 @@ impl PixelNoise {
                 }
             }
         }
+        let mut pull = [[0.0; 6]; 6];
+        let cross = cross_covariance(stencil, smooth);
+        for a in 0..6 {
+            for b in 0..6 {
+                let mut sum = 0.0;
+                for k in 0..block {
+                    for j in 0..6 {
+                        let along: f64 = (0..DERIVATIVES).map(|d| cross[j][d] * truncation.rows[k][b][d]).sum();
+                        sum += basis[j][a][k] * along;
+                    }
+                }
+                let square = quadratic[if a <= b { upper(a, b) } else { upper(b, a) }];
+                let sum = square - sum * scale(a) * scale(b) * both(dot(0, 0), dot(1, 1));
+                pull[a][b] = sum;
+            }
+        }
         let ways = if two { 3 } else { 2 };
         Self {
             constant: trace * both(dot(1, 1), dot(2, 2)),
             linear,
             quadratic,
+            pull,
             mixing: independent(ways, &|a, b| dot(a, b)),
         }
     }
 }
 
 /// `basis[j][a][k]`: how component j of the jet enters column a, row k of P.
-fn basis(rows: usize) -> [[[f64; 6]; 6]; 6] {
+pub(super) fn basis(rows: usize) -> [[[f64; 6]; 6]; 6] {
     std::array::from_fn(|j| {
         let mut jet = [0.0; 6];
         jet[j] = 1.0;
@@ -137,15 +164,21 @@ pub(super) fn smoothing_weights(sigma: f64) -> Vec<f64> {
     weights(sigma, (4.0 * sigma + 0.5) as usize)
 }
 
-/// Covariance of the jet for white pixel noise of variance 1 that was smoothed before.
-fn smoothed_covariance(stencil: &JetStencil, smooth: Option<f64>) -> [[f64; 6]; 6] {
-    let Some(sigma) = smooth else { return stencil.covariance() };
-    // Autocorrelation of the smoothing kernel on each axis; that of the image is the product.
-    let half = smoothing_weights(sigma);
+/// Correlation, along one axis, of white noise of variance 1 smoothed by `smooth` px: at lag 0 its variance's root.
+pub(super) fn shared(smooth: Option<f64>) -> impl Fn(i32) -> f64 {
+    let half = smooth.map_or_else(|| vec![1.0], smoothing_weights);
     let r = half.len() as i32 - 1;
     let weight = |k: i32| half.get(k.unsigned_abs() as usize).copied().unwrap_or(0.0);
-    let shared: Vec<f64> = (0..=2 * r).map(|d| (-r..=r).map(|k| weight(k) * weight(k + d)).sum()).collect();
-    let correlation = |d: i32| shared.get(d.unsigned_abs() as usize).copied().unwrap_or(0.0);
+    let lags: Vec<f64> = (0..=2 * r).map(|d| (-r..=r).map(|k| weight(k) * weight(k + d)).sum()).collect();
+    move |d| lags.get(d.unsigned_abs() as usize).copied().unwrap_or(0.0)
+}
+
+/// Covariance of the jet for white pixel noise of variance 1 that was smoothed before.
+fn smoothed_covariance(stencil: &JetStencil, smooth: Option<f64>) -> [[f64; 6]; 6] {
+    if smooth.is_none() {
+        return stencil.covariance();
+    }
+    let correlation = shared(smooth);
     let mut covariance = [[0.0; 6]; 6];
     for (o, w) in stencil.offsets().iter().zip(stencil.weights()) {
         for (p, z) in stencil.offsets().iter().zip(stencil.weights()) {
@@ -153,6 +186,23 @@ fn smoothed_covariance(stencil: &JetStencil, smooth: Option<f64>) -> [[f64; 6]; 
             for i in 0..6 {
                 for j in 0..6 {
                     covariance[i][j] += c * w[i] * z[j];
+                }
+            }
+        }
+    }
+    covariance
+}
+
+/// Covariance of the jet with the derivatives of [`Truncation`], for the same noise.
+fn cross_covariance(stencil: &JetStencil, smooth: Option<f64>) -> [[f64; DERIVATIVES]; 6] {
+    let correlation = shared(smooth);
+    let mut covariance = [[0.0; DERIVATIVES]; 6];
+    for d in 0..DERIVATIVES {
+        for (p, z) in Truncation::derivative(stencil, d) {
+            for (o, w) in stencil.offsets().iter().zip(stencil.weights()) {
+                let c = correlation(o.0 - p.0) * correlation(o.1 - p.1);
+                for j in 0..6 {
+                    covariance[j][d] += c * z * w[j];
                 }
             }
         }
@@ -187,7 +237,14 @@ mod tests {
         {
             let combination = Combination::of(frames, scheme);
             let rows = if frames == 3 { 12 } else { 6 };
-            let noise = PixelNoise::new(&stencil, combination, rows, smooth, sigma);
+            let noise = PixelNoise::new(
+                &stencil,
+                combination,
+                rows,
+                smooth,
+                sigma,
+                &Truncation::new(&stencil, combination, None),
+            );
             let side = 300usize;
             let images: Vec<Frame<f64>> = (0..frames)
                 .map(|k| {
@@ -239,7 +296,8 @@ mod tests {
         let stencil = JetStencil::new(&Neighbourhood::default(), (1.0, 1.0)).unwrap();
         for scheme in [TimeScheme::Central, TimeScheme::Backward] {
             let combination = Combination::of(3, scheme);
-            let noise = PixelNoise::new(&stencil, combination, 12, None, 3.0);
+            let noise =
+                PixelNoise::new(&stencil, combination, 12, None, 3.0, &Truncation::new(&stencil, combination, None));
             let w = combination.weights();
             for a in 0..3 {
                 for b in 0..3 {

@@ -2,7 +2,9 @@
 
 use super::combine::Combination;
 use super::covariance::NoiseSetting;
+use super::detail::{self, Detail};
 use super::estimate::{Setting, Strip};
+use super::misfit::Truncation;
 use super::noise::{PixelNoise, smoothing_weights};
 use super::options::WindowedOptions;
 use super::support::Support;
@@ -131,6 +133,8 @@ struct Job<'a, T: Clone> {
     origin: (usize, usize),
     setting: Setting<T>,
     noise: Option<NoiseSetting<T>>,
+    /// What the noise is read from, unless it is given.
+    detail: Option<Detail<T>>,
 }
 
 impl<'a, T: SimdReal> Job<'a, T> {
@@ -144,6 +148,8 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let plain: Vec<&Frame<T>> = frames.iter().map(AsRef::as_ref).collect();
         let spread = owner.smoother.as_ref().map_or(0, GaussianSmoother::radius);
         let support = Support::new(&plain, mask.as_deref(), owner.stencil.reach(), spread);
+        let combination = Combination::of(frames.len(), options.scheme);
+        let detail = (common.covariance && common.noise.is_none()).then(|| Detail::new(&plain, combination));
         let frames = match &owner.smoother {
             Some(s) => frames.iter().map(|f| Cow::Owned(s.apply_at(common.level(), f))).collect(),
             None => frames,
@@ -162,7 +168,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             diagnostics: common.diagnostics,
         };
         let noise = common.covariance.then(|| owner.noise(common, window, frames.len()));
-        Self { owner, frames, support, whole, origin, setting, noise }
+        Self { owner, frames, support, whole, origin, setting, noise, detail }
     }
 
     fn local_x(&self, x: usize) -> usize {
@@ -193,7 +199,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let wide = columns.start.saturating_sub(margin)..(columns.end + margin).min(width);
         let high = top.saturating_sub(margin)..(bottom + 1 + margin).min(height);
         let strip = Strip::new(&source, &self.setting, high.collect(), wide);
-        let planes = noise.covariance(&source, &strip, rows, &columns);
+        let planes = noise.covariance((&source, self.detail.as_ref()), &strip, rows, &columns);
         Results { strip, covariance: Some(Covariance { planes, rows: rows.to_vec(), columns }) }
     }
 }
@@ -207,28 +213,25 @@ impl Windowed {
             (a, b) => a.or(b),
         };
         let reach = self.stencil.reach();
+        // The window leaves of the kernel only what it weighs alike.
+        let narrowed = smooth.map(|s| s * options.sigma / options.sigma.hypot(s));
+        let truncation = Truncation::new(&self.stencil, combination, smooth);
+        let rows = options.rows.count();
         NoiseSetting {
-            pixel: PixelNoise::new(&self.stencil, combination, options.rows.count(), smooth, options.sigma),
+            pixel: PixelNoise::new(&self.stencil, combination, rows, smooth, options.sigma, &truncation),
             taps: NoiseSetting::taps(&self.stencil),
             reach: reach.left.max(reach.right).max(reach.up).max(reach.down),
-            smoothing: Window::smoothing(&smooth.map_or_else(|| vec![1.0], smoothing_weights)),
-            squared: Window::squared(options.sigma, options.radius(), spread(&self.stencil, smooth)),
+            smoothing: Window::smoothing(&narrowed.map_or_else(|| vec![1.0], smoothing_weights)),
+            squared: Window::squared(options.sigma, options.radius(), smooth.unwrap_or(0.0)),
             window,
             scale: 1.0 / options.sigma,
-            rows: options.rows.count(),
+            rows,
+            truncation,
+            detail_gain: detail::gain(combination, options.already_smoothed),
             variance: common.noise.map(|n| n * n),
             level: common.level(),
         }
     }
-}
-
-/// Variance, px^2, of the kernel that carries a sample's noise into the window's sums: half that of smoothing and stencil together.
-///
-/// Where the image varies slowly the kernel smooths the window in full, where it varies fast not at all; a half is what calibrates textures.
-fn spread(stencil: &JetStencil, smooth: Option<f64>) -> f64 {
-    let offsets = stencil.offsets();
-    let squares: f64 = offsets.iter().map(|(x, y)| f64::from(x * x + y * y) / 2.0).sum();
-    0.5 * (squares / offsets.len() as f64 + smooth.map_or(0.0, |s| s * s))
 }
 
 /// Estimates and, where asked for, covariances of a part of the sites.

@@ -17,16 +17,17 @@ impl<T: SimdReal> Window<T> {
         Self { taps: cast(&weights(sigma, radius), sigma) }
     }
 
-    /// Squares of the weights with which a window of `sigma` px sees noise that was spread by a kernel of variance `spread` px^2, cut where they are
+    /// Squares of the weights with which a window of `sigma` px sees the noise of samples that were smoothed by a Gaussian of `smooth` px, cut where they are
     /// as small as the Gaussian at `radius`.
     ///
-    /// A kernel turns the weights `g` into the wider, lower `k * g` and `x g` into `(x a) (k * g)` with `a = sigma^2 / (sigma^2 + spread)`; so lengths here
-    /// are in units of `sigma / a`.
-    pub fn squared(sigma: f64, radius: usize, spread: f64) -> Self {
-        let wide = (sigma * sigma + spread).sqrt();
-        let reach = (radius as f64 / std::f64::consts::SQRT_2 * wide / sigma).ceil() as usize;
-        let g: Vec<f64> = weights(wide, radius.max(reach)).iter().map(|w| w * w).collect();
-        Self { taps: cast(&g[..=reach.min(radius)], wide * wide / sigma) }
+    /// `g_sigma(p) g_smooth(q - p)` is `g(q)`, wider by the smoothing, times a kernel about `p = a q`, `a = sigma^2 / (sigma^2 + smooth^2)`; the weights
+    /// are those at p, their squares summed over q. Lengths are in units of `sigma`.
+    pub fn squared(sigma: f64, radius: usize, smooth: f64) -> Self {
+        let narrow = sigma * sigma / sigma.hypot(smooth);
+        let share = (narrow / sigma).powi(2);
+        let reach = (radius as f64 / std::f64::consts::SQRT_2 * narrow / sigma).ceil() as usize;
+        let g: Vec<f64> = weights(narrow, radius.max(reach)).iter().map(|w| share * w * w).collect();
+        Self { taps: cast(&g[..=reach.min(radius)], sigma) }
     }
 
     /// A smoothing kernel from its weights at distance 0, 1, ...

@@ -1,0 +1,385 @@
+//! What truncation leaves in the equations even without noise.
+//!
+//! The equations hold for quadratic brightness and small steps in time. On texture the stencils see higher derivatives too, `L_j = sum_ab M_j(a, b) d_x^a d_y^b` with
+//! `M_j(a, b) = sum_o L_j(o) o_x^a o_y^b / (a! b!)`; a difference over frames is `d_t + c2 d_t^2 + c3 d_t^3`; and smoothing does not commute with strain.
+//! Brightness carried along gives `d_t = -(u d_x + v d_y)`, so the residual r that the true motion leaves in `i' + P(i) m` is known from the image itself, to
+//! leading order: second to fourth derivatives times [`Truncation::rows`], linear in m, and third powers of the flow from the difference in time. For rows 7-12 the same holds with i' for i.
+//! Windows sum it as `sum w T^T P^T r`; `N^-1` of that is minus the bias of the estimate.
+
+use super::combine::Combination;
+use super::estimate::Strip;
+use super::noise::{basis, columns};
+use super::tile::{JetTile, Planes, Source};
+use crate::jet::{JetStencil, TimeScheme};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+
+/// The derivatives that residuals are made of, as powers of d_x and d_y: third, fourth, second.
+const POWERS: [(usize, usize); 12] =
+    [(3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4), (2, 0), (1, 1), (0, 2)];
+/// Which component of the jet each of them is taken from, and the axis (0: x, 1: y) of the difference, first for third and second for fourth derivatives.
+const DIFFERENCED: [(usize, usize); 12] =
+    [(3, 0), (3, 1), (5, 0), (5, 1), (3, 0), (4, 0), (3, 1), (4, 1), (5, 1), (3, 0), (4, 0), (5, 0)];
+/// How many derivatives there are.
+pub(super) const DERIVATIVES: usize = POWERS.len();
+
+/// Coefficients of the leading truncation errors.
+#[derive(Debug, Clone)]
+pub(super) struct Truncation {
+    /// `rows[k][a][d]`: derivative d of the image in the residual of row k, per unit of unknown a.
+    pub rows: [[[f64; DERIVATIVES]; 6]; 6],
+    /// The same without zeros: for each row (d, a, coefficient).
+    terms: [Vec<(usize, usize, f64)>; 6],
+    /// Errors of the differences in time for rows 1-6 and 7-12: of the second and of the third derivative.
+    time: [[f64; 2]; 2],
+}
+
+impl Truncation {
+    /// For this stencil, these differences in time, and frames smoothed by `smooth` px.
+    pub fn new(stencil: &JetStencil, combination: Combination, smooth: Option<f64>) -> Self {
+        let mut rows = [[[0.0; DERIVATIVES]; 6]; 6];
+        let basis = basis(6);
+        for (k, row) in rows.iter_mut().enumerate() {
+            for (a, row) in row.iter_mut().enumerate() {
+                for (d, entry) in row.iter_mut().enumerate().take(if a < 2 { 9 } else { 4 }) {
+                    let kept: f64 = (0..6).map(|j| basis[j][a][k] * moment(stencil, j, POWERS[d])).sum();
+                    *entry = kept - carried(stencil, k, a, POWERS[d]);
+                }
+            }
+        }
+        smoothed(smooth.map_or(0.0, |s| s * s), &mut rows);
+        let terms = std::array::from_fn(|k| {
+            let every = (0..DERIVATIVES).flat_map(|d| (0..6).map(move |a| (d, a)));
+            every.map(|(d, a)| (d, a, rows[k][a][d])).filter(|t| t.2.abs() > 1e-12).collect()
+        });
+        // The mean of a pair, of which its coefficients are made, is off by 1/8 of the second derivative.
+        let time = match combination {
+            Combination::Pair => [[0.0, 1.0 / 24.0 - 1.0 / 8.0]; 2],
+            Combination::Triple(TimeScheme::Central) => [[0.0, 1.0 / 6.0], [0.0, 1.0 / 12.0 - 1.0 / 6.0]],
+            Combination::Triple(TimeScheme::Backward) => [[-0.5, 1.0 / 6.0], [-0.5, 7.0 / 12.0 - 1.0 / 6.0]],
+        };
+        Self { rows, terms, time }
+    }
+
+    /// Offsets and weights with which derivative d is taken from the image.
+    pub fn derivative(stencil: &JetStencil, d: usize) -> Vec<((i32, i32), f64)> {
+        let (component, axis) = DIFFERENCED[d];
+        let steps: &[(i32, f64)] = match d {
+            0..4 => &[(-1, -0.5), (1, 0.5)],
+            4..9 => &[(-1, 1.0), (0, -2.0), (1, 1.0)],
+            _ => &[(0, 1.0)],
+        };
+        let mut kernel = Vec::new();
+        for (o, w) in stencil.offsets().iter().zip(stencil.weights()) {
+            for (step, weight) in steps {
+                let shifted = if axis == 0 { (o.0 + step, o.1) } else { (o.0, o.1 + step) };
+                kernel.push((shifted, weight * w[component]));
+            }
+        }
+        kernel
+    }
+}
+
+/// `M_j(a, b)`.
+fn moment(stencil: &JetStencil, j: usize, (a, b): (usize, usize)) -> f64 {
+    let factorial = |n: usize| (1..=n).product::<usize>() as f64;
+    let terms = stencil.offsets().iter().zip(stencil.weights());
+    let sum: f64 = terms.map(|(o, w)| w[j] * f64::from(o.0).powi(a as i32) * f64::from(o.1).powi(b as i32)).sum();
+    sum / (factorial(a) * factorial(b))
+}
+
+/// What stencil k makes of `x_j d_i` of the image, for unknown a = the derivative along j of the flow's component i (or that component itself):
+/// the coefficient of the derivative of these powers.
+fn carried(stencil: &JetStencil, k: usize, a: usize, (mut x, mut y): (usize, usize)) -> f64 {
+    let power = if a % 2 == 0 { &mut x } else { &mut y };
+    if *power == 0 {
+        return 0.0;
+    }
+    *power -= 1;
+    match a / 2 {
+        0 => moment(stencil, k, (x, y)),
+        1 => (x + 1) as f64 * moment(stencil, k, (x + 1, y)),
+        _ => (y + 1) as f64 * moment(stencil, k, (x, y + 1)),
+    }
+}
+
+/// Adds what smoothing of this variance does: the smoothed image moves like the image only where nothing is strained. For an affine flow
+/// `G * (u . grad I) = u . grad (G * I) + s^2 (u_x d_x^2 + (v_x + u_y) d_x d_y + v_y d_y^2) (G * I)`, and so on for its derivatives.
+fn smoothed(variance: f64, rows: &mut [[[f64; DERIVATIVES]; 6]; 6]) {
+    for (k, row) in rows.iter_mut().enumerate() {
+        let first = [9, 0, 1, 4, 5, 6][k];
+        for (a, step) in [(2, 0), (3, 1), (4, 1), (5, 2)] {
+            row[a][first + step] -= variance;
+        }
+    }
+}
+
+/// Planes of a tile: `P^T r` for the six unknowns, then `r^T r`.
+pub(super) const PLANES: usize = 7;
+/// Highest power of an offset for plane p, and where its moments begin: three each of the flow's two planes, one each of the others.
+pub(super) const fn place(p: usize) -> (usize, usize) {
+    if p < 2 { (1, 3 * p) } else { (0, 4 + p) }
+}
+
+/// Rows of the ring for one row of pixels: the coefficients' jet, that of the first difference, and the usable pixels.
+const SLOT: usize = 13;
+
+/// Rows of jets that differences are taken of.
+pub(super) struct Ring<T> {
+    /// Three times two jets and the usable pixels.
+    rows: Vec<T>,
+    motion: Vec<T>,
+}
+
+impl<T: SimdReal> Ring<T> {
+    pub fn new() -> Self {
+        Self { rows: Vec::new(), motion: Vec::new() }
+    }
+
+    /// Fills the first [`PLANES`] of `planes`, whose corner lies at pixel `corner`, for `rows` equations a pixel.
+    pub fn fill(
+        &mut self,
+        (level, rows): (Level, usize),
+        truncation: &Truncation,
+        (source, strip): (&Source<'_, T>, &Strip<T>),
+        jets: &mut JetTile<T>,
+        (corner, scale): ((isize, isize), f64),
+        planes: &mut Planes<T>,
+    ) {
+        let wide = super::tile::padded(planes.width + 2);
+        jets.load(source, (corner.0 - 1, corner.1 - 1), wide, planes.height + 2);
+        self.rows.resize(3 * SLOT * wide, T::default());
+        self.motion.resize(6 * planes.width, T::default());
+        for r in 0..planes.height + 2 {
+            jets.row(level, source, r);
+            let slot = &mut self.rows[r % 3 * SLOT * wide..(r % 3 + 1) * SLOT * wide];
+            dispatch(level, Keep { jets, wide, slot });
+            if r < 2 {
+                continue;
+            }
+            strip.motion_row(corner.0, corner.1 + r as isize - 2, scale, &mut self.motion);
+            let around: [&[T]; 3] = std::array::from_fn(|k| {
+                let slot = (r + 1 + k) % 3;
+                &self.rows[slot * SLOT * wide..(slot + 1) * SLOT * wide]
+            });
+            let row = Row { truncation, around, wide, motion: &self.motion, planes, row: r - 2, scale };
+            match rows {
+                1 => dispatch(level, Residual::<T, 1, 1>(row)),
+                3 => dispatch(level, Residual::<T, 3, 1>(row)),
+                6 => dispatch(level, Residual::<T, 6, 1>(row)),
+                _ => dispatch(level, Residual::<T, 6, 2>(row)),
+            }
+        }
+    }
+}
+
+/// Copies the jets of a row and which of its pixels are usable.
+struct Keep<'a, T> {
+    jets: &'a JetTile<T>,
+    wide: usize,
+    slot: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Keep<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { jets, wide, slot } = self;
+        let mut c = 0;
+        while c < wide {
+            let j = jets.jets::<V>(c, false);
+            for (k, value) in j.coefficient.into_iter().chain(j.first).enumerate() {
+                value.store(&mut slot[k * wide + c..]);
+            }
+            c += V::LANES;
+        }
+        slot[12 * wide..13 * wide].copy_from_slice(jets.weight());
+    }
+}
+
+/// One row of a tile.
+struct Row<'a, T> {
+    truncation: &'a Truncation,
+    around: [&'a [T]; 3],
+    wide: usize,
+    motion: &'a [T],
+    planes: &'a mut Planes<T>,
+    row: usize,
+    scale: f64,
+}
+
+/// The residual of the first `BLOCK` rows (1, 3 or 6) of `BLOCKS` blocks, and its products with P.
+struct Residual<'a, T, const BLOCK: usize, const BLOCKS: usize>(Row<'a, T>);
+
+impl<T: SimdReal, const BLOCK: usize, const BLOCKS: usize> Kernel<T> for Residual<'_, T, BLOCK, BLOCKS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Row { truncation, around, wide, motion, planes, row, scale } = self.0;
+        let mut c = 0;
+        while c < planes.width {
+            // Row k of the ring at the offset (x, y).
+            let at = |k: usize, x: isize, y: isize| {
+                V::load(&around[(y + 1) as usize][k * wide + (c as isize + 1 + x) as usize..])
+            };
+            let m: [V; 6] = std::array::from_fn(|k| V::load(&motion[k * planes.width + c..]));
+            // Differences need all neighbours.
+            let mut least = at(12, 0, 0);
+            for y in -1..=1 {
+                for x in -1..=1 {
+                    least = least.min(at(12, x, y));
+                }
+            }
+            let usable = V::zero().lt(least);
+            let (mut products, mut energy) = ([V::zero(); 6], V::zero());
+            for block in 0..BLOCKS {
+                let jet: [V; 6] = std::array::from_fn(|k| at(6 * block + k, 0, 0));
+                let derivatives: [V; DERIVATIVES] = std::array::from_fn(|d| {
+                    let (k, axis) = DIFFERENCED[d];
+                    if d >= 9 {
+                        return jet[k];
+                    }
+                    let (x, y) = if axis == 0 { (1, 0) } else { (0, 1) };
+                    let (before, after) = (at(6 * block + k, -x, -y), at(6 * block + k, x, y));
+                    if d < 4 { (after - before) * V::constant(0.5) } else { after + before - (jet[k] + jet[k]) }
+                });
+                let mut r = residual::<V, BLOCK>(truncation, block, &m, &jet, &derivatives);
+                let p = columns::<V, BLOCK>(&jet);
+                for (k, r) in r.iter_mut().enumerate() {
+                    *r = V::select(usable, *r, V::zero());
+                    energy = r.mul_add(*r, energy);
+                    for (product, column) in products.iter_mut().zip(&p) {
+                        *product = column[k].mul_add(*r, *product);
+                    }
+                }
+            }
+            for (a, product) in products.into_iter().enumerate() {
+                let place = planes.at(a, row, c);
+                (product * V::constant(if a < 2 { 1.0 } else { scale })).store(&mut planes.data[place..]);
+            }
+            let place = planes.at(6, row, c);
+            energy.store(&mut planes.data[place..]);
+            c += V::LANES;
+        }
+    }
+}
+
+/// What the motion m leaves in rows 1 to `BLOCK` of a block whose matrix is made of this jet.
+#[inline(always)]
+fn residual<V: Lanes, const BLOCK: usize>(
+    truncation: &Truncation,
+    block: usize,
+    m: &[V; 6],
+    jet: &[V; 6],
+    d: &[V; DERIVATIVES],
+) -> [V; BLOCK] {
+    let mut r = [V::zero(); BLOCK];
+    for (r, terms) in r.iter_mut().zip(&truncation.terms) {
+        for &(derivative, unknown, coefficient) in terms {
+            *r = (d[derivative] * m[unknown]).mul_add(V::constant(coefficient), *r);
+        }
+    }
+    let [u, v, u_x, v_x, u_y, v_y] = *m;
+    let [c2, c3] = truncation.time[block];
+    // (u d_x + v d_y)^2 and -(u d_x + v d_y)^3 of what derivatives from here on belong to.
+    let squared = |xx: V, xy: V, yy: V| (u * xx).mul_add(u, (u * v * xy).mul_add(V::constant(2.0), v * v * yy));
+    let cubed = |t: &[V]| {
+        let mixed = (u * t[1]).mul_add(u * v, u * v * v * t[2]);
+        V::zero() - mixed.mul_add(V::constant(3.0), (u * u * u).mul_add(t[0], v * v * v * t[3]))
+    };
+    let starts = [0, 4, 5];
+    for (r, start) in r.iter_mut().zip(starts) {
+        *r = cubed(&d[start..start + 4]).mul_add(V::constant(c3), *r);
+    }
+    if c2 != 0.0 {
+        let turned = (u_x * u + u_y * v).mul_add(jet[1], (v_x * u + v_y * v) * jet[2]);
+        for (k, (r, start)) in r.iter_mut().zip([9, 0, 1, 4, 5, 6]).enumerate() {
+            let mut second = squared(d[start], d[start + 1], d[start + 2]);
+            if k == 0 {
+                second = second + turned;
+            }
+            *r = second.mul_add(V::constant(c2), *r);
+        }
+    }
+    r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::GaussianSmoother;
+    use crate::jet::Neighbourhood;
+    use crate::types::Frame;
+
+    /// A cubic with all derivatives, about the pixel (10, 10).
+    fn cubic(x: f64, y: f64) -> f64 {
+        let (x, y) = (x - 10.0, y - 10.0);
+        7.0 + 2.0 * x - 3.0 * y + 0.8 * x * x - 1.1 * x * y + 0.4 * y * y + 0.3 * x * x * x - 0.5 * x * x * y
+            + 0.2 * x * y * y
+            + 0.4 * y * y * y
+    }
+
+    /// The largest difference between the residual that motion m leaves in rows 1-6 and what is expected of it, and the largest residual.
+    fn compare(m: [f64; 6], scheme: TimeScheme, neighbourhood: &Neighbourhood, smooth: Option<f64>) -> (f64, f64) {
+        let stencil = JetStencil::new(neighbourhood, (1.0, 1.0)).unwrap();
+        let combination = Combination::Triple(scheme);
+        let field = crate::synth::motion::AffineField::new(m, (10.0, 10.0));
+        let now = if scheme == TimeScheme::Central { 1.0 } else { 2.0 };
+        let frames: Vec<Frame<f64>> = (0..3)
+            .map(|k| {
+                let back = crate::synth::motion::Motion::path_map(&field, f64::from(k) - now, 0.0);
+                let frame = Frame::from_fn(21, 21, |x, y| {
+                    let (x, y) = back(x as f64, y as f64);
+                    cubic(x, y)
+                });
+                smooth.map_or(frame.clone(), |s| GaussianSmoother::new(s).unwrap().apply(&frame))
+            })
+            .collect();
+        let w = combination.weights();
+        let mix = |k: usize, x: usize, y: usize| -> [f64; 6] {
+            let jets: Vec<[f64; 6]> = frames.iter().map(|f| stencil.at(f, x, y)).collect();
+            std::array::from_fn(|j| jets.iter().zip(w[k]).map(|(jet, w)| w * jet[j]).sum())
+        };
+        let (jet, first) = (mix(0, 10, 10), mix(1, 10, 10));
+        let p = columns::<f64, 6>(&jet);
+        let derivatives: [f64; DERIVATIVES] = std::array::from_fn(|d| {
+            let (k, axis) = DIFFERENCED[d];
+            let (x, y) = if axis == 0 { (1, 0) } else { (0, 1) };
+            let (before, after) = (mix(0, 10 - x, 10 - y)[k], mix(0, 10 + x, 10 + y)[k]);
+            if d >= 9 {
+                jet[k]
+            } else if d < 4 {
+                0.5 * (after - before)
+            } else {
+                after + before - 2.0 * jet[k]
+            }
+        });
+        let expected = residual::<f64, 6>(&Truncation::new(&stencil, combination, smooth), 0, &m, &jet, &derivatives);
+        let (mut off, mut size) = (0.0f64, 0.0f64);
+        for k in 0..6 {
+            let r = first[k] + (0..6).map(|a| p[a][k] * m[a]).sum::<f64>();
+            (off, size) = (off.max((r - expected[k]).abs()), size.max(r.abs()));
+        }
+        (off, size)
+    }
+
+    #[test]
+    fn cubics_leave_what_is_expected() {
+        let five = Neighbourhood::square(5);
+        for neighbourhood in [&Neighbourhood::default(), &five] {
+            // Exact for a translation.
+            let (off, size) = compare([0.3, -0.2, 0.0, 0.0, 0.0, 0.0], TimeScheme::Central, neighbourhood, None);
+            assert!(off < 1e-12 && size > 0.1, "{off} {size}");
+            // To first order in the Jacobian, with smoothing too.
+            for smooth in [None, Some(1.5)] {
+                let m = [0.003, -0.002, 2e-4, -1e-4, 3e-4, 1e-4];
+                let (off, size) = compare(m, TimeScheme::Central, neighbourhood, smooth);
+                assert!(off < 2e-3 * size, "{smooth:?} {off} {size}");
+            }
+            // Backward differences err in their second order, whose own Jacobian terms are left out beyond row 1.
+            let (off, size) = compare([0.03, -0.02, 0.0, 0.0, 0.0, 0.0], TimeScheme::Backward, neighbourhood, None);
+            assert!(off < 1e-2 * size, "backward {off} {size}");
+        }
+    }
+}
