@@ -90,7 +90,7 @@ fn moment(stencil: &JetStencil, j: usize, (a, b): (usize, usize)) -> f64 {
 /// What stencil k makes of `x_j d_i` of the image, for unknown a = the derivative along j of the flow's component i (or that component itself):
 /// the coefficient of the derivative of these powers.
 fn carried(stencil: &JetStencil, k: usize, a: usize, (mut x, mut y): (usize, usize)) -> f64 {
-    let power = if a % 2 == 0 { &mut x } else { &mut y };
+    let power = if a.is_multiple_of(2) { &mut x } else { &mut y };
     if *power == 0 {
         return 0.0;
     }
@@ -161,7 +161,7 @@ impl<T: SimdReal> Ring<T> {
                 let slot = (r + 1 + k) % 3;
                 &self.rows[slot * SLOT * wide..(slot + 1) * SLOT * wide]
             });
-            let row = Row { truncation, around, wide, motion: &self.motion, planes, row: r - 2, scale };
+            let row = Row { truncation, around, wide, motion: &self.motion, planes, at: r - 2, scale };
             match rows {
                 1 => dispatch(level, Residual::<T, 1, 1>(row)),
                 3 => dispatch(level, Residual::<T, 3, 1>(row)),
@@ -204,7 +204,7 @@ struct Row<'a, T> {
     wide: usize,
     motion: &'a [T],
     planes: &'a mut Planes<T>,
-    row: usize,
+    at: usize,
     scale: f64,
 }
 
@@ -216,7 +216,7 @@ impl<T: SimdReal, const BLOCK: usize, const BLOCKS: usize> Kernel<T> for Residua
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Row { truncation, around, wide, motion, planes, row, scale } = self.0;
+        let Row { truncation, around, wide, motion, planes, at: row, scale } = self.0;
         let mut c = 0;
         while c < planes.width {
             // Row k of the ring at the offset (x, y).
