@@ -65,7 +65,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Error {
     /// An unusable value: `argument: expected ..., got ...`.
     pub fn argument(argument: &'static str, expected: impl Into<String>, got: impl std::fmt::Display) -> Self {
-        Self::Argument { argument, expected: expected.into(), got: got.to_string() }
+        Self::Argument { argument, expected: expected.into(), got: shortened(got.to_string()) }
     }
 
     /// A failed file operation on `path`.
@@ -79,9 +79,23 @@ impl Error {
     }
 }
 
+/// A value of hundreds of digits tells nothing that its beginning does not.
+fn shortened(text: String) -> String {
+    const MOST: usize = 160;
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_values_are_cut() {
+        assert_eq!(Error::argument("sigma", "less", 1e300).to_string().len(), "sigma: expected less, got ".len() + 163);
+    }
 
     #[test]
     fn message_names_argument_expectation_and_value() {

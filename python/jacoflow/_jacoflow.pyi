@@ -58,8 +58,8 @@ __version__: str
 _Floats: TypeAlias = NDArray[np.floating[Any]]
 _Path: TypeAlias = str | os.PathLike[str]
 _Frame: TypeAlias = NDArray[Any]
-_Frames: TypeAlias = NDArray[Any] | Sequence[NDArray[Any]]
-_Rectangle: TypeAlias = tuple[int, int, int, int]
+_Frames: TypeAlias = NDArray[Any] | Iterable[NDArray[Any]]
+_Rectangle: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
 _Method: TypeAlias = Literal["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]
 _Model: TypeAlias = Literal["affine", "translational", "accelerating"]
 _Scheme: TypeAlias = Literal["central", "backward", "pair"]
@@ -157,6 +157,15 @@ class FlowField:
     def shear_axis(self) -> NDArray[np.float64]:
         """Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in (-pi/2, pi/2], from x towards y."""
     @property
+    def strain_xx(self) -> NDArray[np.float64]:
+        """Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+    @property
+    def strain_yy(self) -> NDArray[np.float64]:
+        """Stretch v_y along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+    @property
+    def strain_xy(self) -> NDArray[np.float64]:
+        """Shear strain (u_y + v_x) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+    @property
     def angular_velocity(self) -> NDArray[np.float64]:
         """Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period."""
     @property
@@ -166,7 +175,7 @@ class FlowField:
     def rotation_centre(self) -> NDArray[np.float64]:
         """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
 
-        It need not be in the picture. NaN where there is none.
+        It need not be in the picture. NaN where there is none. `value` and `std` take its parts, rotation_centre_x and rotation_centre_y.
         """
     @property
     def centre_distance(self) -> NDArray[np.float64]:
@@ -238,7 +247,8 @@ class FlowField:
     def load(path: _Path) -> FlowField:
         """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError for a damaged file."""
     def __len__(self, /) -> int: ...
-    def __getitem__(self, index: int, /) -> FlowField: ...
+    def __bool__(self, /) -> Literal[True]: ...
+    def __getitem__(self, index: int | slice, /) -> FlowField: ...
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
 def estimate(
@@ -280,7 +290,7 @@ def estimate(
 
     Parameters
     ----------
-    frames : array (T, H, W), or list of arrays (H, W)
+    frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         Oldest first, one size, at least 3 x 3 px.
     method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
         "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
@@ -297,7 +307,7 @@ def estimate(
     window_sigma : float, px
         Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
     rows : "brightness", "gradient", "jet" or "all"
-        Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel.
+        Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel; default "all", for pairs "gradient".
     smoothness : float, in units of the root mean square gradient of the frame
         Weight of "horn_schunck", so that the intensity gain does not change the flow; default 1.
     iterations : int
@@ -305,7 +315,7 @@ def estimate(
     rank_deficient : "nan" or "min_norm"
         What "windowed" and "instantaneous" report where the equations do not determine every unknown.
     smooth : float, px
-        Standard deviation of a Gaussian that smooths each frame first; default none.
+        Standard deviation of a Gaussian that smooths each frame first, 0 for none; default 1.5 for "windowed", none for the others.
     quantise : float, grey levels
         Rounds samples down to multiples of it before smoothing; default none.
     colour : "error" (default) or "luminance"
@@ -639,6 +649,8 @@ class MerweScaledSigmaPoints:
 
         NumericalError where `P` is not positive definite.
         """
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
     def __getnewargs__(self, /) -> tuple[int, float, float, float]: ...
 
 @final
@@ -744,6 +756,8 @@ class Scene:
 
         It differs from `duration` times the velocity wherever paths are curved.
         """
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
     def __getnewargs_ex__(self, /) -> tuple[tuple[str], dict[str, Any]]: ...
 
 @final
@@ -768,6 +782,8 @@ class Sensor:
         """
     def apply_u8(self, /, frame: _Frame, index: int = 0) -> NDArray[np.uint8]:
         """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255 clipped."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
     def __getnewargs_ex__(self, /) -> tuple[tuple[()], dict[str, Any]]: ...
 
 @final

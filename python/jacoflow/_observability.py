@@ -46,7 +46,7 @@ class Observability:
     """Condition number of the column-scaled equations."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObservabilityMap:
     """What theorem 1 says of every pixel: arrays (H, W) without units."""
 

@@ -7,11 +7,12 @@ use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PyIterator, PyList};
 
 /// Sample types that frames may have, for messages.
 const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
 
-/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory is copied.
+/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of another byte order is copied.
 pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = object.py();
     if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
@@ -24,6 +25,11 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bou
     } else {
         py.import("numpy")?.getattr("asarray")?.call1((object,))?.cast_into::<PyUntypedArray>()?
     };
+    let kind = array.getattr("dtype")?;
+    if !kind.getattr("isnative")?.extract::<bool>()? {
+        let native = kind.call_method1("newbyteorder", ("=",))?;
+        return Ok(array.call_method1("astype", (native,))?.cast_into::<PyUntypedArray>()?);
+    }
     if array.getattr("flags")?.getattr("aligned")?.extract::<bool>()? {
         return Ok(array);
     }
@@ -150,6 +156,11 @@ impl<'py> Frames<'py> {
             object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
         if is_sequence {
             return Ok(Self { count: object.len()?, object: object.clone(), colour, is_array: false });
+        }
+        if object.cast::<PyIterator>().is_ok() {
+            let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+            let list = PyList::new(object.py(), list)?;
+            return Ok(Self { count: list.len(), object: list.into_any(), colour, is_array: false });
         }
         let array = as_array("frames", object)?;
         let shape = array.shape().to_vec();

@@ -101,7 +101,7 @@ pub fn open_frames(
     options.colour = self::colour(rule);
     options.first = not_negative("first", first)?;
     options.limit = limit.map(|n| not_negative("limit", n)).transpose()?;
-    options.step = options::count("step", step)?;
+    options.step = options::count("step", options::Integer(step))?;
     let spec = spec.to_string_lossy().into_owned();
     let source = py.detach(|| open(&spec, &options))?;
     Ok(FrameReader { spec, colour: rule, options, place: Mutex::new(Place { source, delivered: 0 }) })

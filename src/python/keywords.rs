@@ -13,14 +13,14 @@ macro_rules! with_common {
             quantise: Option<f64> as Option<f64> = None,
             colour: Option<String> as Option<String> = None,
             points: Object as Object = None,
-            region: Option<(i64, i64, i64, i64)> as Option<(i64, i64, i64, i64)> = None,
-            stride: Option<i64> as Option<i64> = None,
+            region: Option<Region> as Option<Region> = None,
+            stride: Option<Integer> as Option<Integer> = None,
             mask: Object as Object = None,
             fps: Option<f64> as Option<f64> = None,
             frame_period: Option<f64> as Option<f64> = None,
             pixel_pitch: Object as Object = None,
             precision: Option<String> as Option<String> = None,
-            threads: Option<i64> as Option<i64> = None,
+            threads: Option<Integer> as Option<Integer> = None,
             simd: Option<String> as Option<String> = None,
         }
     };

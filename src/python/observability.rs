@@ -26,7 +26,7 @@ pub fn observability<'py>(
     smooth: Option<f64>,
     quantise: Option<f64>,
     colour: Option<&str>,
-    threads: Option<i64>,
+    threads: Option<options::Integer>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let py = frames.py();
     let frames = Frames::new(frames, ColourRule::parse(colour)?)?;

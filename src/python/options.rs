@@ -7,9 +7,45 @@ use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
 use crate::types::{AnyFrame, Rect, Sample, Sites};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+
+/// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused by name where it is out of range.
+#[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
+#[pyo3(transparent)]
+pub struct Integer(pub i64);
+
+impl<'py> FromPyObject<'_, 'py> for Integer {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match object.extract::<i64>() {
+            Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
+                Ok(Self(if object.lt(0)? { i64::MIN } else { i64::MAX }))
+            }
+            value => Ok(Self(value?)),
+        }
+    }
+}
+
+/// The argument `region`, any sequence (x, y, width, height), px.
+#[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
+#[pyo3(transparent)]
+pub struct Region((i64, i64, i64, i64));
+
+impl<'py> FromPyObject<'_, 'py> for Region {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = || PyTypeError::new_err("region: expected four integers (x, y, width, height)");
+        let items: Vec<Bound<'_, PyAny>> = object.try_iter().and_then(Iterator::collect).map_err(|_| wrong())?;
+        let numbers: Vec<Integer> =
+            items.iter().map(|item| item.extract()).collect::<PyResult<_>>().map_err(|_| wrong())?;
+        let [Integer(x), Integer(y), Integer(width), Integer(height)] = numbers[..] else { return Err(wrong()) };
+        Ok(Self((x, y, width, height)))
+    }
+}
 
 /// An object that may be absent, as an argument takes it and a pickle keeps it.
 pub type Object = Option<Py<PyAny>>;
@@ -25,7 +61,7 @@ pub fn keep(py: Python<'_>, object: Object) -> PyResult<Object> {
 }
 
 /// A count of at least one.
-pub fn count(name: &'static str, value: i64) -> PyResult<usize> {
+pub fn count(name: &'static str, Integer(value): Integer) -> PyResult<usize> {
     usize::try_from(value)
         .ok()
         .filter(|&n| n > 0)
@@ -33,7 +69,7 @@ pub fn count(name: &'static str, value: i64) -> PyResult<usize> {
 }
 
 /// `threads`: a positive number, or all.
-pub fn threads(value: Option<i64>) -> PyResult<Threads> {
+pub fn threads(value: Option<Integer>) -> PyResult<Threads> {
     Ok(Threads::new(value.map(|n| count("threads", n)).transpose()?)?)
 }
 
@@ -43,12 +79,7 @@ pub fn simd(name: Option<&str>) -> PyResult<Option<Level>> {
 }
 
 /// `points`, `region`, `stride`.
-pub fn sites(
-    py: Python<'_>,
-    points: &Object,
-    region: Option<(i64, i64, i64, i64)>,
-    stride: Option<i64>,
-) -> PyResult<Sites> {
+pub fn sites(py: Python<'_>, points: &Object, region: Option<Region>, stride: Option<Integer>) -> PyResult<Sites> {
     let stride = stride.map(|n| count("stride", n)).transpose()?;
     if let Some(points) = points {
         if region.is_some() || stride.is_some() {
@@ -85,12 +116,12 @@ pub fn neighbourhood(
         });
     };
     let value = value.bind(py);
-    if let Ok((columns, rows)) = value.extract::<(i64, i64)>() {
+    if let Ok((columns, rows)) = value.extract::<(Integer, Integer)>() {
         let (width, height) = (count("neighbourhood", columns)?, count("neighbourhood", rows)?);
         return Ok(Neighbourhood::Rectangle { width, height, sigma });
     }
     let array = arrays::as_array("neighbourhood", value)?;
-    if let Ok([columns, rows]) = array.extract::<[i64; 2]>() {
+    if let Ok([columns, rows]) = array.extract::<[Integer; 2]>() {
         let (width, height) = (count("neighbourhood", columns)?, count("neighbourhood", rows)?);
         return Ok(Neighbourhood::Rectangle { width, height, sigma });
     }
@@ -180,8 +211,8 @@ pub fn check_dtype(argument: &str, first: &str, frame: &AnyFrame) -> PyResult<()
 }
 
 /// `region`: (x, y, width, height), px.
-pub fn region(region: Option<(i64, i64, i64, i64)>) -> PyResult<Option<Rect>> {
-    let Some((x, y, width, height)) = region else { return Ok(None) };
+pub fn region(region: Option<Region>) -> PyResult<Option<Rect>> {
+    let Some(Region((x, y, width, height))) = region else { return Ok(None) };
     let side = |value: i64| usize::try_from(value).ok();
     let rect = || Some(Rect { x: side(x)?, y: side(y)?, width: side(width)?, height: side(height)? });
     let got = format!("({x}, {y}, {width}, {height})");

@@ -8,6 +8,7 @@ use crate::synth::registry::{CARRIERS, Parameter, SCENES};
 use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, truth};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 ///
@@ -110,6 +111,15 @@ impl Scene {
         self.core.displacement(x, y, t, duration)
     }
 
+    /// The same name and options, so the same pictures.
+    fn __eq__(&self, other: &Self) -> bool {
+        (&self.kind, &self.options) == (&other.kind, &other.options)
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&(&self.kind, self.options.width, self.options.height, self.options.seed))
+    }
+
     fn __repr__(&self) -> String {
         let (width, height) = self.core.size();
         format!("Scene({:?}, width={width}, height={height}, seed={})", self.kind, self.options.seed)
@@ -183,6 +193,15 @@ impl Sensor {
         arrays::from_frame(py, seen)
     }
 
+    /// The same options, so the same noise.
+    fn __eq__(&self, other: &Self) -> bool {
+        self.sensor == other.sensor
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&(self.sensor.noise.to_bits(), self.rounding(), self.sensor.saturate, self.sensor.seed))
+    }
+
     fn __repr__(&self) -> String {
         let CoreSensor { noise, saturate, seed, .. } = self.sensor;
         let saturate = if saturate { "True" } else { "False" };
@@ -207,6 +226,12 @@ impl Sensor {
             Rounding::Nearest => "nearest",
         }
     }
+}
+
+fn hash(value: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    hasher.finish()
 }
 
 /// Names of the scenes, with one line about each: a dictionary.

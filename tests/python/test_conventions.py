@@ -114,7 +114,7 @@ def test_misaligned_frames_are_read(texture):
     assert_same(jacoflow.estimate(list(shifted)), jacoflow.estimate(list(frames)))
 
 
-@pytest.mark.parametrize(("method", "reach"), [("windowed", 14), ("instantaneous", 1), ("lucas_kanade", 14)])
+@pytest.mark.parametrize(("method", "reach"), [("windowed", 20), ("instantaneous", 1), ("lucas_kanade", 14)])
 def test_a_block_of_nan_damages_only_what_touches_it(method, reach):
     frames = moving_texture(width=96, height=96)
     clean = jacoflow.estimate(list(frames), method=method)
@@ -207,3 +207,39 @@ def test_views_share_memory_and_are_read_only(texture):
     expected = flow.copy()
     del stack
     assert_array_equal(flow, expected)
+
+
+def test_other_byte_orders_iterators_and_lists_of_four_are_taken():
+    scene = scenes.Scene("affine", width=40, height=32)
+    frames = scene.frames(3).astype(np.float32)
+    plain = jacoflow.estimate(list(frames), region=(4, 4, 20, 20))
+    swapped = jacoflow.estimate(list(frames.astype(">f4")), region=[4, 4, 20, 20])
+    iterated = jacoflow.estimate((frame for frame in frames), region=np.array([4, 4, 20, 20]))
+    assert_array_equal(swapped.flow, plain.flow)
+    assert_array_equal(iterated.flow, plain.flow)
+
+
+def test_value_objects_equal_their_copies():
+    things = [
+        scenes.Scene("vortex", width=30, height=20, core=5.0),
+        scenes.Sensor(noise=2.0, seed=3),
+        jacoflow.filters.MerweScaledSigmaPoints(4, 0.5, 2.0, 0.0),
+    ]
+    others = [
+        scenes.Scene("vortex", width=30, height=20, core=6.0),
+        scenes.Sensor(noise=2.0, seed=4),
+        jacoflow.filters.MerweScaledSigmaPoints(4, 0.6, 2.0, 0.0),
+    ]
+    for thing, other in zip(things, others, strict=True):
+        copy = pickle.loads(pickle.dumps(thing))
+        assert copy == thing and hash(copy) == hash(thing) and thing != other and thing != 3
+
+
+def test_a_field_is_true_and_a_stack_can_be_sliced():
+    stack = jacoflow.estimate(scenes.Scene("affine", width=32, height=24).frames(6))
+    assert stack and stack[0] and len(stack[1:3]) == 2 and len(stack[4:]) == 0
+    assert_array_equal(stack[1:3].flow, stack.flow[1:3])
+    assert_array_equal(pickle.loads(pickle.dumps(stack[1:3])).flow, stack.flow[1:3])
+    assert stack[1:][0].frame_index == 2
+    with pytest.raises(IndexError, match="step 1"):
+        stack[::2]

@@ -1,6 +1,6 @@
 //! Where frames come from and what is done to them first.
 
-use super::{parse_positive, parse_rate};
+use super::{parse_not_negative, parse_positive, parse_rate};
 use clap::Args;
 
 /// Frames and their preparation.
@@ -29,7 +29,7 @@ pub struct InputArguments {
     /// Round samples down to multiples of STEP before anything else
     #[arg(long, value_name = "STEP", num_args = 0..=1, require_equals = true, default_missing_value = "1", visible_alias = "quantize", value_parser = parse_positive)]
     pub quantise: Option<f64>,
-    /// Smooth each frame by a Gaussian of SIGMA pixels
-    #[arg(long, value_name = "SIGMA", value_parser = parse_positive)]
+    /// Smooth each frame by a Gaussian of SIGMA pixels [default: windowed 1.5, everything else 0]
+    #[arg(long, value_name = "SIGMA", value_parser = parse_not_negative)]
     pub smooth: Option<f64>,
 }

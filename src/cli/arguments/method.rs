@@ -34,7 +34,7 @@ pub struct MethodArguments {
     /// windowed, lucas-kanade: standard deviation of the Gaussian window, px [default: 4]
     #[arg(long, value_name = "SIGMA", value_parser = parse_positive)]
     pub window: Option<f64>,
-    /// windowed: equations used, brightness (1), gradient (3), jet (6) or all (12)
+    /// windowed: equations used, brightness (1), gradient (3), jet (6) or all (12) [default: all, for a pair gradient]
     #[arg(long, value_name = "SET")]
     pub rows: Option<String>,
     /// horn-schunck: weight of smoothness, in units of the frame's root mean square gradient [default: 1]
@@ -74,7 +74,7 @@ impl MethodArguments {
         self.refuse_foreign(&method)?;
         let pair = self.pair || frames == Some(2);
         Ok(match method {
-            Method::Windowed(options) => Method::Windowed(self.windowed(options, pair, smoothed)?),
+            Method::Windowed(_) => Method::Windowed(self.windowed(pair, smoothed)?),
             Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
             Method::LucasKanade(mut options) => {
                 options.window = self.window.map_or(options.window, Window::Gaussian);
@@ -87,14 +87,17 @@ impl MethodArguments {
         })
     }
 
-    fn windowed(&self, mut options: WindowedOptions, pair: bool, smoothed: Option<f64>) -> Result<WindowedOptions> {
+    fn windowed(&self, pair: bool, smoothed: Option<f64>) -> Result<WindowedOptions> {
+        let mut options = if pair { WindowedOptions::pair() } else { WindowedOptions::default() };
         options.sigma = self.window.unwrap_or(options.sigma);
         options.scheme = self.scheme(options.scheme)?;
         options.rows = self.rows.as_deref().map_or(Ok(options.rows), RowSet::parse)?;
         options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
         options.rank_deficient = self.rank_policy(options.rank_deficient)?;
-        options.already_smoothed = smoothed;
-        options.frames = if pair { 2 } else { options.frames };
+        if smoothed.is_some() {
+            options.presmooth = None;
+            options.already_smoothed = smoothed.filter(|&sigma| sigma > 0.0);
+        }
         Ok(options)
     }
 

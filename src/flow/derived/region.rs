@@ -4,7 +4,7 @@ use super::sharing::sharing_among;
 use super::{Quantity, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Rect};
+use crate::types::{FlowField, Rect, Sites};
 
 /// How the sites of a region are combined into one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -80,7 +80,7 @@ fn at_site<T: Real>(field: &FlowField<T>, quantity: Quantity, index: usize) -> (
 /// One value of a quantity for the sites inside `region` (pixels of the frame; `None`: all sites).
 ///
 /// # Errors
-/// As [`plane()`]; [`Error::Argument`] naming `aggregate` for [`Aggregate::InverseVariance`] on a field without covariance.
+/// As [`plane()`]; [`Error::Argument`] naming `region` for one that leaves the frame, and `aggregate` for [`Aggregate::InverseVariance`] on a field without covariance.
 pub fn region_mean<T: Real>(
     field: &FlowField<T>,
     quantity: Quantity,
@@ -94,6 +94,9 @@ pub fn region_mean<T: Real>(
             "a field with covariance, or the median",
             "a field without covariance",
         ));
+    }
+    if let Some(r) = region {
+        Sites::Grid { region: Some(r), stride: 1 }.shape(field.layout.frame_size)?;
     }
     let inside = |&index: &usize| {
         let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
@@ -149,7 +152,7 @@ fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{FieldLayout, MOTION_NAMES, Sites, Status};
+    use crate::types::{FieldLayout, MOTION_NAMES, Status};
 
     /// 3 x 2 sites with divergence 0.1, 0.2, ... 0.6 and standard deviation sd each of u_x, none of the others.
     fn field(sd: Option<f64>, period: Option<f64>) -> FlowField<f64> {

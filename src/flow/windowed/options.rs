@@ -10,11 +10,11 @@ pub enum RowSet {
     /// Row 1: brightness constancy alone. The cheapest; biased by the stencils' different smoothing on fine texture.
     Brightness,
     /// Rows 1-3: brightness and gradient constancy.
-    #[default]
     Gradient,
     /// Rows 1-6: `J(i) m = i'`, the whole 2-jet once.
     Jet,
     /// All twelve rows, `J(i) m = i'` and `J(i') m = i''`; needs three frames.
+    #[default]
     All,
 }
 
@@ -66,7 +66,8 @@ pub struct WindowedOptions {
     pub sigma: f64,
     /// Where the window ends, in standard deviations. Default 3.
     pub truncate: f64,
-    /// Which equations are summed. Default [`RowSet::Gradient`].
+    /// Which equations are summed. Default [`RowSet::All`]: with the smoothing below it has the least error on textures, particles and speckle alike
+    /// (`docs/performance.md`, "Which rows, how much smoothing").
     pub rows: RowSet,
     /// Frames of one estimate: 3 (default), or 2 for a pair, which [`RowSet::All`] does not allow. A pair's flow belongs to the moment between its frames.
     pub frames: usize,
@@ -74,7 +75,8 @@ pub struct WindowedOptions {
     pub scheme: TimeScheme,
     /// Pixels that each jet is fitted to. Default 3x3.
     pub neighbourhood: Neighbourhood,
-    /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance knows of it. Default `None`.
+    /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance knows of it. Default 1.5: a 3x3 fit of a
+    /// texture as fine as the pixels is no derivative, and halves the flow of sharp particles.
     /// Frames smoothed beforehand should be declared by [`WindowedOptions::already_smoothed`] instead.
     pub presmooth: Option<f64>,
     /// The frames come already smoothed by a Gaussian of this standard deviation, px: nothing is smoothed, but the covariance
@@ -97,12 +99,19 @@ impl Default for WindowedOptions {
             frames: 3,
             scheme: TimeScheme::default(),
             neighbourhood: Neighbourhood::default(),
-            presmooth: None,
+            presmooth: Some(1.5),
             already_smoothed: None,
             rank_deficient: RankPolicy::default(),
             rank_tolerance: 1e-5,
             min_weight: 0.1,
         }
+    }
+}
+
+impl WindowedOptions {
+    /// The default for two frames: rows of brightness and its gradient, since [`RowSet::All`] needs three.
+    pub fn pair() -> Self {
+        Self { rows: RowSet::Gradient, frames: 2, ..Self::default() }
     }
 }
 

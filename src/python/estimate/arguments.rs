@@ -11,7 +11,7 @@ use crate::jet::{Neighbourhood, TimeScheme};
 use crate::python::arrays::{self, ColourRule};
 use crate::python::image::renamed;
 use crate::python::keywords::{keep_options, with_common};
-use crate::python::options::{self, Object, Precision};
+use crate::python::options::{self, Integer, Object, Precision, Region};
 use pyo3::prelude::*;
 
 /// Hands the options of an estimator to `$then!`.
@@ -27,7 +27,7 @@ macro_rules! estimator_options {
             window_sigma: Option<f64> as Option<f64> = None,
             rows: Option<String> as Option<String> = None,
             smoothness: Option<f64> as Option<f64> = None,
-            iterations: Option<i64> as Option<i64> = None,
+            iterations: Option<Integer> as Option<Integer> = None,
             rank_deficient: String as &str = "nan",
             covariance: Option<bool> as Option<bool> = None,
             diagnostics: bool as bool = false,
@@ -61,12 +61,14 @@ impl Arguments {
 
     /// The core's options; errors name the arguments as Python knows them.
     pub fn plan(&self, py: Python<'_>) -> PyResult<Plan> {
+        let preprocess = options::preprocess(self.smooth, self.quantise)?;
         let method = self.method(py)?;
         let common = self.common(py, !matches!(method, Method::HornSchunck(_)))?;
-        let estimator = Estimator::new(method, common).map_err(|e| renamed(e, "sigma", "window_sigma"))?;
+        let estimator = Estimator::new(method, common)
+            .map_err(|e| renamed(renamed(e, "sigma", "window_sigma"), "window", "window_sigma"))?;
         Ok(Plan {
             estimator,
-            preprocess: options::preprocess(self.smooth, self.quantise)?,
+            preprocess,
             colour: ColourRule::parse(self.colour.as_deref())?,
             precision: Precision::parse(self.precision.as_deref())?,
         })
@@ -118,17 +120,20 @@ impl Arguments {
     fn windowed(&self, o: &mut WindowedOptions, neighbourhood: Neighbourhood) -> Result<()> {
         self.refuse(&["smoothness", "iterations"])?;
         self.expect_model("affine")?;
-        o.neighbourhood = neighbourhood;
         if self.time_scheme.as_deref() == Some(PAIR) {
-            o.frames = 2;
+            *o = WindowedOptions::pair();
         } else {
             o.scheme = self.scheme(o.scheme)?;
         }
+        o.neighbourhood = neighbourhood;
         o.sigma = self.window_sigma.unwrap_or(o.sigma);
         o.rows = self.rows.as_deref().map_or(Ok(o.rows), RowSet::parse)?;
         o.rank_deficient = RankPolicy::parse(&self.rank_deficient)?;
-        // Smoothing correlates the noise of neighbouring pixels; the covariance must know.
-        o.already_smoothed = self.smooth.filter(|&sigma| sigma > 0.0);
+        if let Some(sigma) = self.smooth {
+            // Done to each frame as it comes. Smoothing correlates the noise of neighbouring pixels; the covariance must know.
+            o.presmooth = None;
+            o.already_smoothed = Some(sigma).filter(|&sigma| sigma > 0.0);
+        }
         Ok(())
     }
 
@@ -140,13 +145,12 @@ impl Arguments {
         Ok(())
     }
 
-    fn horn_schunck(&self, o: &mut HornSchunckOptions) -> Result<()> {
+    fn horn_schunck(&self, o: &mut HornSchunckOptions) -> PyResult<()> {
         self.refuse(&["neighbourhood", "window_sigma", "rows", "rank_deficient"])?;
         self.expect_model("translational")?;
         o.smoothness = self.smoothness.map_or(o.smoothness, Smoothness::Relative);
         if let Some(iterations) = self.iterations {
-            let count = usize::try_from(iterations).ok().filter(|&n| n > 0);
-            o.iterations = count.ok_or_else(|| Error::argument("iterations", "a positive integer", iterations))?;
+            o.iterations = options::count("iterations", iterations)?;
         }
         o.differences = self.differences(o.differences)?;
         Ok(())
@@ -154,12 +158,12 @@ impl Arguments {
 
     fn scheme(&self, default: TimeScheme) -> Result<TimeScheme> {
         let named = self.time_scheme.as_deref().map_or(Ok(default), TimeScheme::parse);
-        named.map_err(|e| renamed(e, "scheme", "time_scheme"))
+        named.map_err(|_| unknown_scheme(self, "central, backward or pair"))
     }
 
     fn differences(&self, default: Differences) -> Result<Differences> {
         let named = self.time_scheme.as_deref().map_or(Ok(default), Differences::parse);
-        named.map_err(|e| renamed(e, "differences", "time_scheme"))
+        named.map_err(|_| unknown_scheme(self, "central or pair"))
     }
 
     /// Baselines and the windowed method have one model each; "affine" is also what everybody gets who does not choose.
@@ -188,4 +192,9 @@ impl Arguments {
         }
         Ok(())
     }
+}
+
+fn unknown_scheme(arguments: &Arguments, known: &str) -> Error {
+    let expected = format!("{known} for method {:?}", arguments.method);
+    Error::argument("time_scheme", expected, format!("{:?}", arguments.time_scheme.as_deref().unwrap_or_default()))
 }

@@ -7,7 +7,7 @@ mod stream;
 use super::arrays::{self, Frames};
 use super::field::{FlowField, Packed};
 use super::keywords::with_common;
-use super::options::Object;
+use super::options::{Integer, Object, Region};
 use super::progress::Reporter;
 use crate::error::Error;
 use arguments::{Arguments, PAIR, Plan, estimator_options};
@@ -89,7 +89,7 @@ macro_rules! define_estimate {
         ///
         /// Parameters
         /// ----------
-        /// frames : array (T, H, W), or list of arrays (H, W)
+        /// frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         ///     Oldest first, one size, at least 3 x 3 px.
         /// method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
         ///     "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
@@ -106,7 +106,7 @@ macro_rules! define_estimate {
         /// window_sigma : float, px
         ///     Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
         /// rows : "brightness", "gradient", "jet" or "all"
-        ///     Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel.
+        ///     Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel; default "all", for pairs "gradient".
         /// smoothness : float, in units of the root mean square gradient of the frame
         ///     Weight of "horn_schunck", so that the intensity gain does not change the flow; default 1.
         /// iterations : int
@@ -114,7 +114,7 @@ macro_rules! define_estimate {
         /// rank_deficient : "nan" or "min_norm"
         ///     What "windowed" and "instantaneous" report where the equations do not determine every unknown.
         /// smooth : float, px
-        ///     Standard deviation of a Gaussian that smooths each frame first; default none.
+        ///     Standard deviation of a Gaussian that smooths each frame first, 0 for none; default 1.5 for "windowed", none for the others.
         /// quantise : float, grey levels
         ///     Rounds samples down to multiples of it before smoothing; default none.
         /// colour : "error" (default) or "luminance"

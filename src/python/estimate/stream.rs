@@ -7,7 +7,7 @@ use crate::math::Real;
 use crate::python::arrays;
 use crate::python::field::FlowField;
 use crate::python::keywords::{constructor, with_common};
-use crate::python::options::{self, Object};
+use crate::python::options::{self, Integer, Object, Region};
 use crate::types::{AnyFrame, Frame};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

@@ -2,6 +2,7 @@
 
 use super::{FlowField, Store, derived, each};
 use crate::python::arrays;
+use crate::python::options::{self, Region};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -29,6 +30,24 @@ impl FlowField {
     #[getter]
     fn shear_axis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "shear_axis")
+    }
+
+    /// Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    #[getter]
+    fn strain_xx<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "strain_xx")
+    }
+
+    /// Stretch v_y along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    #[getter]
+    fn strain_yy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "strain_yy")
+    }
+
+    /// Shear strain (u_y + v_x) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    #[getter]
+    fn strain_xy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "strain_xy")
     }
 
     /// Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period.
@@ -63,7 +82,7 @@ impl FlowField {
 
     /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
     ///
-    /// It need not be in the picture. NaN where there is none.
+    /// It need not be in the picture. NaN where there is none. `value` and `std` take its parts, rotation_centre_x and rotation_centre_y.
     #[getter]
     fn rotation_centre<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let both = (self.value(py, "rotation_centre_x")?, self.value(py, "rotation_centre_y")?);
@@ -107,13 +126,13 @@ impl FlowField {
         &self,
         py: Python<'_>,
         name: &str,
-        region: Option<(i64, i64, i64, i64)>,
+        region: Option<Region>,
         aggregate: Option<&str>,
     ) -> PyResult<(f64, f64, usize)> {
         if self.stack {
             return Err(PyTypeError::new_err("region_mean: expected a single field, got a stack; index it first"));
         }
-        let region = crate::python::options::region(region)?;
+        let region = options::region(region)?;
         each!(self.store, packed => {
             let field = self.core(packed, 0);
             Ok(py.detach(|| derived::region(&field, name, region, aggregate))?)

@@ -5,7 +5,7 @@ use crate::python::{arrays, io};
 use crate::types::{Sites, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PySlice, PyTuple};
 use std::path::PathBuf;
 
 #[pymethods]
@@ -197,9 +197,23 @@ impl FlowField {
         }
     }
 
-    /// Field `index` of a stack, sharing its memory. IndexError outside, TypeError for a single field.
-    fn __getitem__(&self, index: isize) -> PyResult<Self> {
+    /// True, whatever it holds: a field is there. (An estimator that has none yet returns None.)
+    fn __bool__(&self) -> bool {
+        true
+    }
+
+    /// Field `index` of a stack, or the stack of a slice of step 1, sharing its memory. IndexError outside, TypeError for a single field.
+    fn __getitem__(&self, index: &Bound<'_, PyAny>) -> PyResult<Self> {
         let count = self.__len__()?;
+        if let Ok(slice) = index.cast::<PySlice>() {
+            let range = slice.indices(count as isize)?;
+            if range.step != 1 {
+                return Err(PyIndexError::new_err(format!("a slice of a stack: expected step 1, got {}", range.step)));
+            }
+            let (first, length) = (range.start as usize, range.slicelength as usize);
+            return Ok(Self { store: self.store.clone(), start: self.start + first, count: length, stack: true });
+        }
+        let index: isize = index.extract()?;
         let place = if index < 0 { index + count as isize } else { index };
         if place < 0 || place >= count as isize {
             return Err(PyIndexError::new_err(format!("index {index}: the stack has {count} fields")));

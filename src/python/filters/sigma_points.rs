@@ -29,6 +29,14 @@ impl MerweScaledSigmaPoints {
         }
         Ok(Self { n, points: SigmaPoints::new(alpha, beta, kappa)? })
     }
+    /// The same dimensions and spreads.
+    fn __eq__(&self, other: &Self) -> bool {
+        self.n == other.n && self.points == other.points
+    }
+    fn __hash__(&self) -> u64 {
+        let SigmaPoints { alpha, beta, kappa } = self.points;
+        [alpha, beta, kappa].iter().fold(self.n as u64, |hash, part| hash.rotate_left(21) ^ part.to_bits())
+    }
     /// Dimensions of the state (a count, no unit).
     #[getter]
     fn n(&self) -> usize {

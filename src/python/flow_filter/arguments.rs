@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::filter::SigmaPoints;
 use crate::python::arrays;
 use crate::python::keywords::{keep_options, with_common};
-use crate::python::options::{self, Object};
+use crate::python::options::{self, Integer, Object, Region};
 use crate::temporal::{FilterForm, FlowFilterOptions, Transition};
 use pyo3::prelude::*;
 

@@ -5,7 +5,7 @@ mod arguments;
 use super::arrays::{self, ColourRule};
 use super::field::FlowField;
 use super::keywords::{constructor, with_common};
-use super::options::{self, Object, Precision};
+use super::options::{self, Integer, Object, Precision, Region};
 use crate::error::Error;
 use crate::image::Preprocess;
 use crate::simd::SimdReal;
