@@ -96,6 +96,11 @@ fn naive<T: Real>(
     n.lu().solve(&r).unwrap_or_else(|| Vector6::repeat(f64::NAN))
 }
 
+/// Frames as they come, and rows that a pair has too.
+fn raw() -> WindowedOptions {
+    WindowedOptions { presmooth: None, rows: RowSet::Gradient, ..WindowedOptions::default() }
+}
+
 fn windowed(options: WindowedOptions, common: Common) -> Estimator {
     Estimator::new(Method::Windowed(options), common).unwrap()
 }
@@ -138,20 +143,16 @@ fn equals_the_naive_sum_everywhere() {
     let mut cases = Vec::new();
     for rows in RowSet::EVERY {
         for scheme in [TimeScheme::Central, TimeScheme::Backward] {
-            cases.push(WindowedOptions { rows, scheme, sigma: 2.5, ..WindowedOptions::default() });
+            cases.push(WindowedOptions { rows, scheme, sigma: 2.5, ..raw() });
         }
         if rows != RowSet::All {
-            cases.push(WindowedOptions { rows, frames: 2, sigma: 2.0, ..WindowedOptions::default() });
+            cases.push(WindowedOptions { rows, frames: 2, sigma: 2.0, ..raw() });
         }
     }
-    cases.push(WindowedOptions {
-        rows: RowSet::All,
-        neighbourhood: Neighbourhood::square(5),
-        ..WindowedOptions::default()
-    });
+    cases.push(WindowedOptions { rows: RowSet::All, neighbourhood: Neighbourhood::square(5), ..raw() });
     let offsets = vec![(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (2, -1)];
     let points = Neighbourhood::Points { offsets, sigma: None };
-    cases.push(WindowedOptions { neighbourhood: points, ..WindowedOptions::default() });
+    cases.push(WindowedOptions { neighbourhood: points, ..raw() });
     for options in cases {
         let frames = &frames[..options.frames];
         let field = estimate(frames, &options, &Common::default());
@@ -215,7 +216,7 @@ fn table_of_estimators() {
             clean.iter().enumerate().map(|(k, f)| smoother.apply(&sensor.apply(f, k as u64))).collect();
         for (column, frames) in [clean, noisy].iter().enumerate() {
             let refs: Vec<&Frame<f64>> = frames.iter().collect();
-            let all = WindowedOptions { rows: RowSet::All, truncate: 4.0, ..WindowedOptions::default() };
+            let all = WindowedOptions { rows: RowSet::All, truncate: 4.0, ..raw() };
             let one = WindowedOptions { rows: RowSet::Brightness, ..all.clone() };
             let fields = [
                 Estimator::new(Method::parse("instantaneous").unwrap(), Common::default())
@@ -320,7 +321,7 @@ fn covariance_is_calibrated() {
         (3.0, 4.0, Some(2.0), 6.0, RowSet::Brightness),
         (3.0, 4.0, None, 4.0, RowSet::Brightness),
     ] {
-        let options = WindowedOptions { rows, sigma, presmooth, ..WindowedOptions::default() };
+        let options = WindowedOptions { rows, sigma, presmooth, ..raw() };
         let known = Common { noise: Some((noise * noise + 1.0 / 12.0_f64).sqrt()), ..common.clone() };
         for motion in [slow, REFERENCE] {
             let texture = Noise::new(grain, 40.0, 128.0, 5).unwrap();
@@ -354,7 +355,7 @@ fn each_parameter_is_what_its_name_says() {
         for k in 0..6 {
             let mut motion = [0.0; 6];
             motion[k] = if k < 2 { 0.2 } else { 0.01 };
-            let options = WindowedOptions { rows, ..WindowedOptions::default() };
+            let options = WindowedOptions { rows, ..raw() };
             let got = estimate(&soft(motion), &options, &Common::default()).affine(32 * 64 + 32).to_array();
             // The centre of the frame lies between four pixels: the flow there differs by half a derivative.
             let near = 0.1 * motion[k];
@@ -372,7 +373,7 @@ fn gain_and_sample_type_never_change_the_flow() {
     let camera = Sensor::eight_bit(1.0, 4);
     let bytes: Vec<Frame<f64>> =
         texture((50, 40), REFERENCE, 6, &TRIPLE).iter().enumerate().map(|(k, f)| camera.apply(f, k as u64)).collect();
-    let options = WindowedOptions { presmooth: Some(1.0), ..WindowedOptions::default() };
+    let options = WindowedOptions { presmooth: Some(1.0), ..raw() };
     let common = Common { covariance: true, ..Common::default() };
     let as_is = estimate(&single(&bytes), &options, &common);
     let doubled: Vec<_> = single(&bytes).iter().map(|f| f.map(|v| v * 256.0)).collect();
@@ -402,7 +403,7 @@ fn damage_stays_where_windows_touch_it() {
     }
     let mask = Frame::from_fn(96, 90, |x, y| !((30..50).contains(&y) && (40..60).contains(&x)));
     for presmooth in [None, Some(1.0)] {
-        let options = WindowedOptions { presmooth, sigma: 3.0, ..WindowedOptions::default() };
+        let options = WindowedOptions { presmooth, sigma: 3.0, ..raw() };
         let common = Common { covariance: true, ..Common::default() };
         let whole = estimate(&clean, &options, &common);
         let masked_common = Common { mask: Some(mask.clone()), ..common.clone() };
@@ -451,7 +452,7 @@ fn damage_stays_where_windows_touch_it() {
 fn sites_threads_and_levels_agree() {
     let frames = single(&texture((150, 170), REFERENCE, 9, &TRIPLE));
     for (rows, presmooth) in [(RowSet::Gradient, Some(1.0)), (RowSet::All, None), (RowSet::Brightness, None)] {
-        let options = WindowedOptions { rows, presmooth, sigma: 2.0, ..WindowedOptions::default() };
+        let options = WindowedOptions { rows, presmooth, sigma: 2.0, ..raw() };
         let common = Common { covariance: true, diagnostics: true, ..Common::default() };
         let threads = |n| Common { threads: Threads::new(Some(n)).unwrap(), ..common.clone() };
         let dense = estimate(&frames, &options, &threads(1));
@@ -507,7 +508,7 @@ fn what_cannot_be_seen_is_said() {
         (0..3).map(|t| Frame::from_fn(40, 30, |x, _| 50.0 * ((x as f32 - 0.2 * t as f32) * 0.6).sin())).collect();
     for rows in RowSet::EVERY {
         for presmooth in [None, Some(1.2)] {
-            let options = WindowedOptions { rows, presmooth, ..WindowedOptions::default() };
+            let options = WindowedOptions { rows, presmooth, ..raw() };
             let field = estimate(&flat, &options, &common);
             assert!(field.status.iter().all(|s| matches!(s, Status::Unobservable | Status::Border)));
             assert!(field.motion.iter().all(|v| v.is_nan()) && field.rank.unwrap().iter().all(|r| *r == 0));
@@ -530,7 +531,7 @@ fn options_are_checked_by_name() {
     let refused = |options: WindowedOptions| {
         Estimator::new(Method::Windowed(options), Common::default()).unwrap_err().to_string()
     };
-    let base = WindowedOptions::default;
+    let base = raw;
     assert!(refused(WindowedOptions { sigma: 0.0, ..base() }).starts_with("sigma"));
     assert!(refused(WindowedOptions { sigma: 1e9, ..base() }).starts_with("sigma"));
     assert!(refused(WindowedOptions { truncate: f64::NAN, ..base() }).starts_with("truncate"));
