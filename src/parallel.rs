@@ -61,7 +61,7 @@ impl Threads {
 fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
     let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(None) };
     let number = value.to_str().and_then(|text| text.trim().parse().ok()).filter(|&n: &usize| n > 0);
-    number.map(Some).ok_or_else(|| Error::argument(VARIABLE, "a positive integer", format!("{value:?}")))
+    number.map(Some).ok_or_else(|| Error::argument(VARIABLE, "a positive integer", value.display()))
 }
 
 /// The shared pool of `count` threads; made on first use and kept.

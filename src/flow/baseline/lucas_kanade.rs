@@ -168,7 +168,7 @@ impl LucasKanade {
                         columns.prepare(&g, at.1 - crop.y0, &self.kernel);
                         (columns.window(at.0 - crop.x0, &self.kernel), g.brightness)
                     };
-                    self.solve::<T>(&mut band, local, &sums, brightness, noise);
+                    Self::solve::<T>(&mut band, local, &sums, brightness, noise);
                 }
                 Ok(())
             })
@@ -176,14 +176,7 @@ impl LucasKanade {
     }
 
     /// The 2x2 normal equations of one window.
-    fn solve<T: Real>(
-        &self,
-        band: &mut FieldBand<'_, T>,
-        local: usize,
-        sums: &Sums,
-        brightness: f64,
-        noise: Option<f64>,
-    ) {
+    fn solve<T: Real>(band: &mut FieldBand<'_, T>, local: usize, sums: &Sums, brightness: f64, noise: Option<f64>) {
         // Without the gain in intensity, whose fourth power may be beyond any number.
         let gain = magnitude(sums.values[0] + sums.values[2]);
         let [xx, xy, yy, xt, yt, tt, sxx, sxy, syy] = sums.values.map(|v| v / gain);
