@@ -83,6 +83,53 @@ pub(super) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
     None
 }
 
+/// How far below zero an eigenvalue may lie, relative to the largest one's size, to be rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// What is wrong with a covariance, in words: entries that are not finite, no symmetry, or an eigenvalue below zero by more than rounding. `None`: nothing.
+pub(super) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
+    if let Some(value) = a.iter().find(|v| !v.is_finite()) {
+        return Some(format!("one with the entry {value}"));
+    }
+    let largest = a.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    for i in 0..n {
+        for j in 0..i {
+            let (lower, upper) = (a[i * n + j], a[j * n + i]);
+            if (lower - upper).abs() > ROUNDING * largest {
+                return Some(format!("one with {upper} at ({j}, {i}) and {lower} at ({i}, {j})"));
+            }
+        }
+    }
+    let least = negative_eigenvalue(a, n)?;
+    Some(format!("one with the eigenvalue {least}"))
+}
+
+/// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended; `None`: nothing can be done.
+pub(super) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
+    if a.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    if negative_eigenvalue(a, n).is_none() {
+        return Some(false);
+    }
+    factor(a, n, &mut vec![0.0; n * n])
+}
+
+/// The least eigenvalue of a symmetric matrix where it is negative by more than rounding.
+fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
+    // With its diagonal raised by what rounding may take, a matrix has a factor: that is cheaper to find out than eigenvalues.
+    let mut raised = a.to_vec();
+    let diagonal = || (0..n).map(|k| k * (n + 1));
+    let shift = 0.5 * ROUNDING * diagonal().fold(0.0f64, |m, k| m.max(a[k]));
+    diagonal().for_each(|k| raised[k] += shift);
+    if cholesky(&raised, n, &mut vec![0.0; n * n]) {
+        return None;
+    }
+    let values = SymmetricEigen::new(DMatrix::from_row_slice(n, n, a)).eigenvalues;
+    let largest = values.amax();
+    Some(values.min()).filter(|least| *least < -ROUNDING * largest)
+}
+
 /// Solves `l l^T x = b` in place.
 pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     forward(l, n, b);
@@ -116,5 +163,27 @@ mod tests {
         assert_eq!(factor(&mut indefinite, 2, &mut l), Some(true));
         assert!((indefinite[0] - 1.5).abs() < 1e-9, "the negative eigenvalue -1 became nearly 0");
         assert_eq!(factor(&mut [f64::NAN], 1, &mut [0.0]), None);
+    }
+
+    #[test]
+    fn faults_are_told_and_rounding_is_none() {
+        for good in [[0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0], [1.0, 1.0 + 1e-12, 1.0, 1.0], [4.0, 1.0, 1.0, 1e9]] {
+            assert_eq!(covariance_fault(&good, 2), None, "{good:?}");
+            assert_eq!(mend(&mut good.clone(), 2), Some(false), "{good:?}");
+        }
+        for (bad, word) in [
+            ([1.0, 2.0, 2.0, 1.0], "eigenvalue -1"),
+            ([1.0, 5.0, 0.0, 1.0], "5 at (0, 1)"),
+            ([-1.0, 0.0, 0.0, 1.0], "eigenvalue -1"),
+            ([1.0, 0.0, 0.0, f64::INFINITY], "inf"),
+            ([1.0, f64::NAN, f64::NAN, 1.0], "NaN"),
+        ] {
+            let fault = covariance_fault(&bad, 2).unwrap();
+            assert!(fault.contains(word), "{fault}");
+        }
+        let mut lost = [1.0, 2.0, 2.0, 1.0];
+        assert_eq!(mend(&mut lost, 2), Some(true));
+        assert_eq!(covariance_fault(&lost, 2), None);
+        assert_eq!(mend(&mut [f64::NAN; 4], 2), None);
     }
 }

@@ -1,6 +1,6 @@
 //! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes and Filtering Theory", 1970, chapter 8).
 
-use super::state::{GaussianState, expect, finite, shared};
+use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
@@ -43,9 +43,8 @@ impl ExtendedFilter {
         let mut next = vec![0.0; self.x.len()];
         fx(&self.x, &mut next)?;
         finite("fx", &next)?;
-        self.state.propagate_covariance(&f);
         self.state.x = next;
-        Ok(())
+        self.state.propagate_covariance(&f)
     }
 
     /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2 n` rows for each state.
@@ -75,6 +74,7 @@ impl ExtendedFilter {
         self.check()?;
         let (n, m) = (self.dim_x, self.dim_z);
         expect("z", z, &[self.batch * m])?;
+        check_measurement(z)?;
         let mut h = vec![0.0; self.batch * m * n];
         jacobian(&self.x, &mut h)?;
         finite("H", &h)?;

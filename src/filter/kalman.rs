@@ -1,7 +1,7 @@
 //! The linear filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", 1960).
 
 use super::dense::multiply;
-use super::state::{GaussianState, expect, shared};
+use super::state::{GaussianState, check_matrix, check_measurement, expect, shared};
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
@@ -33,31 +33,33 @@ impl KalmanFilter {
     /// `x <- F x`, `P <- F P F^T + Q`.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for arrays of wrong length.
+    /// [`Error::Argument`](crate::Error::Argument) for arrays of wrong length, numbers that are not finite and matrices that are no covariances;
+    /// [`Error::Numerical`](crate::Error::Numerical) when the state outgrows all numbers.
     pub fn predict(&mut self) -> Result<()> {
         self.check()?;
         let n = self.dim_x;
         expect("F", &self.F, &[n * n, self.batch * n * n])?;
+        check_matrix("F", &self.F)?;
         let mut next = vec![0.0; n];
         for item in 0..self.state.batch {
             let x = &mut self.state.x[item * n..(item + 1) * n];
             multiply(shared(&self.F, item, n * n), x, n, &mut next);
             x.copy_from_slice(&next);
         }
-        self.state.propagate_covariance(&self.F);
-        Ok(())
+        self.state.propagate_covariance(&self.F)
     }
 
     /// Takes in the measurements `z` `(B, m)`; a state with a NaN among its numbers is left as it is.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for arrays of wrong length, [`Error::Numerical`](crate::Error::Numerical) when `S` is not positive
-    /// definite.
+    /// As [`predict`](Self::predict); also [`Error::Numerical`](crate::Error::Numerical) when `S` is not positive definite.
     pub fn update(&mut self, z: &[f64]) -> Result<()> {
         self.check()?;
         let (n, m) = (self.dim_x, self.dim_z);
         expect("z", z, &[self.batch * m])?;
         expect("H", &self.H, &[m * n, self.batch * m * n])?;
+        check_matrix("H", &self.H)?;
+        check_measurement(z)?;
         let mut predicted = vec![0.0; m];
         for (item, z) in z.chunks_exact(m).enumerate() {
             if z.iter().any(|v| v.is_nan()) {

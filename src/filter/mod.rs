@@ -5,7 +5,8 @@
 //! is row-major: `x` is `(B, n)`, `P` is `(B, n, n)`. A callback receives the whole batch at once, so that one vectorised function call
 //! serves every state and every sigma point.
 //!
-//! Covariances stay symmetric positive definite: updates use the Joseph form, and a matrix that loses a pivot to rounding is mended and counted in
+//! Means, covariances and noise that are not finite, symmetric and positive semi-definite are refused by name at every step.
+//! Covariances stay so: updates use the Joseph form, and a matrix that loses that in a step is mended and counted in
 //! [`GaussianState::repairs`].
 //!
 //! ```
@@ -48,4 +49,6 @@ pub use extended::ExtendedFilter;
 pub use kalman::KalmanFilter;
 pub use sigma_points::SigmaPoints;
 pub use state::GaussianState;
+#[cfg(feature = "python")]
+pub(crate) use state::{check_covariances, check_dimension, check_mean};
 pub use unscented::UnscentedFilter;

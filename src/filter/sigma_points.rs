@@ -93,12 +93,14 @@ impl SigmaPoints {
     /// The sigma points `(2 n + 1, n)` of mean `x` `(n)` and covariance `p` `(n, n)`.
     ///
     /// # Errors
-    /// [`Error::Argument`] for wrong sizes, [`Error::Numerical`] when `p` is not positive definite.
+    /// [`Error::Argument`] for wrong sizes and a mean that is not finite, [`Error::Numerical`] when `p` is not positive definite.
     pub fn sigma_points(&self, x: &[f64], p: &[f64]) -> Result<Vec<f64>> {
         let n = x.len();
         if n == 0 || p.len() != n * n {
             return Err(Error::argument("P", format!("a {n} x {n} matrix with n > 0"), format!("{} values", p.len())));
         }
+        super::state::check_dimension("x", n)?;
+        super::state::check_mean(x)?;
         self.check(n)?;
         let mut l = vec![0.0; n * n];
         if !super::dense::cholesky(p, n, &mut l) {

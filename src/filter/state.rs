@@ -1,6 +1,8 @@
 //! What every filter here holds: a batch of Gaussians, the noise, and the last update's by-products.
 
-use super::dense::{cholesky, factor, forward, multiply, multiply_transposed, solve, symmetrise};
+use super::dense::{
+    cholesky, covariance_fault, factor, forward, mend, multiply, multiply_transposed, solve, symmetrise,
+};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -37,13 +39,11 @@ impl GaussianState {
     /// `batch` states of `dim_x` dimensions with zero mean and identity covariances.
     ///
     /// # Errors
-    /// [`Error::Argument`] when a dimension is zero.
+    /// [`Error::Argument`] when a dimension is zero or above 4096, or when the memory that `batch` states take in a step cannot be had.
     pub fn new(batch: usize, dim_x: usize, dim_z: usize) -> Result<Self> {
-        for (name, value) in [("batch", batch), ("dim_x", dim_x), ("dim_z", dim_z)] {
-            if value == 0 {
-                return Err(Error::argument(name, "a positive integer", 0));
-            }
-        }
+        check_dimension("dim_x", dim_x)?;
+        check_dimension("dim_z", dim_z)?;
+        check_batch(batch, dim_x, dim_z)?;
         let identity = |n: usize| (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect::<Vec<_>>();
         Ok(Self {
             batch,
@@ -61,13 +61,35 @@ impl GaussianState {
         })
     }
 
-    /// Checks the sizes of the public arrays, which a caller may have replaced.
+    /// Checks the public arrays, which a caller may have replaced: sizes, and that they are means and covariances.
     pub(super) fn check(&self) -> Result<()> {
         let (b, n, m) = (self.batch, self.dim_x, self.dim_z);
         expect("x", &self.x, &[b * n])?;
         expect("P", &self.P, &[b * n * n])?;
         expect("Q", &self.Q, &[n * n, b * n * n])?;
-        expect("R", &self.R, &[m * m, b * m * m])
+        expect("R", &self.R, &[m * m, b * m * m])?;
+        check_mean(&self.x)?;
+        check_covariances("P", &self.P, n)?;
+        check_covariances("Q", &self.Q, n)?;
+        check_covariances("R", &self.R, m)
+    }
+
+    /// Mends the covariance of one state after a step if it is none any more, and counts that; refuses numbers that have become infinite.
+    fn keep_sound(&mut self, item: usize) -> Result<()> {
+        let n = self.dim_x;
+        let (x, p) = (&self.x[item * n..(item + 1) * n], &mut self.P[item * n * n..(item + 1) * n * n]);
+        if x.iter().chain(&*p).any(|v| !v.is_finite()) {
+            return Err(Error::Numerical(format!("x or P of state {item} has outgrown the range of numbers")));
+        }
+        let mended =
+            mend(p, n).ok_or_else(|| Error::Numerical(format!("P of state {item} has no positive-definite repair")))?;
+        self.repairs += u64::from(mended);
+        Ok(())
+    }
+
+    /// [`Self::keep_sound`] for every state.
+    pub(super) fn keep_all_sound(&mut self) -> Result<()> {
+        (0..self.batch).try_for_each(|item| self.keep_sound(item))
     }
 
     /// The Cholesky factors `(B, n, n)` of every covariance; mends those that need it.
@@ -121,7 +143,7 @@ impl GaussianState {
         self.y[item * m..(item + 1) * m].copy_from_slice(y);
         self.log_likelihood[item] =
             -0.5 * (white.iter().map(|v| v * v).sum::<f64>() + determinant + m as f64 * std::f64::consts::TAU.ln());
-        Ok(())
+        self.keep_sound(item)
     }
 
     /// Clears the by-products of a state whose measurement is missing.
@@ -134,7 +156,7 @@ impl GaussianState {
     }
 
     /// Sets every `P` to `F P F^T + Q`, given `F` of each state `(B, n, n)` or of all `(n, n)`.
-    pub(super) fn propagate_covariance(&mut self, f: &[f64]) {
+    pub(super) fn propagate_covariance(&mut self, f: &[f64]) -> Result<()> {
         let n = self.dim_x;
         let mut half = vec![0.0; n * n];
         for item in 0..self.batch {
@@ -145,6 +167,73 @@ impl GaussianState {
             p.iter_mut().zip(shared(&self.Q, item, n * n)).for_each(|(p, q)| *p += q);
             symmetrise(p, n);
         }
+        self.keep_all_sound()
+    }
+}
+
+/// Largest dimension of a state or a measurement: one matrix of it takes 128 MiB.
+pub(super) const LARGEST_DIMENSION: usize = 4096;
+
+/// Refuses a dimension that no filter can have; `name` is the argument.
+///
+/// # Errors
+/// [`Error::Argument`] when it is zero or above 4096.
+pub(crate) fn check_dimension(name: &'static str, n: usize) -> Result<()> {
+    if (1..=LARGEST_DIMENSION).contains(&n) {
+        return Ok(());
+    }
+    Err(Error::argument(name, format!("an integer from 1 to {LARGEST_DIMENSION}"), n))
+}
+
+/// Refuses a number of states for which there is no memory: about what an unscented step takes is asked for and given back.
+fn check_batch(batch: usize, n: usize, m: usize) -> Result<()> {
+    if batch == 0 {
+        return Err(Error::argument("batch", "a positive integer", 0));
+    }
+    let one = 16 * n * n + 8 * n * m + 4 * m * m;
+    let room = batch.checked_mul(one).map(|values| Vec::<f64>::new().try_reserve_exact(values));
+    if matches!(room, Some(Ok(()))) {
+        return Ok(());
+    }
+    let expected = format!("as many filters of {n} state and {m} measurement dimensions as memory holds");
+    Err(Error::argument("batch", expected, batch))
+}
+
+/// Refuses a mean that is not finite.
+///
+/// # Errors
+/// [`Error::Argument`] naming `x`.
+pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
+    match x.iter().find(|v| !v.is_finite()) {
+        Some(value) => Err(Error::argument("x", "finite numbers", value)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses `(n, n)` matrices, one after another, that are no covariances: finite, symmetric, no negative eigenvalue but by rounding.
+///
+/// # Errors
+/// [`Error::Argument`] naming `name` and what is wrong.
+pub(crate) fn check_covariances(name: &'static str, values: &[f64], n: usize) -> Result<()> {
+    match values.chunks_exact(n * n).find_map(|matrix| covariance_fault(matrix, n)) {
+        Some(fault) => Err(Error::argument(name, "a symmetric positive semi-definite matrix of finite numbers", fault)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a measurement that is infinite; NaN stands for a missing one.
+pub(super) fn check_measurement(z: &[f64]) -> Result<()> {
+    match z.iter().find(|v| v.is_infinite()) {
+        Some(value) => Err(Error::argument("z", "finite numbers, or NaN where one is missing", value)),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a matrix with an entry that is not finite.
+pub(super) fn check_matrix(name: &'static str, values: &[f64]) -> Result<()> {
+    match values.iter().find(|v| !v.is_finite()) {
+        Some(value) => Err(Error::argument(name, "a matrix of finite numbers", value)),
+        None => Ok(()),
     }
 }
 

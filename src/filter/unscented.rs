@@ -2,7 +2,7 @@
 
 use super::dense::{cholesky, solve, symmetrise};
 use super::sigma_points::SigmaPoints;
-use super::state::{GaussianState, expect, finite, shared};
+use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
@@ -48,8 +48,7 @@ impl UnscentedFilter {
         fx(&drawn, &mut sigmas)?;
         finite("fx", &sigmas)?;
         let (n, q) = (self.dim_x, self.Q.clone());
-        self.take_moments(sigmas, n, Some(&q));
-        Ok(())
+        self.take_moments(sigmas, n, Some(&q))
     }
 
     /// Augmented noise: `4 n + 1` points of the state with its noise `w ~ N(0, Q)`; `fx` receives the state rows and the noise rows,
@@ -84,8 +83,7 @@ impl UnscentedFilter {
         let mut sigmas = vec![0.0; states.len()];
         fx(&states, &noises, &mut sigmas)?;
         finite("fx", &sigmas)?;
-        self.take_moments(sigmas, 2 * n, None);
-        Ok(())
+        self.take_moments(sigmas, 2 * n, None)
     }
 
     /// Takes in the measurements `z` `(B, m)` through `hx`; a state with a NaN among its numbers is left as it is.
@@ -98,6 +96,7 @@ impl UnscentedFilter {
         self.points.check(self.dim_x)?;
         let (n, m, batch) = (self.dim_x, self.dim_z, self.batch);
         expect("z", z, &[batch * m])?;
+        check_measurement(z)?;
         let factors = self.state.factors()?;
         let sigmas = if self.redraw || self.sigmas.is_empty() { self.draw_from(&factors) } else { self.sigmas.clone() };
         let rows = sigmas.len() / (batch * n);
@@ -155,7 +154,7 @@ impl UnscentedFilter {
     }
 
     /// Sets `x` and `P` to the weighted moments of propagated points of `dims` dimensions, plus additive noise.
-    fn take_moments(&mut self, sigmas: Vec<f64>, dims: usize, noise: Option<&[f64]>) {
+    fn take_moments(&mut self, sigmas: Vec<f64>, dims: usize, noise: Option<&[f64]>) -> Result<()> {
         let n = self.dim_x;
         let rows = SigmaPoints::count(dims);
         let (wm, wc) = (self.points.mean_weights(dims), self.points.covariance_weights(dims));
@@ -170,6 +169,7 @@ impl UnscentedFilter {
             self.P[item * n * n..(item + 1) * n * n].copy_from_slice(&p);
         }
         self.sigmas = sigmas;
+        self.state.keep_all_sound()
     }
 }
 

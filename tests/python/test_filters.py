@@ -125,6 +125,45 @@ def test_a_batch_equals_single_filters(augmented):
     assert_array_equal(batch.P, [single.P for single in singles])
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("R", -1.0),
+        ("P", [[1, 2], [2, 1]]),
+        ("P", [[1, 5], [0, 1]]),
+        ("Q", np.full((2, 2), np.nan)),
+        ("x", [np.inf, 0.0]),
+    ],
+)
+def test_what_is_no_covariance_or_mean_is_refused(name, value):
+    ours = KalmanFilter(2, 1)
+    ours.H = [[1.0, 0.0]]
+    before = getattr(ours, name).copy()
+    with pytest.raises(ValueError, match=f"^{name}: "):
+        setattr(ours, name, value)
+    assert_array_equal(getattr(ours, name), before)
+    getattr(ours, name)[...] = value
+    with pytest.raises(ValueError, match=f"^{name}: "):
+        ours.predict() if name != "R" else ours.update(0.3)
+    with pytest.raises(ValueError, match="^z: "):
+        KalmanFilter(2, 1).update([np.inf])
+
+
+def test_sizes_beyond_memory_are_refused():
+    for call, name in (
+        (lambda: KalmanFilter(10**6, 1), "dim_x"),
+        (lambda: KalmanFilter(4, 10**6), "dim_z"),
+        (lambda: KalmanFilter(4, 2, batch=10**15), "batch"),
+        (lambda: ExtendedKalmanFilter(10**6, 1), "dim_x"),
+        (lambda: MerweScaledSigmaPoints(10**6), "n"),
+        (lambda: MerweScaledSigmaPoints(3, 0.1, 2.0, -3.0), "kappa"),
+    ):
+        with pytest.raises(ValueError, match=f"^{name}: "):
+            call()
+    with pytest.raises(ValueError, match="^x: "):
+        MerweScaledSigmaPoints(2).sigma_points([np.nan, 0.0], np.eye(2))
+
+
 def test_missing_measurements_leave_the_prediction():
     ours = unscented(batch=2)
     ours.predict()

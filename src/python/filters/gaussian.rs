@@ -1,7 +1,7 @@
 //! What the three filters share: the batch of Gaussians as numpy arrays that the user may change in place.
 
 use crate::error::Error;
-use crate::filter::GaussianState;
+use crate::filter::{GaussianState, check_covariances, check_mean};
 use crate::python::arrays;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -11,7 +11,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 ///
 /// Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B` they are
 /// (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or changed in place; a number given
-/// for P, Q or R means that multiple of the identity. Units are the state's and the measurement's own.
+/// for P, Q or R means that multiple of the identity. ValueError for an x that is not finite and for a P, Q or R that is not finite, symmetric
+/// and positive semi-definite, when it is set or, changed in place, at the next step. Units are the state's and the measurement's own.
 #[pyclass(module = "jacoflow.filters", subclass, frozen)]
 pub struct GaussianFilter {
     pub dim_x: usize,
@@ -118,6 +119,11 @@ impl GaussianFilter {
         }
         if shape != tail && shape != self.shape(index) {
             return Err(self.wrong(index, &shape));
+        }
+        match index {
+            0 => check_mean(&values)?,
+            1..=3 => check_covariances(NAMES[index], &values, tail[0])?,
+            _ => {}
         }
         if matches!(index, 0 | 1) && shape == tail {
             values = values.repeat(self.batch.unwrap_or(1));

@@ -1,7 +1,7 @@
 //! `MerweScaledSigmaPoints`.
 
 use crate::error::Error;
-use crate::filter::SigmaPoints;
+use crate::filter::{SigmaPoints, check_dimension};
 use crate::python::arrays;
 use pyo3::prelude::*;
 
@@ -24,10 +24,10 @@ impl MerweScaledSigmaPoints {
         let default = SigmaPoints::default();
         let (alpha, beta, kappa) =
             (alpha.unwrap_or(default.alpha), beta.unwrap_or(default.beta), kappa.unwrap_or(default.kappa));
-        if n == 0 {
-            return Err(Error::argument("n", "a positive integer", 0).into());
-        }
-        Ok(Self { n, points: SigmaPoints::new(alpha, beta, kappa)? })
+        check_dimension("n", n)?;
+        let points = SigmaPoints::new(alpha, beta, kappa)?;
+        points.check(n)?;
+        Ok(Self { n, points })
     }
     /// The same dimensions and spreads.
     fn __eq__(&self, other: &Self) -> bool {
