@@ -101,5 +101,6 @@ def agreement(frames: int = 400) -> list[dict[str, object]]:
                 ours.append(np.concatenate([np.ravel(field.flow), np.ravel(np.swapaxes(field.jacobian, -1, -2))]))
             difference = np.abs(np.array(ours) - means[:, 6:]).max(axis=0)
             relative = float((difference / np.abs(means[:, 6:]).max(axis=0)).max())
-            rows.append({"form": form, "precision": dtype, "frames": frames, "largest_relative_difference": relative})
+            order = "motion first" if form == "fast" else "brightness first"
+            rows.append({"form": form, "reference_square_root": order, "precision": dtype, "frames": frames, "largest_relative_difference": relative})
     return rows

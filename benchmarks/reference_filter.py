@@ -133,8 +133,8 @@ class ReferenceFilter:
     """filterpy's unscented filter set up for one pixel: ``step(z)`` predicts and updates.
 
     ``augmented``: sigma points of the state with its process noise (24 dimensions, 49 points), else 12 dimensions and additive Q (25 points).
-    ``motion_first``: the square root that spreads the points takes the motion before the brightness (any square root is as good; the choice shows
-    while the filter settles).
+    ``motion_first``: the square root that spreads the points takes the motion before the brightness, as jacoflow's form "fast" does. Beyond
+    second order the points depend on it: with the patent's constants filterpy's own order, brightness first, follows the ramp more closely.
     """
 
     def __init__(self, settings: Settings, *, augmented: bool, motion_first: bool = False) -> None:

@@ -417,6 +417,10 @@ class FlowFilter:
     Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
     v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
     frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
+
+    `form` "fast" (13 sigma points) has the numbers of "non_augmented" (25) with `square_root="motion_first"`, not those of its default
+    "brightness_first", which is filterpy's order. With the profile "measured" they follow the patent's ramp equally well (rms error of u within
+    0.3 %); with "patent" use "augmented" or "non_augmented": the rms error of u is 0.063 px/frame there and 0.30 px/frame with "fast".
     """
     def __new__(
         cls,
@@ -424,6 +428,7 @@ class FlowFilter:
         profile: Literal["patent", "measured"] = "patent",
         form: Literal["augmented", "non_augmented", "fast", "extended"] | None = None,
         transition: Literal["rk4", "exact"] | None = None,
+        square_root: Literal["brightness_first", "motion_first"] | None = None,
         neighbourhood: tuple[int, int] | ArrayLike | None = None,
         neighbourhood_sigma: float | None = None,
         Q: ArrayLike | None = None,

@@ -6,8 +6,10 @@ use super::open::open_source;
 use super::progress::Bar;
 use super::report::{Report, print};
 use crate::error::{Error, Result};
+use crate::io::npz::NpzReader;
 use crate::io::{FlowImage, FrameSource, OpenOptions, read_flo, read_kitti, read_npz, read_pfm};
 use crate::parallel::Progress;
+use crate::temporal::SavedFilter;
 use crate::types::AnyFrame;
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -18,7 +20,7 @@ use std::path::Path;
 /// Options of `info`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Reads recordings (folder, images, .y4m, .npy, video) and results (.npz, .flo, .pfm, KITTI .png).\n\n\
+    after_help = "Reads recordings (folder, images, .y4m, .npy, video) results (.npz, .flo, .pfm, KITTI .png) and saved filters (.npz).\n\n\
     Examples:\n  \
     jacoflow info frames/\n  \
     jacoflow info out/000012.npz --json"
@@ -144,7 +146,23 @@ fn planes_info<'a>(
     })
 }
 
+/// A saved filter, if the archive holds one.
+fn filter_info(path: &Path) -> Result<Option<Value>> {
+    let saved = SavedFilter::describe(&mut NpzReader::open(path)?)?;
+    Ok(saved.map(|saved| {
+        let options: Value = serde_json::from_str(&saved.options).unwrap_or_default();
+        json!({
+            "command": "info", "kind": "filter state", "input": path, "format": "npz", "frames": saved.frames,
+            "width": saved.frame_size.0, "height": saved.frame_size.1, "dtype": saved.precision,
+            "form": options["form"], "transition": options["transition"], "repairs": saved.repairs, "options": options,
+        })
+    }))
+}
+
 fn npz_info(path: &Path) -> Result<Value> {
+    if let Some(info) = filter_info(path)? {
+        return Ok(info);
+    }
     let stored = read_npz::<f64>(path)?;
     let field = &stored.field;
     let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[]).to_vec()));
@@ -163,7 +181,7 @@ fn npz_info(path: &Path) -> Result<Value> {
 }
 
 /// Entries in the order in which people want to read them.
-const ORDER: [&str; 14] = [
+const ORDER: [&str; 17] = [
     "kind",
     "input",
     "format",
@@ -171,6 +189,9 @@ const ORDER: [&str; 14] = [
     "width",
     "height",
     "dtype",
+    "form",
+    "transition",
+    "repairs",
     "fps",
     "model",
     "frame_index",

@@ -12,4 +12,5 @@ mod persist;
 mod store;
 
 pub use flow_filter::FlowFilter;
-pub use options::{FilterForm, FlowFilterOptions, Transition};
+pub use options::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
+pub use persist::SavedFilter;

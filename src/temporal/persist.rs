@@ -6,7 +6,7 @@
 
 use super::flow_filter::FlowFilter;
 use super::kernel::{N, PACKED};
-use super::options::{FilterForm, FlowFilterOptions, Transition};
+use super::options::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use crate::error::{Error, Result};
 use crate::filter::SigmaPoints;
 use crate::io::Element;
@@ -40,6 +40,9 @@ struct SavedOptions {
     neighbourhood: SavedNeighbourhood,
     form: FilterForm,
     transition: Transition,
+    /// Absent in files of before there was a choice.
+    #[serde(default)]
+    square_root: Option<SquareRoot>,
     process_noise: [f64; N],
     measurement_noise: f64,
     initial_mean: [f64; N],
@@ -89,6 +92,7 @@ impl SavedOptions {
             neighbourhood,
             form: options.form,
             transition: options.transition,
+            square_root: options.square_root,
             process_noise: options.process_noise,
             measurement_noise: options.measurement_noise,
             initial_mean: options.initial_mean,
@@ -120,6 +124,7 @@ impl SavedOptions {
             neighbourhood,
             form: self.form,
             transition: self.transition,
+            square_root: self.square_root,
             process_noise: self.process_noise,
             measurement_noise: self.measurement_noise,
             initial_mean: self.initial_mean,
@@ -201,17 +206,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
     fn read_from<R: Read + Seek>(mut reader: NpzReader<R>) -> Result<Self> {
         let path = reader.path().to_path_buf();
         let wrong = |message: String| Error::format(&path, message);
-        let text = reader.text("header")?;
-        // The version is looked at before the rest, which another version may have changed.
-        let value: serde_json::Value =
-            serde_json::from_str(&text).map_err(|e| wrong(format!("the header is damaged: {e}")))?;
-        if value["format"] != FORMAT {
-            return Err(wrong(format!("expected a file of the kind '{FORMAT}', got {}", value["format"])));
-        }
-        if value["version"] != VERSION {
-            return Err(wrong(format!("expected version {VERSION} of the state, got {}", value["version"])));
-        }
-        let header: Header = serde_json::from_value(value).map_err(|e| wrong(format!("the header is damaged: {e}")))?;
+        let header = read_header(&mut reader)?;
         if header.precision != precision::<T>() {
             return Err(wrong(format!("expected a state in {}, got {}", precision::<T>(), header.precision)));
         }
@@ -249,6 +244,55 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         filter.frames = header.frames;
         filter.repairs = header.repairs;
         Ok(filter)
+    }
+}
+
+/// The header, if it is one of this version.
+fn read_header<R: Read + Seek>(reader: &mut NpzReader<R>) -> Result<Header> {
+    let path = reader.path().to_path_buf();
+    let wrong = |message: String| Error::format(&path, message);
+    let text = reader.text("header")?;
+    // The version is looked at before the rest, which another version may have changed.
+    let value: serde_json::Value =
+        serde_json::from_str(&text).map_err(|e| wrong(format!("the header is damaged: {e}")))?;
+    if value["format"] != FORMAT {
+        return Err(wrong(format!("expected a file of the kind '{FORMAT}', got {}", value["format"])));
+    }
+    if value["version"] != VERSION {
+        return Err(wrong(format!("expected version {VERSION} of the state, got {}", value["version"])));
+    }
+    serde_json::from_value(value).map_err(|e| wrong(format!("the header is damaged: {e}")))
+}
+
+/// What a saved filter is, without its states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavedFilter {
+    /// Its working precision: "float32" or "float64".
+    pub precision: String,
+    /// Size `(width, height)` of its frames.
+    pub frame_size: (usize, usize),
+    /// How many frames it has taken in.
+    pub frames: usize,
+    /// How often a covariance was mended.
+    pub repairs: u64,
+    /// The options in words and numbers, as JSON.
+    pub options: String,
+}
+
+impl SavedFilter {
+    /// Describes an archive that holds the state of a filter; `None` when it holds something else.
+    ///
+    /// # Errors
+    /// [`Error::Format`] when it is a damaged state or one of another version.
+    pub fn describe<R: Read + Seek>(reader: &mut NpzReader<R>) -> Result<Option<Self>> {
+        if !reader.contains("header") {
+            return Ok(None);
+        }
+        let header = read_header(reader)?;
+        let options =
+            serde_json::to_string(&header.options).map_err(|e| Error::Numerical(format!("state header: {e}")))?;
+        let Header { precision, frame_size, frames, repairs, .. } = header;
+        Ok(Some(Self { precision, frame_size, frames, repairs, options }))
     }
 }
 

@@ -199,6 +199,11 @@ fn info_reads_results() {
         assert!((mean - 0.3).abs() < 0.1, "{name}: {mean}");
         assert!(place.good(&format!("info {name}")).out.contains("mean"));
     }
+    place.good("filter s.npy -o fields --form fast --save-state state.npz");
+    let info = place.good("info state.npz --json").json();
+    assert_eq!((info["kind"].as_str(), info["frames"].as_u64()), (Some("filter state"), Some(3)));
+    assert_eq!((info["form"].as_str(), info["width"].as_u64()), (Some("fast"), Some(40)));
+    assert!(place.good("info state.npz").out.contains("filter state"));
 }
 
 #[test]

@@ -142,6 +142,35 @@ def test_a_saved_filter_is_taken_up_only_where_it_fits(frames, tmp_path):
         other.load(tmp_path / "bad.npz")
     with pytest.raises(FileNotFoundError):
         other.load(tmp_path / "none.npz")
+    good = (tmp_path / "state.npz").read_bytes()
+    for at in range(500, len(good), len(good) // 40):
+        damaged = bytearray(good)
+        damaged[at] ^= 0x11
+        (tmp_path / "damaged.npz").write_bytes(damaged)
+        try:
+            other.load(tmp_path / "damaged.npz")
+        except (jacoflow.FormatError, ValueError) as error:
+            assert "float64" not in str(error), "the state is of single precision"
+        else:
+            assert_array_equal(other.state, one.state)
+
+
+def test_fast_is_the_25_points_with_the_motion_first(frames):
+    options = {"precision": "float64", "points": [[12, 10], [20, 14]]}
+    fast, same, default = (
+        FlowFilter(form="fast", **options),
+        FlowFilter(form="non_augmented", square_root="motion_first", **options),
+        FlowFilter(form="non_augmented", **options),
+    )
+    for frame in frames:
+        for one in (fast, same, default):
+            one.push(frame)
+    np.testing.assert_allclose(fast.state, same.state, rtol=1e-8, atol=1e-8)
+    assert not np.allclose(fast.state, default.state, rtol=1e-8, atol=1e-8)
+    with pytest.raises(ValueError, match="square_root"):
+        FlowFilter(form="fast", square_root="brightness_first").push(frames[0])
+    with pytest.raises(ValueError, match="square_root"):
+        FlowFilter(square_root="upwards")
 
 
 def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):

@@ -3,7 +3,7 @@
 use super::method::{rectangle, word};
 use super::{parse_pair, parse_positive, parse_size};
 use crate::error::{Error, Result};
-use crate::temporal::{FilterForm, FlowFilterOptions, Transition};
+use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -15,12 +15,17 @@ pub struct FilterArguments {
     /// frames, unbiased divergence)
     #[arg(long, value_name = "NAME", default_value = "patent")]
     pub profile: String,
-    /// Prediction: augmented (49 sigma points), non-augmented (25), fast (13, the same numbers) or extended
+    /// Prediction: augmented (49 sigma points), non-augmented (25), fast (13: the numbers of the 25 with the motion first,
+    /// for the profile measured) or extended
     #[arg(long, value_name = "NAME")]
     pub form: Option<String>,
     /// State transition: rk4 or exact
     #[arg(long, value_name = "NAME")]
     pub transition: Option<String>,
+    /// Order of the square root that spreads the sigma points: brightness-first or motion-first [default: motion-first for the form
+    /// fast, which knows no other, else brightness-first]
+    #[arg(long, value_name = "NAME")]
+    pub square_root: Option<String>,
     /// Pixels of one measurement
     #[arg(long, value_name = "KxL", visible_alias = "neighborhood", value_parser = parse_size)]
     pub neighbourhood: Option<(usize, usize)>,
@@ -87,6 +92,7 @@ impl FilterArguments {
         if let Some(transition) = &self.transition {
             options.transition = Transition::parse(&word(transition))?;
         }
+        options.square_root = self.square_root.as_deref().map(|name| SquareRoot::parse(&word(name))).transpose()?;
         options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
         options.process_noise = self.process_noise.map_or(options.process_noise, |q| q.0);
         options.measurement_noise = self.measurement_noise.unwrap_or(options.measurement_noise);
@@ -107,6 +113,7 @@ impl FilterArguments {
         let given = [
             ("form", self.form.is_some()),
             ("transition", self.transition.is_some()),
+            ("square_root", self.square_root.is_some()),
             ("neighbourhood", self.neighbourhood.is_some()),
             ("process_noise", self.process_noise.is_some()),
             ("measurement_noise", self.measurement_noise.is_some()),
@@ -127,6 +134,7 @@ impl FilterArguments {
 pub fn describe_filter(options: &FlowFilterOptions) -> Value {
     json!({
         "method": "filter", "form": options.form.name(), "transition": options.transition.name(),
+        "square_root": options.square_root.map(SquareRoot::name),
         "neighbourhood": format!("{:?}", options.neighbourhood), "process_noise": options.process_noise,
         "measurement_noise": options.measurement_noise, "initial_mean": options.initial_mean,
         "initial_covariance": options.initial_covariance, "full_scale": options.full_scale,

@@ -5,7 +5,7 @@ use crate::filter::SigmaPoints;
 use crate::python::arrays;
 use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Integer, Object, Region};
-use crate::temporal::{FilterForm, FlowFilterOptions, Transition};
+use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use pyo3::prelude::*;
 
 /// Hands the options of the filter to `$then!`.
@@ -16,6 +16,7 @@ macro_rules! filter_options {
             profile: String as &str = "patent",
             form: Option<String> as Option<String> = None,
             transition: Option<String> as Option<String> = None,
+            square_root: Option<String> as Option<String> = None,
             neighbourhood: Object as Object = None,
             neighbourhood_sigma: Option<f64> as Option<f64> = None,
             Q: Object as Object = None,
@@ -73,6 +74,7 @@ impl Arguments {
             )?,
             form: self.form.as_deref().map_or(Ok(base.form), FilterForm::parse)?,
             transition: self.transition.as_deref().map_or(Ok(base.transition), Transition::parse)?,
+            square_root: self.square_root.as_deref().map(SquareRoot::parse).transpose()?,
             process_noise: twelve(py, "Q", &self.Q, base.process_noise)?,
             measurement_noise: self.R.unwrap_or(base.measurement_noise),
             initial_mean: twelve(py, "x0", &self.x0, base.initial_mean)?,

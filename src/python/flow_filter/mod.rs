@@ -8,12 +8,14 @@ use super::keywords::{constructor, with_common};
 use super::options::{self, Integer, Object, Precision, Region};
 use crate::error::Error;
 use crate::image::Preprocess;
+use crate::io::npz::NpzReader;
 use crate::simd::SimdReal;
-use crate::temporal::{FlowFilter as Core, FlowFilterOptions};
+use crate::temporal::{FlowFilter as Core, FlowFilterOptions, SavedFilter};
 use crate::types::{AnyFrame, Frame, Sample, Sites};
 use arguments::{Arguments, filter_options};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::io::{Cursor, Read, Seek};
 use std::path::PathBuf;
 
 /// The filters, once the first frame has told their number and precision.
@@ -39,6 +41,10 @@ macro_rules! each_engine {
 /// Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
 /// v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
 /// frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
+///
+/// `form` "fast" (13 sigma points) has the numbers of "non_augmented" (25) with `square_root="motion_first"`, not those of its default
+/// "brightness_first", which is filterpy's order. With the profile "measured" they follow the patent's ramp equally well (rms error of u within
+/// 0.3 %); with "patent" use "augmented" or "non_augmented": the rms error of u is 0.063 px/frame there and 0.30 px/frame with "fast".
 #[pyclass(module = "jacoflow")]
 pub struct FlowFilter {
     arguments: Arguments,
@@ -127,9 +133,12 @@ impl FlowFilter {
     ///
     /// FormatError for a damaged file, ValueError for a file of other options or another precision, OSError when it cannot be read.
     fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let engine = py.detach(|| match Core::<f32>::load(&path) {
-            Ok(core) => Ok(Engine::Single(core, "")),
-            Err(_) => Core::<f64>::load(&path).map(|core| Engine::Double(core, "")),
+        let engine = py.detach(|| {
+            if is_double(NpzReader::open(&path)?)? {
+                Core::<f64>::load(&path).map(|core| Engine::Double(core, ""))
+            } else {
+                Core::<f32>::load(&path).map(|core| Engine::Single(core, ""))
+            }
         })?;
         self.engine = self.resume(engine)?;
         Ok(())
@@ -228,6 +237,12 @@ impl FlowFilter {
     }
 }
 
+/// Whether a saved filter works in double precision.
+fn is_double<R: Read + Seek>(mut reader: NpzReader<R>) -> crate::Result<bool> {
+    let saved = SavedFilter::describe(&mut reader)?;
+    Ok(saved.is_some_and(|saved| saved.precision == "float64"))
+}
+
 /// The core's complaint in the words of this class.
 fn named(error: Error) -> Error {
     let names = [
@@ -267,9 +282,12 @@ pub fn restore_filter(py: Python<'_>, options: Arguments, state: Option<(Vec<u8>
     let mut filter = FlowFilter::from_arguments(py, options)?;
     if let Some((bytes, name)) = state {
         let dtype = options::known_dtype(&name)?;
-        let engine = py.detach(|| match Core::<f32>::from_bytes(&bytes) {
-            Ok(core) => Ok(Engine::Single(core, dtype)),
-            Err(_) => Core::<f64>::from_bytes(&bytes).map(|core| Engine::Double(core, dtype)),
+        let engine = py.detach(|| {
+            if is_double(NpzReader::new(Cursor::new(&bytes), "filter state")?)? {
+                Core::<f64>::from_bytes(&bytes).map(|core| Engine::Double(core, dtype))
+            } else {
+                Core::<f32>::from_bytes(&bytes).map(|core| Engine::Single(core, dtype))
+            }
         })?;
         filter.engine = filter.resume(engine)?;
     }

@@ -39,6 +39,8 @@ pub(super) struct Constants<T> {
     pub spread: T,
     /// `beta - alpha^2`: weight of the squared shift of the mean, beyond the points' own moments.
     pub shift: T,
+    /// Whether the square root takes the motion first.
+    pub motion_first: bool,
     /// Mean and covariance diagonal of a filter that starts.
     pub start: ([T; N], [T; N]),
 }
@@ -51,6 +53,7 @@ impl<T: SimdReal> Constants<T> {
             q: options.process_noise.map(T::from_f64),
             spread: T::from_f64(points.spread(n).sqrt()),
             shift: T::from_f64(points.beta - points.alpha * points.alpha),
+            motion_first: options.motion_first(),
             start: (options.initial_mean.map(T::from_f64), options.initial_covariance.map(T::from_f64)),
         }
     }

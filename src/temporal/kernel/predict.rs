@@ -55,14 +55,19 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let order = if FORM == FAST { &MOTION_FIRST } else { &BRIGHTNESS_FIRST };
+        let motion_first = FORM == FAST || (FORM != EXTENDED && self.constants.motion_first);
         let mut scratch = Scratch::<V>::new();
         for (block, repaired) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.repaired.chunks_exact_mut(BLOCK))
         {
             for at in (0..BLOCK).step_by(V::LANES) {
                 let mut lane = loop {
                     let lane = Lane::<V>::load(block, at);
-                    let bad = failed(factor(&lane.cov, order, &mut scratch.columns));
+                    let ok = if motion_first {
+                        factor(&lane.cov, &MOTION_FIRST, &mut scratch.columns)
+                    } else {
+                        factor(&lane.cov, &BRIGHTNESS_FIRST, &mut scratch.columns)
+                    };
+                    let bad = failed(ok);
                     if bad == 0 {
                         break lane;
                     }
