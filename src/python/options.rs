@@ -41,7 +41,7 @@ impl<'py> FromPyObject<'_, 'py> for Region {
         let wrong = || PyTypeError::new_err("region: expected four integers (x, y, width, height)");
         let items: Vec<Bound<'_, PyAny>> = object.try_iter().and_then(Iterator::collect).map_err(|_| wrong())?;
         let numbers: Vec<Integer> =
-            items.iter().map(|item| item.extract()).collect::<PyResult<_>>().map_err(|_| wrong())?;
+            items.iter().map(PyAnyMethods::extract).collect::<PyResult<_>>().map_err(|_| wrong())?;
         let [Integer(x), Integer(y), Integer(width), Integer(height)] = numbers[..] else { return Err(wrong()) };
         Ok(Self((x, y, width, height)))
     }

@@ -243,3 +243,19 @@ def test_a_field_is_true_and_a_stack_can_be_sliced():
     assert stack[1:][0].frame_index == 2
     with pytest.raises(IndexError, match="step 1"):
         stack[::2]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_pixel_without_data_damages_only_what_touches_it(method):
+    """No-data values of 1e9 and more are usual; a threshold taken from the whole frame would hide everything else."""
+    frames = moving_texture(width=96, height=96).astype(np.float32)
+    clean = jacoflow.estimate(list(frames), method=method)
+    frames[1, 50, 50] = 3e9
+    dirty = jacoflow.estimate(list(frames), method=method)
+    if method == "horn_schunck":
+        assert dirty.valid.mean() > 0.9
+        return
+    far = np.ones((96, 96), bool)
+    far[50 - 40 : 50 + 41, 50 - 40 : 50 + 41] = False
+    assert_array_equal(dirty.status[far], clean.status[far])
+    assert_array_equal(dirty.flow[far], clean.flow[far])

@@ -1,5 +1,6 @@
 //! The estimate itself: moments, normal equations, solution and status of every pixel of a strip of rows.
 
+use super::floor;
 use super::rows::Plan;
 use super::solve::{Deficient, ENTRIES, MomentRow, decompose, factor, normal_matrix, right_side};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
@@ -27,7 +28,7 @@ pub(super) struct Setting<T> {
     pub tolerance: f64,
     /// Least share of the window's weight.
     pub min_weight: f64,
-    /// Squared gradients below this are rounding noise.
+    /// Sums of squared gradients above this are more than rounding noise; below it the samples around tell.
     pub floor: f64,
     /// Instruction set.
     pub level: Level,
@@ -286,7 +287,12 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             }
             let quality = solved[6 * TILE_COLUMNS + c].to_f64();
             let largest = solved[7 * TILE_COLUMNS + c].to_f64();
-            let determined = quality >= setting.tolerance && largest > setting.floor;
+            let floor = if largest > setting.floor {
+                setting.floor
+            } else {
+                floor::about(&source.frames, (x, y), setting.window.radius(), source.reach)
+            };
+            let determined = quality >= setting.tolerance && largest > floor;
             if determined {
                 band.rank[out] = 6;
             } else {
@@ -299,7 +305,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                 MomentRow { data: &scratch.moments.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
             let n = normal_matrix::<T, T>(plan, &row, c);
             let right = right_side::<T, T>(plan, &row, c);
-            let Deficient { rank, solution, condition } = decompose(&n, &right, setting.tolerance, setting.floor);
+            let Deficient { rank, solution, condition } = decompose(&n, &right, setting.tolerance, floor);
             if let Some(plane) = &mut band.condition {
                 plane[out] = T::from_f64(condition);
             }

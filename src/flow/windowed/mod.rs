@@ -43,6 +43,7 @@ mod covariance;
 mod covariance_kernels;
 mod detail;
 mod estimate;
+mod floor;
 mod misfit;
 mod noise;
 mod options;

@@ -4,6 +4,7 @@ use super::combine::Combination;
 use super::covariance::NoiseSetting;
 use super::detail::{self, Detail};
 use super::estimate::{Setting, Strip};
+use super::floor;
 use super::misfit::Truncation;
 use super::noise::{PixelNoise, smoothing_weights};
 use super::options::WindowedOptions;
@@ -15,7 +16,6 @@ use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
 use crate::image::GaussianSmoother;
 use crate::jet::{JetRows, JetStencil};
-use crate::math::Real;
 use crate::parallel::BAND_ROWS;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, Sites};
@@ -162,7 +162,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             policy: options.rank_deficient,
             tolerance: options.rank_tolerance,
             min_weight: options.min_weight,
-            floor: rounding_floor(&frames),
+            floor: floor::of_frames(frames.iter().map(AsRef::as_ref)),
             level: common.level(),
             inverse: common.covariance,
             diagnostics: common.diagnostics,
@@ -360,28 +360,4 @@ fn cut<S: Copy>(frame: &Frame<S>, part: Rect) -> Cow<'_, Frame<S>> {
         return Cow::Borrowed(frame);
     }
     Cow::Owned(Frame::from_fn(part.width, part.height, |x, y| frame.get(part.x + x, part.y + y)))
-}
-
-/// Sums of squared gradients below this are what rounding alone leaves of a constant image.
-fn rounding_floor<T: Real>(frames: &[Cow<'_, Frame<T>>]) -> f64 {
-    let epsilon = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
-    let largest = frames.iter().map(|f| largest_magnitude(f.data())).fold(0.0, f64::max);
-    (8.0 * epsilon * largest).powi(2)
-}
-
-/// Largest finite magnitude.
-fn largest_magnitude<T: Real>(data: &[T]) -> f64 {
-    let mut largest = [T::default(); 16];
-    let mut chunks = data.chunks_exact(16);
-    for chunk in &mut chunks {
-        for (most, v) in largest.iter_mut().zip(chunk) {
-            let magnitude = if *v < T::default() { -*v } else { *v };
-            *most = if magnitude > *most { magnitude } else { *most };
-        }
-    }
-    let most = largest.iter().chain(chunks.remainder()).map(|v| v.to_f64().abs()).fold(0.0, f64::max);
-    if most.is_finite() {
-        return most;
-    }
-    data.iter().map(|v| v.to_f64().abs()).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }

@@ -198,6 +198,7 @@ impl FlowField {
     }
 
     /// True, whatever it holds: a field is there. (An estimator that has none yet returns None.)
+    #[allow(clippy::unused_self, reason = "Python's signature")]
     fn __bool__(&self) -> bool {
         true
     }
@@ -210,7 +211,7 @@ impl FlowField {
             if range.step != 1 {
                 return Err(PyIndexError::new_err(format!("a slice of a stack: expected step 1, got {}", range.step)));
             }
-            let (first, length) = (range.start as usize, range.slicelength as usize);
+            let (first, length) = (range.start as usize, range.slicelength);
             return Ok(Self { store: self.store.clone(), start: self.start + first, count: length, stack: true });
         }
         let index: isize = index.extract()?;
