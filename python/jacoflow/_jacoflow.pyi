@@ -522,7 +522,8 @@ class GaussianFilter:
 
     Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B` they are
     (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or changed in place; a number given
-    for P, Q or R means that multiple of the identity. Units are the state's and the measurement's own.
+    for P, Q or R means that multiple of the identity. ValueError for an x that is not finite and for a P, Q or R that is not finite, symmetric
+    and positive semi-definite, when it is set or, changed in place, at the next step. Units are the state's and the measurement's own.
     """
     @property
     def x(self) -> NDArray[np.float64]:
