@@ -9,19 +9,23 @@
 //! `w2 + t2` at q times a kernel of variance `a t2` about `a q`, `a = w2 / (w2 + t2)`. So h is smoothed by `a t2` instead of t2, samples count at the place
 //! `a q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The stencil's few pixels are taken to be one place.
 //!
-//! Two things draw the estimate away from the truth in a known direction: noise in the coefficients towards zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own
-//! `E[dA^T dA]`, and truncation ([`super::misfit`]). Neither is subtracted; the outer product of their sum is added, so that the covariance is that of the whole error.
+//! Three things draw the estimate away from the truth in a known direction: noise in the coefficients towards zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own
+//! `E[dA^T dA]`; truncation ([`super::misfit`]); and flow that is not affine in the window ([`super::misfit_planes`]). None is subtracted; the outer product of the first two's sum
+//! is added and that of the third, so that the covariance is that of the whole error.
 //!
 //! Unless the noise is given, its variance is read from the highest frequencies of the frames ([`super::detail`]), where motion and misfit hardly show. The residual gives
-//! another, its sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more than [`CHANCE`]
-//! times that, and where the residual is that much larger than noise and truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
+//! another, its sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more than what chance allows
+//! beyond that, and where the residual is that much larger than noise and truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
 
-use super::covariance_kernels::{Outer, Pass, Sandwich, Scatter, Weigh};
+use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
 use super::detail::Detail;
 use super::estimate::Strip;
-use super::misfit::{self, Ring, Truncation};
+use super::hidden;
+use super::misfit::Truncation;
+use super::misfit_planes::{self as misfit, Ring};
 use super::noise::PixelNoise;
 use super::rows::Plan;
+use super::sandwich::Sandwich;
 use super::solve::{ENTRIES, MomentRow};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
 use super::window::Window;
@@ -80,7 +84,7 @@ impl<T: SimdReal> NoiseSetting<T> {
 
     /// How far beyond a site estimates of the motion are used, px.
     pub fn margin(&self) -> usize {
-        (self.squared.radius() + self.smoothing.radius() + self.reach).max(self.window.radius())
+        (self.squared.radius() + self.smoothing.radius() + self.reach).max(self.window.radius() + 1)
     }
 
     /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with the margin around them
@@ -156,19 +160,14 @@ impl<T: SimdReal> Scratch<T> {
     }
 }
 
-/// Fixed-point steps towards the true motion in the pull of the noise.
-pub(super) const PULL_STEPS: usize = 3;
 /// Rows of `Scratch::pixel`.
-const PIXEL: usize = PIXEL_RESULT + ENTRIES;
+const PIXEL: usize = PIXEL_SHARE + 2;
+/// Where the noise's share of the equations stands, and the variance of the noise.
+pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
 /// Where the result begins among them.
-pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 6 + 3;
-/// Where the misfit's score begins: six entries, its energy, the energy of the detail and the weight of the pixels that have detail.
+pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 12 + 3;
+/// Where the misfit's scores begin: six entries of the truncation's, six of the flow's, the truncation's energy, the energy of the detail and the weight of the pixels that have detail.
 pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
-/// The truncation is known to leading order; only a residual beyond so many times its energy is laid to anything else.
-pub(super) const MISFIT_SLACK: f64 = 2.0;
-/// Two estimates of the noise from one window may differ by so much by chance.
-pub(super) const CHANCE: f64 = 1.5;
-
 /// The covariance of a band of rows.
 struct BandTask<'a, 'b, T> {
     setting: &'a NoiseSetting<T>,
@@ -327,6 +326,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
         dispatch(setting.level, Sandwich { setting, row, pixel });
         let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
+        hidden::widen_row(&setting.pixel, setting.scale, pixel, count);
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
             let source = (PIXEL_RESULT + k) * TILE_COLUMNS;
@@ -362,14 +362,15 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         // With u = u0 + x u_x + y u_y the entry of u_x is that of u times x, and its own.
         let Scratch { misfit_sums, pixel, .. } = &mut **scratch;
         let moment = |k: usize| &misfit_sums.data[(k * GROUP_ROWS + g) * TILE_COLUMNS..][..TILE_COLUMNS];
-        for i in 0..6 {
-            let target = &mut pixel[(PIXEL_MISFIT + i) * TILE_COLUMNS..][..TILE_COLUMNS];
-            target.copy_from_slice(moment(3 * (i % 2) + i / 2));
+        for p in 0..12 {
+            let (first, i) = (p / 6 * misfit::SCORE, p % 6);
+            let target = &mut pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS];
+            target.copy_from_slice(moment(first + 3 * (i % 2) + i / 2));
             if i > 1 {
-                target.iter_mut().zip(moment(4 + i)).for_each(|(sum, own)| *sum += *own);
+                target.iter_mut().zip(moment(first + 4 + i)).for_each(|(sum, own)| *sum += *own);
             }
         }
-        for p in 6..misfit::PLANES + if detail.is_some() { 2 } else { 0 } {
+        for p in 12..misfit::PLANES + if detail.is_some() { 2 } else { 0 } {
             pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS].copy_from_slice(moment(misfit::place(p).1));
         }
     }

@@ -1,10 +1,10 @@
 //! The steps of the covariance, each a kernel over one row of a tile.
 
-use super::covariance::{CHANCE, MISFIT_SLACK, NoiseSetting, PIXEL_MISFIT, PIXEL_RESULT, PULL_STEPS};
-use super::noise::{PixelNoise, columns, pulled_back};
+use super::covariance::NoiseSetting;
+use super::noise::{columns, pulled_back};
 use super::rows::Plan;
-use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
-use super::tile::{JetTile, Planes, TILE_COLUMNS};
+use super::solve::{ENTRIES, upper};
+use super::tile::{JetTile, Planes};
 use super::window::filter;
 use crate::simd::{Kernel, Lanes, SimdReal};
 
@@ -117,86 +117,6 @@ impl<T: SimdReal, const UNKNOWNS: usize> Kernel<T> for Outer<'_, T, UNKNOWNS> {
     }
 }
 
-/// `s2 N^-1 S N^-1` and the pull, for one row of a tile.
-pub(super) struct Sandwich<'a, T> {
-    pub setting: &'a NoiseSetting<T>,
-    pub row: MomentRow<'a, T>,
-    pub pixel: &'a mut [T],
-}
-
-impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { setting, row, pixel } = self;
-        let (noise, plan) = (&setting.pixel, setting.plan());
-        let mut c = 0;
-        while c < TILE_COLUMNS {
-            let at = |k: usize| V::load(&pixel[k * TILE_COLUMNS + c..]);
-            let inverse: [V; ENTRIES] = std::array::from_fn(at);
-            let m: [V; 6] = std::array::from_fn(|k| at(ENTRIES + k));
-            let (residual, weight) = (at(ENTRIES + 6), at(ENTRIES + 7));
-            let ones: [V; 6] = std::array::from_fn(|k| at(ENTRIES + 8 + k));
-            let misfit: [V; 6] = std::array::from_fn(|k| at(PIXEL_MISFIT + k));
-            let score = normal_matrix::<V, T>(plan, &row, c);
-            // B = N^-1 S, then B N^-1.
-            let mut b = [[V::zero(); 6]; 6];
-            let mut trace = V::zero();
-            for i in 0..6 {
-                for k in 0..6 {
-                    let mut sum = V::zero();
-                    for l in 0..6 {
-                        sum = symmetric(&inverse, i, l).mul_add(symmetric(&score, l, k), sum);
-                    }
-                    b[i][k] = sum;
-                }
-                trace = trace + b[i][i];
-            }
-            let variance = if let Some(v) = setting.variance {
-                V::constant(v)
-            } else {
-                let expected = one_pixel::<V>(noise, &m) * weight;
-                let left = (expected - trace).max(expected * V::constant(0.05));
-                let [truncated, energy, known] = std::array::from_fn(|k| at(PIXEL_MISFIT + 6 + k));
-                let whole = residual / left;
-                let fine = energy / (known * V::constant(setting.detail_gain));
-                let chance = V::constant(CHANCE);
-                let unexplained = (residual - truncated * V::constant(MISFIT_SLACK)) / (left * chance);
-                let enough = (weight * V::constant(0.5)).lt(known);
-                V::select(enough, (whole * chance).min(fine.max(unexplained)), whole)
-            };
-            // The pull acts on the true motion, which is what is left after undoing it.
-            let mut shift = [V::zero(); 6];
-            for _ in 0..PULL_STEPS {
-                let whole: [V; 6] = std::array::from_fn(|k| m[k] + shift[k]);
-                let pull = pull::<V>(noise, &ones, &whole);
-                let pull: [V; 6] = std::array::from_fn(|k| pull[k].mul_add(variance, misfit[k]));
-                for i in 0..6 {
-                    let mut sum = V::zero();
-                    for k in 0..6 {
-                        sum = symmetric(&inverse, i, k).mul_add(pull[k], sum);
-                    }
-                    shift[i] = sum;
-                }
-            }
-            for i in 0..6 {
-                for k in i..6 {
-                    let mut sum = V::zero();
-                    for l in 0..6 {
-                        sum = b[i][l].mul_add(symmetric(&inverse, l, k), sum);
-                    }
-                    let whole = sum.mul_add(variance, shift[i] * shift[k]);
-                    let unit = (if i < 2 { 1.0 } else { setting.scale }) * if k < 2 { 1.0 } else { setting.scale };
-                    let target = (PIXEL_RESULT + upper(i, k)) * TILE_COLUMNS + c;
-                    (whole * V::constant(unit)).store(&mut pixel[target..]);
-                }
-            }
-            c += V::LANES;
-        }
-    }
-}
-
 /// Adds the adjoint stencil of one row of weights to the planes: `h(p + o) += sum_j L_j(o) d_j(p)`.
 pub(super) struct Scatter<'a, T> {
     pub taps: &'a [((isize, isize), [T; 6])],
@@ -237,54 +157,4 @@ impl<T: SimdReal> Kernel<T> for Scatter<'_, T> {
             }
         }
     }
-}
-
-/// Entry (i, j) of a symmetric matrix kept as its upper triangle.
-#[inline(always)]
-fn symmetric<V: Lanes>(list: &[V; ENTRIES], i: usize, j: usize) -> V {
-    list[if i <= j { upper(i, j) } else { upper(j, i) }]
-}
-
-/// Expected squared residual of one pixel for unit noise, `k + 2 l . m + m^T Q m`.
-#[inline(always)]
-fn one_pixel<V: Lanes>(noise: &PixelNoise, m: &[V; 6]) -> V {
-    let mut sum = V::constant(noise.constant);
-    for i in 0..6 {
-        let mut inner = V::constant(2.0 * noise.linear[i]);
-        for j in 0..6 {
-            let q = noise.quadratic[if i <= j { upper(i, j) } else { upper(j, i) }];
-            inner = m[j].mul_add(V::constant(q), inner);
-        }
-        sum = m[i].mul_add(inner, sum);
-    }
-    sum
-}
-
-/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, Q being [`PixelNoise::pull`]: minus the pull of unit noise on the score.
-#[inline(always)]
-fn pull<V: Lanes>(noise: &PixelNoise, ones: &[V; 6], m: &[V; 6]) -> [V; 6] {
-    const POWER: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-    let q = |i: usize, j: usize| V::constant(noise.pull[i][j]);
-    std::array::from_fn(|i| {
-        let (k, c) = (i / 2, i % 2);
-        let mut sum = V::constant(noise.linear[c]) * ones[k];
-        if k > 0 {
-            sum = sum + V::constant(noise.linear[i]) * ones[0];
-        }
-        for j in 0..6 {
-            let (l, d) = (j / 2, j % 2);
-            let mut entry = q(c, d) * ones[POWER[k][l]];
-            if l > 0 {
-                entry = q(c, j).mul_add(ones[k], entry);
-            }
-            if k > 0 {
-                entry = q(i, d).mul_add(ones[l], entry);
-            }
-            if k > 0 && l > 0 {
-                entry = q(i, j).mul_add(ones[0], entry);
-            }
-            sum = entry.mul_add(m[j], sum);
-        }
-        sum
-    })
 }

@@ -7,17 +7,15 @@
 //! Windows sum it as `sum w T^T P^T r`; `N^-1` of that is minus the bias of the estimate.
 
 use super::combine::Combination;
-use super::estimate::Strip;
-use super::noise::{basis, columns};
-use super::tile::{JetTile, Planes, Source};
+use super::noise::basis;
 use crate::jet::{JetStencil, TimeScheme};
-use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::simd::Lanes;
 
 /// The derivatives that residuals are made of, as powers of d_x and d_y: third, fourth, second.
 const POWERS: [(usize, usize); 12] =
     [(3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4), (2, 0), (1, 1), (0, 2)];
 /// Which component of the jet each of them is taken from, and the axis (0: x, 1: y) of the difference, first for third and second for fourth derivatives.
-const DIFFERENCED: [(usize, usize); 12] =
+pub(super) const DIFFERENCED: [(usize, usize); 12] =
     [(3, 0), (3, 1), (5, 0), (5, 1), (3, 0), (4, 0), (3, 1), (4, 1), (5, 1), (3, 0), (4, 0), (5, 0)];
 /// How many derivatives there are.
 pub(super) const DERIVATIVES: usize = POWERS.len();
@@ -31,6 +29,8 @@ pub(super) struct Truncation {
     terms: [Vec<(usize, usize, f64)>; 6],
     /// Errors of the differences in time for rows 1-6 and 7-12: of the second and of the third derivative.
     time: [[f64; 2]; 2],
+    /// Variance of the smoothing, px^2.
+    pub smoothing: f64,
 }
 
 impl Truncation {
@@ -46,7 +46,8 @@ impl Truncation {
                 }
             }
         }
-        smoothed(smooth.map_or(0.0, |s| s * s), &mut rows);
+        let smoothing = smooth.map_or(0.0, |s| s * s);
+        smoothed(smoothing, &mut rows);
         let terms = std::array::from_fn(|k| {
             let every = (0..DERIVATIVES).flat_map(|d| (0..6).map(move |a| (d, a)));
             every.map(|(d, a)| (d, a, rows[k][a][d])).filter(|t| t.2.abs() > 1e-12).collect()
@@ -57,7 +58,7 @@ impl Truncation {
             Combination::Triple(TimeScheme::Central) => [[0.0, 1.0 / 6.0], [0.0, 1.0 / 12.0 - 1.0 / 6.0]],
             Combination::Triple(TimeScheme::Backward) => [[-0.5, 1.0 / 6.0], [-0.5, 7.0 / 12.0 - 1.0 / 6.0]],
         };
-        Self { rows, terms, time }
+        Self { rows, terms, time, smoothing }
     }
 
     /// Offsets and weights with which derivative d is taken from the image.
@@ -113,161 +114,9 @@ fn smoothed(variance: f64, rows: &mut [[[f64; DERIVATIVES]; 6]; 6]) {
     }
 }
 
-/// Planes of a tile: `P^T r` for the six unknowns, then `r^T r`.
-pub(super) const PLANES: usize = 7;
-/// Highest power of an offset for plane p, and where its moments begin: three each of the flow's two planes, one each of the others.
-pub(super) const fn place(p: usize) -> (usize, usize) {
-    if p < 2 { (1, 3 * p) } else { (0, 4 + p) }
-}
-
-/// Rows of the ring for one row of pixels: the coefficients' jet, that of the first difference, and the usable pixels.
-const SLOT: usize = 13;
-
-/// Rows of jets that differences are taken of.
-pub(super) struct Ring<T> {
-    /// Three times two jets and the usable pixels.
-    rows: Vec<T>,
-    motion: Vec<T>,
-}
-
-impl<T: SimdReal> Ring<T> {
-    pub fn new() -> Self {
-        Self { rows: Vec::new(), motion: Vec::new() }
-    }
-
-    /// Fills the first [`PLANES`] of `planes`, whose corner lies at pixel `corner`, for `rows` equations a pixel.
-    pub fn fill(
-        &mut self,
-        (level, rows): (Level, usize),
-        truncation: &Truncation,
-        (source, strip): (&Source<'_, T>, &Strip<T>),
-        jets: &mut JetTile<T>,
-        (corner, scale): ((isize, isize), f64),
-        planes: &mut Planes<T>,
-    ) {
-        let wide = super::tile::padded(planes.width + 2);
-        jets.load(source, (corner.0 - 1, corner.1 - 1), wide, planes.height + 2);
-        self.rows.resize(3 * SLOT * wide, T::default());
-        self.motion.resize(6 * planes.width, T::default());
-        for r in 0..planes.height + 2 {
-            jets.row(level, source, r);
-            let slot = &mut self.rows[r % 3 * SLOT * wide..(r % 3 + 1) * SLOT * wide];
-            dispatch(level, Keep { jets, wide, slot });
-            if r < 2 {
-                continue;
-            }
-            strip.motion_row(corner.0, corner.1 + r as isize - 2, scale, &mut self.motion);
-            let around: [&[T]; 3] = std::array::from_fn(|k| {
-                let slot = (r + 1 + k) % 3;
-                &self.rows[slot * SLOT * wide..(slot + 1) * SLOT * wide]
-            });
-            let row = Row { truncation, around, wide, motion: &self.motion, planes, at: r - 2, scale };
-            match rows {
-                1 => dispatch(level, Residual::<T, 1, 1>(row)),
-                3 => dispatch(level, Residual::<T, 3, 1>(row)),
-                6 => dispatch(level, Residual::<T, 6, 1>(row)),
-                _ => dispatch(level, Residual::<T, 6, 2>(row)),
-            }
-        }
-    }
-}
-
-/// Copies the jets of a row and which of its pixels are usable.
-struct Keep<'a, T> {
-    jets: &'a JetTile<T>,
-    wide: usize,
-    slot: &'a mut [T],
-}
-
-impl<T: SimdReal> Kernel<T> for Keep<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { jets, wide, slot } = self;
-        let mut c = 0;
-        while c < wide {
-            let j = jets.jets::<V>(c, false);
-            for (k, value) in j.coefficient.into_iter().chain(j.first).enumerate() {
-                value.store(&mut slot[k * wide + c..]);
-            }
-            c += V::LANES;
-        }
-        slot[12 * wide..13 * wide].copy_from_slice(jets.weight());
-    }
-}
-
-/// One row of a tile.
-struct Row<'a, T> {
-    truncation: &'a Truncation,
-    around: [&'a [T]; 3],
-    wide: usize,
-    motion: &'a [T],
-    planes: &'a mut Planes<T>,
-    at: usize,
-    scale: f64,
-}
-
-/// The residual of the first `BLOCK` rows (1, 3 or 6) of `BLOCKS` blocks, and its products with P.
-struct Residual<'a, T, const BLOCK: usize, const BLOCKS: usize>(Row<'a, T>);
-
-impl<T: SimdReal, const BLOCK: usize, const BLOCKS: usize> Kernel<T> for Residual<'_, T, BLOCK, BLOCKS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Row { truncation, around, wide, motion, planes, at: row, scale } = self.0;
-        let mut c = 0;
-        while c < planes.width {
-            // Row k of the ring at the offset (x, y).
-            let at = |k: usize, x: isize, y: isize| {
-                V::load(&around[(y + 1) as usize][k * wide + (c as isize + 1 + x) as usize..])
-            };
-            let m: [V; 6] = std::array::from_fn(|k| V::load(&motion[k * planes.width + c..]));
-            // Differences need all neighbours.
-            let mut least = at(12, 0, 0);
-            for y in -1..=1 {
-                for x in -1..=1 {
-                    least = least.min(at(12, x, y));
-                }
-            }
-            let usable = V::zero().lt(least);
-            let (mut products, mut energy) = ([V::zero(); 6], V::zero());
-            for block in 0..BLOCKS {
-                let jet: [V; 6] = std::array::from_fn(|k| at(6 * block + k, 0, 0));
-                let derivatives: [V; DERIVATIVES] = std::array::from_fn(|d| {
-                    let (k, axis) = DIFFERENCED[d];
-                    if d >= 9 {
-                        return jet[k];
-                    }
-                    let (x, y) = if axis == 0 { (1, 0) } else { (0, 1) };
-                    let (before, after) = (at(6 * block + k, -x, -y), at(6 * block + k, x, y));
-                    if d < 4 { (after - before) * V::constant(0.5) } else { after + before - (jet[k] + jet[k]) }
-                });
-                let mut r = residual::<V, BLOCK>(truncation, block, &m, &jet, &derivatives);
-                let p = columns::<V, BLOCK>(&jet);
-                for (k, r) in r.iter_mut().enumerate() {
-                    *r = V::select(usable, *r, V::zero());
-                    energy = r.mul_add(*r, energy);
-                    for (product, column) in products.iter_mut().zip(&p) {
-                        *product = column[k].mul_add(*r, *product);
-                    }
-                }
-            }
-            for (a, product) in products.into_iter().enumerate() {
-                let place = planes.at(a, row, c);
-                (product * V::constant(if a < 2 { 1.0 } else { scale })).store(&mut planes.data[place..]);
-            }
-            let place = planes.at(6, row, c);
-            energy.store(&mut planes.data[place..]);
-            c += V::LANES;
-        }
-    }
-}
-
 /// What the motion m leaves in rows 1 to `BLOCK` of a block whose matrix is made of this jet.
 #[inline(always)]
-fn residual<V: Lanes, const BLOCK: usize>(
+pub(super) fn residual<V: Lanes, const BLOCK: usize>(
     truncation: &Truncation,
     block: usize,
     m: &[V; 6],
@@ -307,6 +156,7 @@ fn residual<V: Lanes, const BLOCK: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::noise::columns;
     use super::*;
     use crate::image::GaussianSmoother;
     use crate::jet::Neighbourhood;
