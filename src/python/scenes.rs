@@ -2,10 +2,12 @@
 
 use super::arrays::{self, ColourRule};
 use super::field::FlowField;
+use super::options::Integer;
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::synth::registry::{CARRIERS, Parameter, SCENES};
 use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, truth};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -78,10 +80,17 @@ impl Scene {
 
     /// Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
     #[pyo3(signature = (count, start=0.0))]
-    fn frames<'py>(&self, py: Python<'py>, count: usize, start: f64) -> PyResult<Bound<'py, PyAny>> {
+    fn frames<'py>(&self, py: Python<'py>, count: Integer, start: f64) -> PyResult<Bound<'py, PyAny>> {
+        let wrong = |_| Error::argument("count", "zero or a positive integer", count.0);
+        let count = usize::try_from(count.0).map_err(wrong)?;
         let (width, height) = self.core.size();
         let threads = Threads::new(None)?;
         let mut data = Vec::new();
+        let values = count.checked_mul(width * height);
+        if values.is_none_or(|n| data.try_reserve_exact(n).is_err()) {
+            let message = format!("count: no memory for {count} frames of {width} x {height} float64");
+            return Err(PyMemoryError::new_err(message));
+        }
         for index in 0..count {
             py.check_signals()?;
             let frame = py.detach(|| threads.install(|| self.core.frame(start + index as f64)));

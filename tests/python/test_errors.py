@@ -261,3 +261,13 @@ def test_options_are_named_as_the_user_wrote_them():
     field = jacoflow.estimate(frames)[0]
     with pytest.raises(ValueError, match="^region: "):
         field.region_mean("curl", (0, 0, 600, 5))
+
+
+def test_frames_beyond_memory_are_refused():
+    scene = jacoflow.scenes.Scene("affine", width=64, height=48)
+    for count in (10**12, 10**30):
+        with pytest.raises(MemoryError, match="^count: "):
+            scene.frames(count)
+    with pytest.raises(ValueError, match="^count: "):
+        scene.frames(-1)
+    assert scene.frames(0).shape == (0, 48, 64)
