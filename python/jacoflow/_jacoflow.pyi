@@ -203,10 +203,10 @@ class FlowField:
         region: _Rectangle | None = None,
         aggregate: Literal["inverse_variance", "median"] | None = None,
     ) -> tuple[float, float, int]:
-        """One number for a region: (value, standard deviation, number of sites) of the derived quantity `name`, in its unit.
+        """One number for a region: (value, standard deviation, number of sites) of the parameter or derived quantity `name`, in its unit.
 
         `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-        The standard deviation allows for the correlation of neighbouring estimates. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        The standard deviation allows for the correlation of neighbouring estimates, and for an error that they have in common: what they claim and do not scatter. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
         """
     def unit(self, /, name: str) -> str:
         """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name."""

@@ -8,6 +8,6 @@ mod region_motion;
 mod sharing;
 
 pub use quantity::{Quantity, value_and_std};
-pub use region::{Aggregate, Mean, plane, planes, region_mean};
+pub use region::{Aggregate, Mean, parameter_mean, plane, planes, region_mean};
 pub use region_motion::{RegionMotion, fit_region};
 pub use sharing::sharing;

@@ -1,6 +1,6 @@
 //! Derived quantities over a field, and their mean over a region.
 
-use super::sharing::sharing_among;
+use super::sharing::{in_common, sharing_among};
 use super::{Quantity, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::Real;
@@ -22,7 +22,8 @@ pub enum Aggregate {
 pub struct Mean {
     /// The value; NaN when no site has one.
     pub value: f64,
-    /// Its standard deviation, with the correlation of neighbouring estimates ([`sharing`](super::sharing())); at least what their scatter shows.
+    /// Its standard deviation, with the correlation of neighbouring estimates ([`sharing`](super::sharing())): at least what their scatter shows, and with [`Aggregate::InverseVariance`] what
+    /// they claim and do not scatter, which they must have in common.
     pub std: f64,
     /// Sites that took part.
     pub count: usize,
@@ -88,6 +89,32 @@ pub fn region_mean<T: Real>(
     aggregate: Aggregate,
 ) -> Result<Mean> {
     check(field, quantity)?;
+    mean_of(field, (region, aggregate), |index| at_site(field, quantity, index))
+}
+
+/// One value of the parameter `name` (u, v, u_x, ...) for the sites inside `region`, as [`region_mean`].
+///
+/// # Errors
+/// As [`region_mean`]; [`Error::Argument`] naming `name` for a parameter that the field does not have.
+pub fn parameter_mean<T: Real>(
+    field: &FlowField<T>,
+    name: &str,
+    region: Option<Rect>,
+    aggregate: Aggregate,
+) -> Result<Mean> {
+    let Some(plane) = field.plane(name) else {
+        return Err(Error::argument("name", format!("one of {}", field.layout.parameters.join(", ")), name));
+    };
+    let std = field.standard_deviation(name);
+    mean_of(field, (region, aggregate), |index| (plane[index].to_f64(), std.as_ref().map(|std| std[index].to_f64())))
+}
+
+/// The mean of a value with its standard deviation.
+fn mean_of<T: Real>(
+    field: &FlowField<T>,
+    (region, aggregate): (Option<Rect>, Aggregate),
+    at: impl Fn(usize) -> (f64, Option<f64>),
+) -> Result<Mean> {
     if aggregate == Aggregate::InverseVariance && field.covariance.is_none() {
         return Err(Error::argument(
             "aggregate",
@@ -106,17 +133,17 @@ pub fn region_mean<T: Real>(
     let (used, sites): (Vec<usize>, Vec<(f64, Option<f64>)>) = (0..field.len())
         .filter(inside)
         .filter(known)
-        .map(|index| (index, at_site(field, quantity, index)))
+        .map(|index| (index, at(index)))
         .filter(|(_, (value, _))| value.is_finite())
         .unzip();
-    let mean = match aggregate {
-        Aggregate::InverseVariance => weighted(&sites),
-        Aggregate::Median => median_of(sites.into_iter().map(|s| s.0).collect()),
-    };
-    Ok(Mean { std: mean.std * sharing_among(&field.layout, field.width, &used).sqrt(), ..mean })
+    let sharing = sharing_among(&field.layout, field.width, &used);
+    Ok(match aggregate {
+        Aggregate::InverseVariance => weighted(&sites, sharing),
+        Aggregate::Median => median_of(sites.into_iter().map(|s| s.0).collect(), sharing),
+    })
 }
 
-fn weighted(sites: &[(f64, Option<f64>)]) -> Mean {
+fn weighted(sites: &[(f64, Option<f64>)], sharing: f64) -> Mean {
     let known: Vec<(f64, f64)> =
         sites.iter().filter_map(|&(v, s)| s.filter(|s| s.is_finite()).map(|s| (v, s * s))).collect();
     // Estimates that claim no error at all (exact data) outweigh the rest and share the weight equally.
@@ -128,11 +155,14 @@ fn weighted(sites: &[(f64, Option<f64>)]) -> Mean {
     let scatter: f64 = used.iter().map(|k| (k.0 - value).powi(2) / k.1).sum();
     // The larger of the claimed and the observed spread (Birge 1932).
     let ratio = if used.len() > 1 { scatter / (used.len() - 1) as f64 } else { 1.0 };
+    let common = if all_exact { 0.0 } else { in_common(ratio, (used.len(), 1), sharing) };
     let ratio = if all_exact { ratio } else { ratio.max(1.0) };
-    Mean { value, std: (ratio / weight).sqrt(), count: used.len() }
+    // What all have in common does not shrink with their number.
+    let variance = (sharing * ratio * (1.0 - common) + common * used.len() as f64) / weight;
+    Mean { value, std: variance.sqrt(), count: used.len() }
 }
 
-fn median_of(mut values: Vec<f64>) -> Mean {
+fn median_of(mut values: Vec<f64>, sharing: f64) -> Mean {
     let count = values.len();
     if count == 0 {
         return Mean { value: f64::NAN, std: f64::NAN, count };
@@ -140,7 +170,7 @@ fn median_of(mut values: Vec<f64>) -> Mean {
     let value = median(&mut values);
     let mut deviations: Vec<f64> = values.iter().map(|v| (v - value).abs()).collect();
     let spread = 1.4826 * median(&mut deviations);
-    Mean { value, std: 1.2533 * spread / (count as f64).sqrt(), count }
+    Mean { value, std: 1.2533 * spread * (sharing / count as f64).sqrt(), count }
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -190,19 +220,23 @@ mod tests {
     #[test]
     fn a_region_has_one_value() {
         let region = Some(Rect { x: 0, y: 0, width: 6, height: 2 });
-        let f = field(Some(0.3), None);
+        let f = field(Some(0.1), None);
         let mean = region_mean(&f, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
         assert!((mean.value - 0.2).abs() < 1e-12 && mean.count == 3);
-        assert!((mean.std - 0.3 / 3f64.sqrt()).abs() < 1e-12);
+        assert!((mean.std - 0.1 / 3f64.sqrt()).abs() < 1e-12);
         // Estimates that share their pixels are worth one.
         let mut overlapping = f.clone();
         overlapping.layout.correlation_length = 1e4;
         let mean = region_mean(&overlapping, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
-        assert!((mean.std - 0.3).abs() < 1e-6);
+        assert!((mean.std - 0.1).abs() < 1e-6);
         // Claimed errors far below the scatter are not believed.
         let tight =
             region_mean(&field(Some(1e-6), None), Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();
         assert!((tight.value - 0.35).abs() < 1e-9 && tight.std > 0.05);
+        let mean = parameter_mean(&f, "u_x", region, Aggregate::InverseVariance).unwrap();
+        assert!((mean.value - 0.2).abs() < 1e-12 && (mean.std - 0.1 / 3f64.sqrt()).abs() < 1e-12);
+        let unknown = parameter_mean(&f, "w", None, Aggregate::Median).unwrap_err().to_string();
+        assert!(unknown.starts_with("name"), "{unknown}");
         let median = region_mean(&field(None, None), Quantity::Divergence, None, Aggregate::Median).unwrap();
         assert!((median.value - 0.35).abs() < 1e-12 && median.std > 0.0);
         assert!(region_mean(&field(None, None), Quantity::Divergence, None, Aggregate::InverseVariance).is_err());

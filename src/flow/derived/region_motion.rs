@@ -1,6 +1,7 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
 use super::sharing;
+use super::sharing::in_common;
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
@@ -35,7 +36,8 @@ impl RegionMotion {
 ///
 /// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing). Where the estimates
 /// scatter more than their covariances allow, it is enlarged by that ratio too (R. T. Birge, "The calculation of errors by the method of least squares", 1932), so that a region
-/// that does not move as one affine motion shows in the standard deviation.
+/// that does not move as one affine motion shows in the standard deviation. Where they scatter less, they have an error in common, which does not
+/// shrink with their number: the covariance holds it in full.
 ///
 /// The motion is NaN where the field has no covariance or the sites do not determine six parameters.
 pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
@@ -43,6 +45,9 @@ pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
     let (dx, dy) = field.layout.pixel_pitch;
     let observed: Vec<usize> = observed_parameters(field);
     let (mut normal, mut right, mut square, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0, 0);
+    // Sums of the weights, and of what they make of an error that all sites have in common.
+    let mut weights = DMatrix::zeros(observed.len(), observed.len());
+    let mut passed = DMatrix::zeros(6, observed.len());
     for site in (0..field.len()).filter(|&site| field.status[site].is_valid()) {
         let Some(weight) = inverse_covariance(field, site, &observed) else { continue };
         let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
@@ -53,6 +58,8 @@ pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
         let weighted = rows.transpose() * &weight;
         normal += &weighted * &rows;
         right += &weighted * &value;
+        passed += &weighted;
+        weights += &weight;
         square += (value.transpose() * &weight * &value)[0];
         count += 1;
     }
@@ -61,8 +68,15 @@ pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
     let Some(inverse) = invert_scaled(&normal) else { return unknown };
     let motion = inverse * right;
     let freedom = (count * observed.len()) as f64 - 6.0;
-    let scatter = if freedom > 0.0 { ((square - right.dot(&motion)) / freedom).max(1.0) } else { 1.0 };
-    let covariance = inverse * (scatter * sharing(&field.layout));
+    let scatter = if freedom > 0.0 { (square - right.dot(&motion)) / freedom } else { 1.0 };
+    let sharing = sharing(&field.layout);
+    let common = in_common(scatter, (count, observed.len()), sharing);
+    let mut covariance = inverse * (scatter.max(1.0) * sharing * (1.0 - common));
+    if let Some(claimed) = weights.try_inverse() {
+        let passed = inverse * passed;
+        let whole = &passed * claimed * passed.transpose() * (common * count as f64);
+        covariance += Matrix6::from_fn(|i, j| whole[(i, j)]);
+    }
     RegionMotion { motion: motion.into(), covariance: covariance.transpose().into(), ..unknown }
 }
 
@@ -181,6 +195,20 @@ mod tests {
         overlapping.layout.correlation_length = 4.0;
         let overlapping = fit_region(&overlapping).covariance[2][2];
         assert!(overlapping > 10.0 * honest);
+    }
+
+    #[test]
+    fn what_is_claimed_and_does_not_scatter_is_common() {
+        // An error of one claimed deviation in every u, and hardly any scatter.
+        let mut biased = field(0.001, 0.05, 3);
+        let n = biased.len();
+        biased.motion[..n].iter_mut().for_each(|u| *u += 0.05);
+        let fit = fit_region(&biased);
+        let (error, deviation) = (fit.motion[0] - TRUTH[0], fit.covariance[0][0].sqrt());
+        assert!((error - 0.05).abs() < 1e-3 && (0.8..1.1).contains(&(error / deviation)), "{error} {deviation}");
+        // Errors that scatter as claimed have nothing in common.
+        let honest = fit_region(&field(0.05, 0.05, 3)).covariance[0][0].sqrt();
+        assert!(honest < 0.25 * deviation, "{honest} {deviation}");
     }
 
     #[test]

@@ -42,6 +42,20 @@ pub fn sharing_among(layout: &FieldLayout, width: usize, used: &[usize]) -> f64 
     }
 }
 
+/// The share of the claimed variance that all estimates have in common: what they claim and do not scatter.
+///
+/// A covariance that holds a bias claims more than estimates with one bias scatter about their mean. `scatter` is the sum of squares of `count` sites in units of the claimed variance, over
+/// its degrees of freedom, `values` the estimates of each; of it [`sharing`] leaves `1 - sharing / count`. What chance explains (one deviation of the ratio) is not counted.
+pub(super) fn in_common(scatter: f64, (count, values): (usize, usize), sharing: f64) -> f64 {
+    let independent = count as f64 / sharing;
+    let left = 1.0 - 1.0 / independent;
+    if left.is_nan() || left < 0.5 {
+        return 0.0;
+    }
+    let chance = (2.0 / (independent * values as f64)).sqrt();
+    (1.0 - chance - scatter / left).max(0.0)
+}
+
 /// Sums over the neighbourhood of some of the sites in which correlations count; `length` in steps of the lattice.
 fn on_lattice(width: usize, used: &[usize], length: f64) -> f64 {
     let rows = used.iter().max().map_or(0, |last| last / width + 1);

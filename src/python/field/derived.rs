@@ -1,7 +1,7 @@
 //! Parameters and derived quantities by name.
 
 use crate::error::{Error, Result};
-use crate::flow::derived::{Aggregate, Quantity, plane, planes, region_mean};
+use crate::flow::derived::{Aggregate, Quantity, parameter_mean, plane, planes, region_mean};
 use crate::flow::model::ModelKind;
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, Rect};
@@ -27,7 +27,7 @@ pub fn std<T: Real>(field: &FlowField<T>, name: &str) -> Result<Vec<f64>> {
     }
 }
 
-/// Value, standard deviation and number of sites of a quantity in a region.
+/// Value, standard deviation and number of sites of a parameter or quantity in a region.
 pub fn region<T: Real>(
     field: &FlowField<T>,
     name: &str,
@@ -43,7 +43,11 @@ pub fn region<T: Real>(
             return Err(Error::argument("aggregate", expected, format!("{other:?}")));
         }
     };
-    let mean = region_mean(field, quantity(&field.layout, name)?, region, aggregate)?;
+    let mean = if field.plane(name).is_some() {
+        parameter_mean(field, name, region, aggregate)?
+    } else {
+        region_mean(field, quantity(&field.layout, name)?, region, aggregate)?
+    };
     Ok((mean.value, mean.std, mean.count))
 }
 

@@ -117,10 +117,10 @@ impl FlowField {
         })
     }
 
-    /// One number for a region: (value, standard deviation, number of sites) of the derived quantity `name`, in its unit.
+    /// One number for a region: (value, standard deviation, number of sites) of the parameter or derived quantity `name`, in its unit.
     ///
     /// `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-    /// The standard deviation allows for the correlation of neighbouring estimates. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+    /// The standard deviation allows for the correlation of neighbouring estimates, and for an error that they have in common: what they claim and do not scatter. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
     #[pyo3(signature = (name, region=None, aggregate=None))]
     fn region_mean(
         &self,
