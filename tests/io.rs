@@ -166,10 +166,10 @@ fn frames_pass_from_sink_to_source_to_preprocessing() {
     sink.finish().unwrap();
     let mut source = open(&spec, &OpenOptions::default()).unwrap();
     let frame = source.next_frame().unwrap().unwrap().to_real::<f64>();
-    let quantise = Preprocess { quantise: Some(Quantiser::default()), smooth: None };
+    let quantise = Preprocess { quantise: Some(Quantiser::default()), ..Preprocess::default() };
     let levels = quantise.apply(frame.clone());
     assert!(levels.data().iter().zip(frame.data()).all(|(l, x)| l.fract() == 0.0 && (0.0..1.0).contains(&(x - l))));
-    let smooth = Preprocess { quantise: None, smooth: Some(GaussianSmoother::new(1.5).unwrap()) };
+    let smooth = Preprocess { smooth: Some(GaussianSmoother::new(1.5).unwrap()), ..Preprocess::default() };
     let mean = |f: &jacoflow::types::Frame<f64>| f.data().iter().sum::<f64>() / f.data().len() as f64;
     // Reflected borders make the smoother's weights sum to one down every column of its matrix too.
     assert!((mean(&smooth.apply(levels.clone())) - mean(&levels)).abs() < 1e-10);

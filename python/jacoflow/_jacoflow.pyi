@@ -337,7 +337,7 @@ def estimate(
     diagnostics : bool
         Whether to report residual, rank and condition number.
     noise : float, grey levels
-        Standard deviation of the pixel noise for the covariance; default from the residual.
+        Standard deviation of the pixel noise for the covariance; default from the frames.
     precision : "float32" or "float64"
         Default: that of the frames.
     threads : int
@@ -350,7 +350,7 @@ def estimate(
     Raises
     ------
     ValueError
-        For fewer than three frames, frames under 3 x 3 px or of different sizes, colour, and options out of range; each message names the argument.
+        For fewer frames than the method needs, frames under 3 x 3 px or of different sizes, colour, and options out of range; each message names the argument.
     TypeError
         For another dtype.
     """

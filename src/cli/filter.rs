@@ -109,8 +109,9 @@ impl FilterCommand {
         }
         let plan: OutputPlan = plan_output(&self.output, &options.sites, self.tell.json, opened.frames)?;
         expect_output(&plan, self.tell.json, self.save_state.is_some())?;
+        let steps = preprocess(&self.input, options.mask.as_ref())?;
         let mut pipeline = Pipeline::<T>::new(Box::new(stage))
-            .with_preprocess(preprocess(&self.input)?)
+            .with_preprocess(steps)
             .with_threads(threads)
             .with_numbering(opened.numbering);
         for sink in plan.sinks(description.to_string(), self.output.ranges())? {

@@ -4,7 +4,7 @@ use super::arguments::{
     ComputeArguments, InputArguments, MethodArguments, OutputArguments, SiteArguments, TellArguments,
 };
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
+use super::open::{Opened, compute, in_double, open_input, preprocess_for, read_mask};
 use super::report::Report;
 use super::run::{Telling, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
@@ -144,8 +144,9 @@ impl FlowCommand {
         if let Value::Object(details) = &mut details {
             details.insert("method".into(), prepared.description["method"].clone());
         }
+        let steps = preprocess_for(&prepared.estimator, &self.input)?;
         let mut pipeline = Pipeline::<T>::new(Box::new(EstimatorStage::new(prepared.estimator)))
-            .with_preprocess(preprocess(&self.input)?)
+            .with_preprocess(steps)
             .with_threads(compute(&self.compute)?.0)
             .with_numbering(opened.numbering);
         for sink in plan.sinks(prepared.description.to_string(), self.output.ranges())? {

@@ -3,7 +3,7 @@
 use super::arguments::{ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments};
 use super::flow::prepare;
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess};
+use super::open::{Opened, compute, in_double, open_input, preprocess_for};
 use super::report::Report;
 use super::run::{Telling, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
@@ -105,8 +105,9 @@ impl MeasureCommand {
             details.insert("quantities".into(), json!(self.quantity));
             details.insert("method".into(), estimator.method().name().into());
         }
+        let steps = preprocess_for(&estimator, &self.input)?;
         let mut pipeline = Pipeline::<T>::new(Box::new(EstimatorStage::new(estimator)))
-            .with_preprocess(preprocess(&self.input)?)
+            .with_preprocess(steps)
             .with_threads(compute(&self.compute)?.0)
             .with_numbering(opened.numbering)
             .with_sink(Box::new(sink));

@@ -2,6 +2,7 @@
 
 use super::arguments::{ComputeArguments, InputArguments, Precision};
 use crate::error::{Error, Result};
+use crate::flow::{Estimator, Method};
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{Colour, FilesSource, FrameSource, OpenOptions, Selected, open, read_image};
 use crate::parallel::Threads;
@@ -60,12 +61,22 @@ pub fn open_source(input: &[String], options: &OpenOptions) -> Result<Box<dyn Fr
     }
 }
 
-/// Quantiser and smoother.
-pub fn preprocess(arguments: &InputArguments) -> Result<Preprocess> {
+/// Quantiser and smoother, which heeds the mask.
+pub fn preprocess(arguments: &InputArguments, mask: Option<&Mask>) -> Result<Preprocess> {
     Ok(Preprocess {
         quantise: arguments.quantise.map(Quantiser::new).transpose()?,
         smooth: arguments.smooth.map(GaussianSmoother::new).transpose()?,
+        mask: mask.cloned(),
     })
+}
+
+/// What is done to frames before this estimator has them. The windowed one smooths on its own, and reads the noise from the frames before that.
+pub fn preprocess_for(estimator: &Estimator, arguments: &InputArguments) -> Result<Preprocess> {
+    let mut steps = preprocess(arguments, estimator.common().mask.as_ref())?;
+    if matches!(estimator.method(), Method::Windowed(_)) {
+        steps.smooth = None;
+    }
+    Ok(steps)
 }
 
 /// Number of threads and instruction set.

@@ -55,7 +55,7 @@ pub struct Common {
     pub covariance: bool,
     /// Whether to report residual, rank and condition number of each site. Default: no.
     pub diagnostics: bool,
-    /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the residual.
+    /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the frames.
     pub noise: Option<f64>,
     /// Threads. Default: `JACOFLOW_THREADS`, else every processor.
     pub threads: Threads,

@@ -39,7 +39,7 @@ pub fn observability<'py>(
     }
     let scheme = time_scheme.map_or(Ok(TimeScheme::default()), TimeScheme::parse);
     let request = Request {
-        preprocess: options::preprocess(smooth, quantise)?,
+        preprocess: options::preprocess(smooth, quantise, None)?,
         scheme: scheme.map_err(|e| renamed(e, "scheme", "time_scheme"))?,
         neighbourhood: options::neighbourhood(py, &neighbourhood, neighbourhood_sigma, &Neighbourhood::default())?,
         threads: options::threads(threads)?,

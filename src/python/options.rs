@@ -6,7 +6,7 @@ use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{AnyFrame, Rect, Sample, Sites};
+use crate::types::{AnyFrame, Mask, Rect, Sample, Sites};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -145,11 +145,12 @@ pub fn frame_period(fps: Option<f64>, frame_period: Option<f64>) -> PyResult<Opt
     }
 }
 
-/// `smooth` and `quantise`.
-pub fn preprocess(smooth: Option<f64>, quantise: Option<f64>) -> PyResult<Preprocess> {
+/// `smooth` and `quantise`, and the mask that smoothing heeds.
+pub fn preprocess(smooth: Option<f64>, quantise: Option<f64>, mask: Option<&Mask>) -> PyResult<Preprocess> {
     Ok(Preprocess {
         quantise: quantise.map(Quantiser::new).transpose()?,
         smooth: smooth.map(GaussianSmoother::new).transpose()?,
+        mask: mask.cloned(),
     })
 }
 

@@ -259,3 +259,68 @@ def test_a_pixel_without_data_damages_only_what_touches_it(method):
     far[50 - 40 : 50 + 41, 50 - 40 : 50 + 41] = False
     assert_array_equal(dirty.status[far], clean.status[far])
     assert_array_equal(dirty.flow[far], clean.flow[far])
+
+
+def bytes_of(width, height, seed):
+    """Three frames as an 8-bit camera sees them."""
+    return np.clip(np.round(moving_texture(width=width, height=height, seed=seed)), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("options", [{}, {"smooth": 1.5}, {"method": "instantaneous", "smooth": 1.0}, {"method": "horn_schunck", "smooth": 1.0}])
+def test_what_lies_under_the_mask_does_not_matter(options):
+    frames = bytes_of(64, 56, seed=4)
+    mask = np.ones((56, 64), bool)
+    mask[20:30, 25:40] = False
+    others = np.where(mask, frames, 255 - frames).astype(np.uint8)
+    one, other = (jacoflow.estimate(stack, mask=mask, **options) for stack in (frames, others))
+    assert_same(one, other)
+    assert one.valid.mean() > 0.3
+    filters = [jacoflow.FlowFilter(mask=mask, smooth=1.0) for _ in range(2)]
+    for pair in zip(frames, others, strict=True):
+        one, other = (filter.push(frame) for filter, frame in zip(filters, pair, strict=True))
+        assert_array_equal(one.flow, other.flow)
+
+
+def test_the_default_smoothing_may_be_written_out():
+    frames = bytes_of(64, 56, seed=5)
+    assert_same(jacoflow.estimate(frames), jacoflow.estimate(frames, smooth=1.5))
+
+
+@pytest.mark.parametrize("options", [{}, {"noise": 1.0}, {"noise": 1.0, "smooth": 0}])
+def test_neither_axis_comes_first(options):
+    frames = [frame.astype(float) for frame in bytes_of(64, 56, seed=6)]
+    one = jacoflow.estimate(frames, **options)
+    other = jacoflow.estimate([np.ascontiguousarray(frame.T) for frame in frames], **options)
+    known = one.valid & other.valid.T
+    assert known.mean() > 0.5
+    for name, mirrored in {"u": "v", "v": "u", "u_x": "v_y", "v_x": "u_y", "u_y": "v_x", "v_y": "u_x"}.items():
+        assert_allclose(one.value(name)[known], other.value(mirrored).T[known], rtol=1e-6, atol=1e-9)
+        assert_allclose(one.std(name)[known], other.std(mirrored).T[known], rtol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_covariances_are_positive_definite_where_little_is_known(noise):
+    """A grating leaves the motion along its lines open: the matrices are nearly singular, in single precision."""
+    y, x = np.mgrid[:64, :72]
+    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=2)
+    gratings = [100 + 50 * np.sin((x + 0.7 * y - 0.3 * t) / 4) for t in (-1, 0, 1)]
+    field = jacoflow.estimate([camera.apply_u8(grating, index=k) for k, grating in enumerate(gratings)])
+    covariance = field.covariance[field.valid].astype(float)
+    assert len(covariance) > 1000 and field.covariance.dtype == np.float32
+    scale = np.sqrt(np.einsum("nii->ni", covariance))
+    assert np.linalg.eigvalsh(covariance / (scale[:, :, None] * scale[:, None, :])).min() > 0
+
+
+def test_a_still_scene_has_the_deviation_of_rounding():
+    frame = bytes_of(64, 56, seed=7)[0]
+    field = jacoflow.estimate([frame] * 3)
+    deviation = field.std("u")[field.valid]
+    assert abs(field.u[field.valid]).max() == 0 and 1e-4 < np.median(deviation) < 0.05 and deviation.min() > 0
+
+
+@pytest.mark.parametrize("value", [3.4e38, 1e30])
+def test_what_overflows_is_no_estimate(value):
+    frames = [frame.astype(np.float32) for frame in bytes_of(96, 88, seed=8)]
+    frames[1][40, 50] = value
+    field = jacoflow.estimate(frames)
+    assert np.isfinite(field.covariance[field.valid]).all() and field.valid.mean() > 0.3

@@ -46,7 +46,7 @@ pub struct MethodArguments {
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
-    /// Standard deviation of the pixel noise, grey levels [default: from the residual]
+    /// Standard deviation of the pixel noise, grey levels [default: from the frames]
     #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
     pub noise: Option<f64>,
     /// Physical size of a pixel; flow then comes in that unit per frame
@@ -65,16 +65,16 @@ pub fn rectangle((width, height): (usize, usize)) -> Neighbourhood {
 }
 
 impl MethodArguments {
-    /// The method with its options, for a sequence of `frames` frames (if known) that were smoothed by `smoothed` px.
+    /// The method with its options, for a sequence of `frames` frames (if known) that are to be smoothed by `smooth` px.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option that is unusable, or that this method does not know.
-    pub fn method(&self, frames: Option<usize>, smoothed: Option<f64>) -> Result<Method> {
+    pub fn method(&self, frames: Option<usize>, smooth: Option<f64>) -> Result<Method> {
         let method = Method::parse(&word(&self.method))?;
         self.refuse_foreign(&method)?;
         let pair = self.pair || frames == Some(2);
         Ok(match method {
-            Method::Windowed(_) => Method::Windowed(self.windowed(pair, smoothed)?),
+            Method::Windowed(_) => Method::Windowed(self.windowed(pair, smooth)?),
             Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
             Method::LucasKanade(mut options) => {
                 options.window = self.window.map_or(options.window, Window::Gaussian);
@@ -87,16 +87,15 @@ impl MethodArguments {
         })
     }
 
-    fn windowed(&self, pair: bool, smoothed: Option<f64>) -> Result<WindowedOptions> {
+    fn windowed(&self, pair: bool, smooth: Option<f64>) -> Result<WindowedOptions> {
         let mut options = if pair { WindowedOptions::pair() } else { WindowedOptions::default() };
         options.sigma = self.window.unwrap_or(options.sigma);
         options.scheme = self.scheme(options.scheme)?;
         options.rows = self.rows.as_deref().map_or(Ok(options.rows), RowSet::parse)?;
         options.neighbourhood = self.neighbourhood.map_or(options.neighbourhood, rectangle);
         options.rank_deficient = self.rank_policy(options.rank_deficient)?;
-        if smoothed.is_some() {
-            options.presmooth = None;
-            options.already_smoothed = smoothed.filter(|&sigma| sigma > 0.0);
+        if smooth.is_some() {
+            options.presmooth = smooth.filter(|&sigma| sigma > 0.0);
         }
         Ok(options)
     }

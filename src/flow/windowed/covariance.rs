@@ -27,6 +27,7 @@ use super::noise::PixelNoise;
 use super::rows::Plan;
 use super::sandwich::Sandwich;
 use super::solve::{ENTRIES, MomentRow};
+use super::sound;
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
 use super::window::Window;
 use crate::jet::JetStencil;
@@ -55,8 +56,10 @@ pub(super) struct NoiseSetting<T> {
     pub scale: f64,
     /// Equations a pixel.
     pub rows: usize,
-    /// Variance of the pixel noise; `None`: from the residual.
+    /// Variance of the pixel noise; `None`: from the frames.
     pub variance: Option<f64>,
+    /// Least variance that is believed of the frames: that of rounding to whole grey levels, where they hold nothing else.
+    pub least_variance: f64,
     /// What truncation leaves.
     pub truncation: Truncation,
     /// Energy of the detail per variance of the noise.
@@ -327,6 +330,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         dispatch(setting.level, Sandwich { setting, row, pixel });
         let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
         hidden::widen_row(&setting.pixel, setting.scale, pixel, count);
+        sound::mend_row(setting.scale, pixel, count);
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
             let source = (PIXEL_RESULT + k) * TILE_COLUMNS;

@@ -17,6 +17,8 @@ const POWERS: [(usize, usize); 12] =
 /// Which component of the jet each of them is taken from, and the axis (0: x, 1: y) of the difference, first for third and second for fourth derivatives.
 pub(super) const DIFFERENCED: [(usize, usize); 12] =
     [(3, 0), (3, 1), (5, 0), (5, 1), (3, 0), (4, 0), (3, 1), (4, 1), (5, 1), (3, 0), (4, 0), (5, 0)];
+/// The derivative (2, 2), the mean of the two ways to take it: neither axis comes first.
+pub(super) const MIXED: usize = 6;
 /// How many derivatives there are.
 pub(super) const DERIVATIVES: usize = POWERS.len();
 
@@ -63,7 +65,14 @@ impl Truncation {
 
     /// Offsets and weights with which derivative d is taken from the image.
     pub fn derivative(stencil: &JetStencil, d: usize) -> Vec<((i32, i32), f64)> {
-        let (component, axis) = DIFFERENCED[d];
+        if d == MIXED {
+            let [one, other] = [(3, 1), (5, 0)].map(|from| Self::difference(stencil, d, from));
+            return one.into_iter().chain(other).map(|(at, weight)| (at, 0.5 * weight)).collect();
+        }
+        Self::difference(stencil, d, DIFFERENCED[d])
+    }
+
+    fn difference(stencil: &JetStencil, d: usize, (component, axis): (usize, usize)) -> Vec<((i32, i32), f64)> {
         let steps: &[(i32, f64)] = match d {
             0..4 => &[(-1, -0.5), (1, 0.5)],
             4..9 => &[(-1, 1.0), (0, -2.0), (1, 1.0)],
@@ -197,7 +206,11 @@ mod tests {
             let (k, axis) = DIFFERENCED[d];
             let (x, y) = if axis == 0 { (1, 0) } else { (0, 1) };
             let (before, after) = (mix(0, 10 - x, 10 - y)[k], mix(0, 10 + x, 10 + y)[k]);
-            if d >= 9 {
+            if d == MIXED {
+                let second =
+                    |k: usize, x: usize, y: usize| mix(0, 10 - x, 10 - y)[k] + mix(0, 10 + x, 10 + y)[k] - 2.0 * jet[k];
+                0.5 * (second(3, 0, 1) + second(5, 1, 0))
+            } else if d >= 9 {
                 jet[k]
             } else if d < 4 {
                 0.5 * (after - before)

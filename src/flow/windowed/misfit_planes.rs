@@ -6,7 +6,7 @@
 //! smoothing by s px adds `s^2 / 2` times its Laplacian.
 
 use super::estimate::Strip;
-use super::misfit::{DERIVATIVES, DIFFERENCED, Truncation, residual};
+use super::misfit::{DERIVATIVES, DIFFERENCED, MIXED, Truncation, residual};
 use super::noise::columns;
 use super::tile::{JetTile, Planes, Source, padded};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
@@ -205,6 +205,12 @@ impl<T: SimdReal, const BLOCK: usize, const BLOCKS: usize> Kernel<T> for Residua
                     let (k, axis) = DIFFERENCED[d];
                     if d >= 9 {
                         return jet[k];
+                    }
+                    if d == MIXED {
+                        let second = |k: usize, x: isize, y: isize| {
+                            at(6 * block + k, x, y) + at(6 * block + k, -x, -y) - (jet[k] + jet[k])
+                        };
+                        return (second(3, 0, 1) + second(5, 1, 0)) * V::constant(0.5);
                     }
                     let (x, y) = if axis == 0 { (1, 0) } else { (0, 1) };
                     let (before, after) = (at(6 * block + k, -x, -y), at(6 * block + k, x, y));

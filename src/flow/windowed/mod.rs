@@ -52,6 +52,7 @@ mod rows;
 mod run;
 mod sandwich;
 mod solve;
+mod sound;
 mod support;
 mod tile;
 mod window;

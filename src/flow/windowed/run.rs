@@ -18,7 +18,7 @@ use crate::image::GaussianSmoother;
 use crate::jet::{JetRows, JetStencil};
 use crate::parallel::BAND_ROWS;
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Rect, Sites};
+use crate::types::{FlowField, Frame, Rect, Sites, Status};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -59,10 +59,11 @@ impl Windowed {
     pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         let sites = field.layout.sites.clone();
         let size = frames[0].size();
+        let rounded = common.covariance && are_rounded(frames);
         common.threads.install(|| match &sites {
             Sites::Grid { region, stride } => {
                 let whole = Rect { x: 0, y: 0, width: size.0, height: size.1 };
-                let job = Job::new(self, frames, common, region.unwrap_or(whole));
+                let job = Job::new(self, frames, (common, rounded), region.unwrap_or(whole));
                 let last = (field.width.saturating_sub(1)) * stride;
                 let columns = job.local_x(region.map_or(0, |r| r.x));
                 let columns = columns..columns + last + 1;
@@ -73,14 +74,14 @@ impl Windowed {
                     job.strip(rows, columns.clone()).write(&job, &sites, bands);
                 }
             }
-            Sites::Points(points) => self.points(frames, common, points, field),
+            Sites::Points(points) => self.points(frames, (common, rounded), points, field),
         });
     }
 
     fn points<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
-        common: &Common,
+        (common, rounded): (&Common, bool),
         points: &[(usize, usize)],
         field: &mut FlowField<T>,
     ) {
@@ -94,7 +95,7 @@ impl Windowed {
             bands(field).into_par_iter().for_each(|mut band| {
                 for index in band.sites.clone() {
                     let (x, y) = points[index];
-                    let job = Job::new(self, frames, common, Rect { x, y, width: 1, height: 1 });
+                    let job = Job::new(self, frames, (common, rounded), Rect { x, y, width: 1, height: 1 });
                     let column = job.local_x(x);
                     let results = job.strip(&[job.local_y(y)], column..column + 1);
                     let run = Run { at: (x, y), step: 1, count: 1 };
@@ -102,7 +103,7 @@ impl Windowed {
                 }
             });
         } else {
-            let job = Job::new(self, frames, common, box_);
+            let job = Job::new(self, frames, (common, rounded), box_);
             let (left, top) = (job.local_x(box_.x), job.local_y(box_.y));
             let rows: Vec<usize> = (top..top + box_.height).collect();
             let mut field_bands = bands(field);
@@ -138,7 +139,7 @@ struct Job<'a, T: Clone> {
 }
 
 impl<'a, T: SimdReal> Job<'a, T> {
-    fn new(owner: &'a Windowed, frames: &[&'a Frame<T>], common: &'a Common, sites: Rect) -> Self {
+    fn new(owner: &'a Windowed, frames: &[&'a Frame<T>], (common, rounded): (&'a Common, bool), sites: Rect) -> Self {
         let options = &owner.options;
         let whole = frames[0].size();
         let crop = crop(sites, whole, owner.margin(common));
@@ -167,7 +168,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             inverse: common.covariance,
             diagnostics: common.diagnostics,
         };
-        let noise = common.covariance.then(|| owner.noise(common, window, frames.len()));
+        let noise = common.covariance.then(|| owner.noise((common, rounded), window, frames.len()));
         Self { owner, frames, support, whole, origin, setting, noise, detail }
     }
 
@@ -205,7 +206,12 @@ impl<'a, T: SimdReal> Job<'a, T> {
 }
 
 impl Windowed {
-    fn noise<T: SimdReal>(&self, common: &Common, window: Window<T>, frames: usize) -> NoiseSetting<T> {
+    fn noise<T: SimdReal>(
+        &self,
+        (common, rounded): (&Common, bool),
+        window: Window<T>,
+        frames: usize,
+    ) -> NoiseSetting<T> {
         let options = &self.options;
         let combination = Combination::of(frames, options.scheme);
         let smooth = match (options.presmooth, options.already_smoothed) {
@@ -229,6 +235,7 @@ impl Windowed {
             truncation,
             detail_gain: detail::gain(combination, options.already_smoothed),
             variance: common.noise.map(|n| n * n),
+            least_variance: if rounded { 1.0 / 12.0 } else { 0.0 },
             level: common.level(),
         }
     }
@@ -295,6 +302,7 @@ impl<T: SimdReal> Results<T> {
             for (k, plane) in band.covariance.iter_mut().enumerate() {
                 run.copy(&covariance.planes, k * n + from, &mut plane[places.clone()]);
             }
+            withdraw_what_overflowed(band, places.clone());
         }
         if let Some(plane) = &mut band.residual {
             let rows = T::from_f64(job.setting.rows as f64);
@@ -310,6 +318,34 @@ impl<T: SimdReal> Results<T> {
             run.copy(&strip.condition, from, &mut plane[places]);
         }
     }
+}
+
+/// An estimate whose covariance is beyond the precision is none.
+fn withdraw_what_overflowed<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usize>) {
+    for place in places {
+        let known = band.covariance.iter().all(|plane| plane[place].finite());
+        if !known && band.status[place].is_valid() {
+            band.status[place] = Status::NonFinite;
+            band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[place] = T::nan());
+        }
+    }
+}
+
+/// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them: rounding is then the least noise they can have.
+fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
+    const STEPS: f64 = 8.0;
+    let range = |frame: &&Frame<T>| {
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite()) {
+            if value.fract() != 0.0 {
+                return None;
+            }
+            (least, most) = (least.min(value), most.max(value));
+        }
+        Some((least, most))
+    };
+    let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
+    ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
 }
 
 /// Evenly spaced pixels of one row of the frame.

@@ -97,7 +97,9 @@ fn variances<T: SimdReal, V: Lanes<Scalar = T>>(
     let fine = energy / (known * V::constant(setting.detail_gain));
     let enough = (weight * V::constant(0.5)).lt(known);
     let most = whole * chance;
-    (V::select(enough, most.min(fine), whole), V::select(enough, most.min(fine.max(unexplained)), whole))
+    let least = V::constant(setting.least_variance);
+    let of_noise = V::select(enough, most.min(fine), whole).max(least);
+    (of_noise, V::select(enough, most.min(fine.max(unexplained)), whole).max(least))
 }
 
 /// `sum_k a_k b_k` over six pairs.

@@ -61,11 +61,16 @@ impl Arguments {
 
     /// The core's options; errors name the arguments as Python knows them.
     pub fn plan(&self, py: Python<'_>) -> PyResult<Plan> {
-        let preprocess = options::preprocess(self.smooth, self.quantise)?;
         let method = self.method(py)?;
         let common = self.common(py, !matches!(method, Method::HornSchunck(_)))?;
+        let mut preprocess = options::preprocess(self.smooth, self.quantise, common.mask.as_ref())?;
+        if matches!(method, Method::Windowed(_)) {
+            // It smooths on its own, and reads the noise from the frames before that.
+            preprocess.smooth = None;
+        }
         let estimator = Estimator::new(method, common)
-            .map_err(|e| renamed(renamed(e, "sigma", "window_sigma"), "window", "window_sigma"))?;
+            .map_err(|e| renamed(renamed(e, "sigma", "window_sigma"), "window", "window_sigma"))
+            .map_err(|e| renamed(e, "presmooth", "smooth"))?;
         Ok(Plan {
             estimator,
             preprocess,
@@ -130,9 +135,7 @@ impl Arguments {
         o.rows = self.rows.as_deref().map_or(Ok(o.rows), RowSet::parse)?;
         o.rank_deficient = RankPolicy::parse(&self.rank_deficient)?;
         if let Some(sigma) = self.smooth {
-            // Done to each frame as it comes. Smoothing correlates the noise of neighbouring pixels; the covariance must know.
-            o.presmooth = None;
-            o.already_smoothed = Some(sigma).filter(|&sigma| sigma > 0.0);
+            o.presmooth = Some(sigma).filter(|&sigma| sigma > 0.0);
         }
         Ok(())
     }

@@ -167,9 +167,10 @@ impl FlowFilter {
 impl FlowFilter {
     fn from_arguments(py: Python<'_>, arguments: Arguments) -> PyResult<Self> {
         let arguments = arguments.keep(py)?;
+        let options = arguments.options(py)?;
         Ok(Self {
-            options: arguments.options(py)?,
-            preprocess: options::preprocess(arguments.smooth, arguments.quantise)?,
+            preprocess: options::preprocess(arguments.smooth, arguments.quantise, options.mask.as_ref())?,
+            options,
             colour: ColourRule::parse(arguments.colour.as_deref())?,
             precision: Precision::parse(arguments.precision.as_deref())?,
             engine: Engine::Waiting,
