@@ -24,6 +24,21 @@ pub struct Scene {
     core: Box<dyn CoreScene>,
 }
 
+impl Scene {
+    /// Memory for so many frames.
+    fn expect_room(&self, count: usize) -> PyResult<Vec<f64>> {
+        let (width, height) = self.core.size();
+        let mut room = Vec::new();
+        match count.checked_mul(width * height).map(|values| room.try_reserve_exact(values)) {
+            Some(Ok(())) => Ok(room),
+            _ => {
+                let message = format!("count: no memory for {count} frames of {width} x {height} float64");
+                Err(PyMemoryError::new_err(message))
+            }
+        }
+    }
+}
+
 #[pymethods]
 impl Scene {
     #[new]
@@ -73,6 +88,7 @@ impl Scene {
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped.
     fn frame<'py>(&self, py: Python<'py>, t: f64) -> PyResult<Bound<'py, PyAny>> {
+        self.expect_room(1)?;
         let threads = Threads::new(None)?;
         let frame = py.detach(|| threads.install(|| self.core.frame(t)));
         arrays::from_frame(py, frame)
@@ -85,12 +101,7 @@ impl Scene {
         let count = usize::try_from(count.0).map_err(wrong)?;
         let (width, height) = self.core.size();
         let threads = Threads::new(None)?;
-        let mut data = Vec::new();
-        let values = count.checked_mul(width * height);
-        if values.is_none_or(|n| data.try_reserve_exact(n).is_err()) {
-            let message = format!("count: no memory for {count} frames of {width} x {height} float64");
-            return Err(PyMemoryError::new_err(message));
-        }
+        let mut data = self.expect_room(count)?;
         for index in 0..count {
             py.check_signals()?;
             let frame = py.detach(|| threads.install(|| self.core.frame(start + index as f64)));

@@ -141,7 +141,7 @@ impl WindowedOptions {
         }
         if self.sigma < 0.5 || self.sigma * self.truncate > LARGEST_RADIUS || self.sigma * self.truncate < 1.0 {
             let want = format!("at least 0.5 px, and with truncate a radius of 1 to {LARGEST_RADIUS} px");
-            return Err(Error::argument("sigma", want, format!("{} (truncate {})", self.sigma, self.truncate)));
+            return Err(Error::argument("sigma", want, format!("{:?} (truncate {:?})", self.sigma, self.truncate)));
         }
         if !(2..=3).contains(&self.frames) {
             return Err(Error::argument("frames", "2 or 3 for a windowed estimate", self.frames));
