@@ -29,13 +29,11 @@ impl Scene {
     fn expect_room(&self, count: usize) -> PyResult<Vec<f64>> {
         let (width, height) = self.core.size();
         let mut room = Vec::new();
-        match count.checked_mul(width * height).map(|values| room.try_reserve_exact(values)) {
-            Some(Ok(())) => Ok(room),
-            _ => {
-                let message = format!("count: no memory for {count} frames of {width} x {height} float64");
-                Err(PyMemoryError::new_err(message))
-            }
+        if count.checked_mul(width * height).is_none_or(|values| room.try_reserve_exact(values).is_err()) {
+            let message = format!("count: no memory for {count} frames of {width} x {height} float64");
+            return Err(PyMemoryError::new_err(message));
         }
+        Ok(room)
     }
 }
 

@@ -21,75 +21,20 @@ use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
 use super::detail::Detail;
 use super::estimate::Strip;
 use super::hidden;
-use super::misfit::Truncation;
 use super::misfit_planes::{self as misfit, Ring};
-use super::noise::PixelNoise;
-use super::rows::Plan;
+use super::noise_setting::NoiseSetting;
 use super::sandwich::Sandwich;
 use super::solve::{ENTRIES, MomentRow};
 use super::sound;
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
-use super::window::Window;
-use crate::jet::JetStencil;
-use crate::simd::{Level, SimdReal, dispatch};
+use crate::simd::{SimdReal, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows of one parallel task.
 const TASK_ROWS: usize = 64;
 
-/// What the covariance needs beside the estimates.
-pub(super) struct NoiseSetting<T> {
-    /// Second moments of the noise.
-    pub pixel: PixelNoise,
-    /// The stencil: offset and weights of each of its samples.
-    pub taps: Vec<((isize, isize), [T; 6])>,
-    /// Largest offset of the stencil, px.
-    pub reach: usize,
-    /// Kernel of the smoothing as the window sees it, or of radius 0.
-    pub smoothing: Window<T>,
-    /// The window of the normal equations.
-    pub window: Window<T>,
-    /// Squared weights of the noisy samples.
-    pub squared: Window<T>,
-    /// 1 / sigma of the window.
-    pub scale: f64,
-    /// Equations a pixel.
-    pub rows: usize,
-    /// Variance of the pixel noise; `None`: from the frames.
-    pub variance: Option<f64>,
-    /// Least variance that is believed of the frames: that of rounding to whole grey levels, where they hold nothing else.
-    pub least_variance: f64,
-    /// What truncation leaves.
-    pub truncation: Truncation,
-    /// Energy of the detail per variance of the noise.
-    pub detail_gain: f64,
-    /// Instruction set.
-    pub level: Level,
-}
-
 impl<T: SimdReal> NoiseSetting<T> {
-    /// Offsets and weights of a stencil in working precision.
-    pub fn taps(stencil: &JetStencil) -> Vec<((isize, isize), [T; 6])> {
-        let pairs = stencil.offsets().iter().zip(stencil.weights());
-        pairs.map(|(&(x, y), w)| ((x as isize, y as isize), w.map(T::from_f64))).collect()
-    }
-
-    /// Unknowns that have a column of their own in the equations; with row 1 alone the others act by transport only.
-    fn unknowns(&self) -> usize {
-        if self.rows == 1 { 2 } else { 6 }
-    }
-
-    /// The products of those.
-    pub fn plan(&self) -> Plan {
-        if self.rows == 1 { Plan::flow() } else { Plan::outer() }
-    }
-
-    /// How far beyond a site estimates of the motion are used, px.
-    pub fn margin(&self) -> usize {
-        (self.squared.radius() + self.smoothing.radius() + self.reach).max(self.window.radius() + 1)
-    }
-
     /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with the margin around them
     /// (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and frames.
     pub fn covariance(

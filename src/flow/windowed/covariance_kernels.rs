@@ -1,7 +1,7 @@
 //! The steps of the covariance, each a kernel over one row of a tile.
 
-use super::covariance::NoiseSetting;
 use super::noise::{columns, pulled_back};
+use super::noise_setting::NoiseSetting;
 use super::rows::Plan;
 use super::solve::{ENTRIES, upper};
 use super::tile::{JetTile, Planes};

@@ -1,24 +1,23 @@
 //! From frames and options to a filled field: cropping, smoothing, strips, sites.
 
 use super::combine::Combination;
-use super::covariance::NoiseSetting;
-use super::detail::{self, Detail};
+use super::detail::Detail;
 use super::estimate::{Setting, Strip};
 use super::floor;
-use super::misfit::Truncation;
-use super::noise::{PixelNoise, smoothing_weights};
+use super::noise_setting::NoiseSetting;
 use super::options::WindowedOptions;
+use super::results::{Covariance, Results, Run};
 use super::support::Support;
 use super::tile::Source;
 use super::window::Window;
 use crate::error::Result;
 use crate::flow::options::Common;
-use crate::flow::site::{FieldBand, bands};
+use crate::flow::site::bands;
 use crate::image::GaussianSmoother;
 use crate::jet::{JetRows, JetStencil};
 use crate::parallel::BAND_ROWS;
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Rect, Sites, Status};
+use crate::types::{FlowField, Frame, Rect, Sites};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -124,15 +123,15 @@ impl Windowed {
 }
 
 /// One rectangle of sites with the part of the frames that matters to it.
-struct Job<'a, T: Clone> {
+pub(super) struct Job<'a, T: Clone> {
     owner: &'a Windowed,
     frames: Vec<Cow<'a, Frame<T>>>,
     support: Support,
     /// Size of the uncropped frames.
-    whole: (usize, usize),
+    pub whole: (usize, usize),
     /// Frame coordinates of the crop's corner.
     origin: (usize, usize),
-    setting: Setting<T>,
+    pub setting: Setting<T>,
     noise: Option<NoiseSetting<T>>,
     /// What the noise is read from, unless it is given.
     detail: Option<Detail<T>>,
@@ -168,14 +167,16 @@ impl<'a, T: SimdReal> Job<'a, T> {
             inverse: common.covariance,
             diagnostics: common.diagnostics,
         };
-        let noise = common.covariance.then(|| owner.noise((common, rounded), window, frames.len()));
+        let noise = common
+            .covariance
+            .then(|| NoiseSetting::new((options, &owner.stencil), (common, rounded), window, frames.len()));
         Self { owner, frames, support, whole, origin, setting, noise, detail }
     }
 
-    fn local_x(&self, x: usize) -> usize {
+    pub fn local_x(&self, x: usize) -> usize {
         x - self.origin.0
     }
-    fn local_y(&self, y: usize) -> usize {
+    pub fn local_y(&self, y: usize) -> usize {
         y - self.origin.1
     }
 
@@ -205,132 +206,6 @@ impl<'a, T: SimdReal> Job<'a, T> {
     }
 }
 
-impl Windowed {
-    fn noise<T: SimdReal>(
-        &self,
-        (common, rounded): (&Common, bool),
-        window: Window<T>,
-        frames: usize,
-    ) -> NoiseSetting<T> {
-        let options = &self.options;
-        let combination = Combination::of(frames, options.scheme);
-        let smooth = match (options.presmooth, options.already_smoothed) {
-            (Some(a), Some(b)) => Some(a.hypot(b)),
-            (a, b) => a.or(b),
-        };
-        let reach = self.stencil.reach();
-        // The window leaves of the kernel only what it weighs alike.
-        let narrowed = smooth.map(|s| s * options.sigma / options.sigma.hypot(s));
-        let truncation = Truncation::new(&self.stencil, combination, smooth);
-        let rows = options.rows.count();
-        NoiseSetting {
-            pixel: PixelNoise::new(&self.stencil, combination, rows, smooth, options.sigma, &truncation),
-            taps: NoiseSetting::taps(&self.stencil),
-            reach: reach.left.max(reach.right).max(reach.up).max(reach.down),
-            smoothing: Window::smoothing(&narrowed.map_or_else(|| vec![1.0], smoothing_weights)),
-            squared: Window::squared(options.sigma, options.radius(), smooth.unwrap_or(0.0)),
-            window,
-            scale: 1.0 / options.sigma,
-            rows,
-            truncation,
-            detail_gain: detail::gain(combination, options.already_smoothed),
-            variance: common.noise.map(|n| n * n),
-            least_variance: if rounded { 1.0 / 12.0 } else { 0.0 },
-            level: common.level(),
-        }
-    }
-}
-
-/// Estimates and, where asked for, covariances of a part of the sites.
-struct Results<T> {
-    strip: Strip<T>,
-    covariance: Option<Covariance<T>>,
-}
-
-/// 21 planes at these rows and columns.
-struct Covariance<T> {
-    planes: Vec<T>,
-    rows: Vec<usize>,
-    columns: Range<usize>,
-}
-
-impl<T: SimdReal> Results<T> {
-    /// Copies the sites that lie in the strip to their bands.
-    fn write(&self, job: &Job<'_, T>, sites: &Sites, bands: &mut [FieldBand<'_, T>]) {
-        bands.par_iter_mut().for_each(|band| match sites {
-            Sites::Grid { region, stride } => {
-                let width = region.map_or(job.whole.0, |r| r.width).div_ceil(*stride);
-                for row in band.sites.start / width..band.sites.end / width {
-                    let run = Run { at: sites.pixel(0, row), step: *stride, count: width };
-                    self.write_run(job, &run, row * width - band.sites.start, band);
-                }
-            }
-            Sites::Points(points) => {
-                for index in band.sites.clone() {
-                    let run = Run { at: points[index], step: 1, count: 1 };
-                    self.write_run(job, &run, index - band.sites.start, band);
-                }
-            }
-        });
-    }
-
-    /// Copies the results of a run of the frame's pixels, if they are here, to the band from place `to` on.
-    fn write_run(&self, job: &Job<'_, T>, run: &Run, to: usize, band: &mut FieldBand<'_, T>) {
-        let (x, y) = (job.local_x(run.at.0), job.local_y(run.at.1));
-        let strip = &self.strip;
-        let wanted = self.covariance.as_ref().map_or(&strip.rows, |c| &c.rows);
-        if wanted.first().is_none_or(|first| y < *first) || wanted.last().is_none_or(|last| y > *last) {
-            return;
-        }
-        let from = place(&strip.rows, &strip.columns, (x, y));
-        let n = strip.rows.len() * strip.columns.len();
-        let places = to..to + run.count;
-        run.copy(&strip.status, from, &mut band.status[places.clone()]);
-        for (k, plane) in band.motion.iter_mut().enumerate() {
-            let target = &mut plane[places.clone()];
-            run.copy(&strip.motion, k * n + from, target);
-            if k >= 2 {
-                let unit = T::from_f64(job.setting.scale);
-                for value in target {
-                    *value *= unit;
-                }
-            }
-        }
-        if let Some(covariance) = &self.covariance {
-            let from = place(&covariance.rows, &covariance.columns, (x, y));
-            let n = covariance.rows.len() * covariance.columns.len();
-            for (k, plane) in band.covariance.iter_mut().enumerate() {
-                run.copy(&covariance.planes, k * n + from, &mut plane[places.clone()]);
-            }
-            withdraw_what_overflowed(band, places.clone());
-        }
-        if let Some(plane) = &mut band.residual {
-            let rows = T::from_f64(job.setting.rows as f64);
-            let sources = strip.residual[from..].iter().zip(&strip.weight[from..]).step_by(run.step);
-            for (value, (sum, weight)) in plane[places.clone()].iter_mut().zip(sources) {
-                *value = crate::simd::Lanes::sqrt(*sum / (rows * *weight));
-            }
-        }
-        if let Some(plane) = &mut band.rank {
-            run.copy(&strip.rank, from, &mut plane[places.clone()]);
-        }
-        if let Some(plane) = &mut band.condition {
-            run.copy(&strip.condition, from, &mut plane[places]);
-        }
-    }
-}
-
-/// An estimate whose covariance is beyond the precision is none.
-fn withdraw_what_overflowed<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usize>) {
-    for place in places {
-        let known = band.covariance.iter().all(|plane| plane[place].finite());
-        if !known && band.status[place].is_valid() {
-            band.status[place] = Status::NonFinite;
-            band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[place] = T::nan());
-        }
-    }
-}
-
 /// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them: rounding is then the least noise they can have.
 fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
     const STEPS: f64 = 8.0;
@@ -346,32 +221,6 @@ fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
     };
     let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
     ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
-}
-
-/// Evenly spaced pixels of one row of the frame.
-struct Run {
-    at: (usize, usize),
-    step: usize,
-    count: usize,
-}
-
-impl Run {
-    /// Copies every `step`-th value of a plane from `from` on.
-    fn copy<S: Copy>(&self, plane: &[S], from: usize, target: &mut [S]) {
-        if self.step == 1 {
-            target.copy_from_slice(&plane[from..from + self.count]);
-        } else {
-            for (value, source) in target.iter_mut().zip(plane[from..].iter().step_by(self.step)) {
-                *value = *source;
-            }
-        }
-    }
-}
-
-/// Place of pixel `(x, y)` in planes of these evenly spaced rows and these columns.
-fn place(rows: &[usize], columns: &Range<usize>, (x, y): (usize, usize)) -> usize {
-    let spacing = rows.get(1).map_or(1, |second| second - rows[0]);
-    (y - rows[0]) / spacing * columns.len() + x - columns.start
 }
 
 /// The rectangle with a margin, inside the frame; the whole frame where little would be saved.

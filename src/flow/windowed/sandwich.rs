@@ -1,7 +1,8 @@
 //! The covariance of one row of pixels, from what the passes have summed for them.
 
-use super::covariance::{NoiseSetting, PIXEL_MISFIT, PIXEL_RESULT, PIXEL_SHARE};
+use super::covariance::{PIXEL_MISFIT, PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
+use super::noise_setting::NoiseSetting;
 use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
 use super::tile::TILE_COLUMNS;
 use crate::simd::{Kernel, Lanes, SimdReal};
