@@ -25,7 +25,7 @@
 //! Measured (`calibration_over_every_setting` of the tests): the normalised error squared of the six parameters against the truth, over noise realisations (6 is exact). Textures
 //! of 2 and 3 px with 1, 2 and 4 grey levels of noise, rounded to whole grey levels; windows of 3, 4 and 6 px; 1, 3 and 12 rows; motion of 0.1 to 0.6 px/frame; a mean over 8
 //! realisations of 64 pixels a case, which is uncertain by about 0.3. Smoothed by 0.7 to 2 px, all 432 cases lie between 4.3 and 7.3 with the noise known and between 3.7 and 7.2 with the
-//! noise from the frames; the low ones are those smoothed most. Without smoothing row 1 is at 4.7 to 6.2; rows that use second derivatives of raw frames, of which noise is a large part, reach 12.9.
+//! noise from the frames; the low ones are those smoothed most. Without smoothing row 1 is at 4.7 to 6.2; rows that use second derivatives of raw frames, of which noise is a large part, reach 12.8.
 //!
 //! With the noise known, edges as sharp as a pixel (speckle and particles of 3 px) and curved flow are not covered; from the frames the residual covers them.
 //!
