@@ -41,7 +41,7 @@ pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<()>
 pub(crate) fn refuse_colour(path: &Path) -> Error {
     Error::format(
         path,
-        "holds colour; expected grey. Ask for luminance (0.299 R + 0.587 G + 0.114 B: colour = luminance), or convert it to grey first",
+        "holds colour; expected grey. Ask for luminance (0.299 R + 0.587 G + 0.114 B) by --luminance or colour=\"luminance\", or convert it to grey first",
     )
 }
 
