@@ -750,10 +750,12 @@ class Scene:
         """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped."""
     def frames(self, /, count: int, start: float = 0.0) -> NDArray[np.float64]:
         """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale."""
-    def truth(self, /, t: float) -> FlowField:
+    def truth(self, /, t: float, *, between: tuple[float, float] | None = None) -> FlowField:
         """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
 
-        Status MASKED and NaN where the scene has no single truth.
+        Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between the times t + a and t + b of the matter that is at each
+        pixel at time t, `(d(b) - d(a)) / (b - a)` for displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
+        the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where the scene has no single truth.
         """
     def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
         """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth."""

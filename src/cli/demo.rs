@@ -91,7 +91,7 @@ impl DemoCommand {
         let (summary, failure) = run_pipeline(&mut pipeline, source, &telling, watch);
         if failure.is_none() {
             let fields = fields.lock().unwrap_or_else(PoisonError::into_inner);
-            let errors = compare(&*scene, &fields)?;
+            let errors = threads.install(|| compare(&*scene, &fields))?;
             telling.details = json!({
                 "scene": "vortex", "flow_rms_error": errors.flow, "jacobian_rms_error": errors.jacobian,
             });
@@ -115,10 +115,11 @@ impl DemoCommand {
         let mut frames = Vec::with_capacity(FRAMES);
         for index in 0..FRAMES {
             watch.check()?;
-            let exact = threads.install(|| scene.frame(index as f64));
+            let time = index as f64;
+            let (exact, motion) = threads.install(|| (scene.frame(time), truth(scene, time)));
             let frame = AnyFrame::U8(sensor.apply_u8(&exact, index as u64));
             sink.write(&frame)?;
-            FieldFormat::Npz.write(self.output.join(truth_name(index)), &truth(scene, index as f64)?, "")?;
+            FieldFormat::Npz.write(self.output.join(truth_name(index)), &motion?, "")?;
             frames.push(frame);
         }
         sink.finish()?;

@@ -162,7 +162,7 @@ impl SynthCommand {
                 let frame = threads.install(|| scene.frame(index as f64));
                 recording.write(&self.sample(&frame, index as u64))?;
                 if let Some(folder) = &self.truth {
-                    let field = truth(scene, index as f64)?;
+                    let field = threads.install(|| truth(scene, index as f64))?;
                     for format in formats {
                         let path = folder.join(format!("{index:06}.{}", format.extension()));
                         format.write(path, &field, "")?;

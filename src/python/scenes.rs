@@ -6,7 +6,7 @@ use super::options::Integer;
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::synth::registry::{CARRIERS, Parameter, SCENES};
-use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, truth};
+use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, mean_truth, truth};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -110,9 +110,20 @@ impl Scene {
 
     /// Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
     ///
-    /// Status MASKED and NaN where the scene has no single truth.
-    fn truth(&self, py: Python<'_>, t: f64) -> PyResult<FlowField> {
-        Ok(FlowField::single(py.detach(|| truth(self.core.as_ref(), t))?))
+    /// Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between the times t + a and t + b of the matter that is at each
+    /// pixel at time t, `(d(b) - d(a)) / (b - a)` for displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
+    /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where the scene has no single truth.
+    #[pyo3(signature = (t, *, between=None))]
+    fn truth(&self, py: Python<'_>, t: f64, between: Option<(f64, f64)>) -> PyResult<FlowField> {
+        let threads = Threads::new(None)?;
+        let scene = self.core.as_ref();
+        let field = py.detach(|| {
+            threads.install(|| match between {
+                None => truth(scene, t),
+                Some(between) => mean_truth(scene, t, between),
+            })
+        });
+        Ok(FlowField::single(field?))
     }
 
     /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth.

@@ -14,6 +14,7 @@ pub mod registry;
 mod scene;
 mod sensor;
 pub mod texture;
+mod truth;
 
 pub use affine_texture::AffineTexture;
 pub use carried::Carried;
@@ -21,5 +22,6 @@ pub use disc::{RotatingDisc, radians_per_frame};
 pub use particles::{ParticleImages, ParticleLook};
 pub use ramp::RotatingRamp;
 pub use registry::{SceneOptions, build};
-pub use scene::{Scene, truth};
+pub use scene::Scene;
 pub use sensor::{Rounding, Sensor};
+pub use truth::{mean_truth, truth};

@@ -1,8 +1,7 @@
 //! What every scene can tell.
 
-use crate::error::Result;
 use crate::parallel::for_each_band;
-use crate::types::{AffineFlow, FieldLayout, FlowField, Frame, MOTION_NAMES, Sites, Status};
+use crate::types::{AffineFlow, Frame};
 
 /// A moving picture with exact truth.
 ///
@@ -52,34 +51,4 @@ pub(super) fn render((width, height): (usize, usize), value: impl Fn(usize, usiz
         }
     });
     frame
-}
-
-/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN where the scene has none.
-///
-/// # Errors
-/// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
-pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
-    let layout = FieldLayout {
-        frame_size: scene.size(),
-        sites: Sites::default(),
-        model: "truth".into(),
-        parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
-        frame_index: t.max(0.0).round() as usize,
-        correlation_length: 0.0,
-    };
-    let mut field = FlowField::<f64>::empty(layout, false)?;
-    let (n, width, origin) = (field.len(), field.width, scene.origin());
-    for index in 0..n {
-        let (x, y) = (origin.0 + (index % width) as f64, origin.1 + (index / width) as f64);
-        field.status[index] = Status::Masked;
-        if let Some(motion) = scene.motion(x, y, t) {
-            field.status[index] = Status::Ok;
-            for (p, value) in motion.to_array().into_iter().enumerate() {
-                field.motion[p * n + index] = value;
-            }
-        }
-    }
-    Ok(field)
 }

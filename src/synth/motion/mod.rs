@@ -2,17 +2,21 @@
 
 mod affine;
 mod approach;
+mod integrate;
 mod shear;
 mod turbulence;
 mod vortex;
+mod waves;
 
 pub use affine::AffineField;
 pub use approach::Approach;
 pub use shear::SinusoidalShear;
 pub use turbulence::Turbulence;
 pub use vortex::LambOseen;
+pub use waves::Waves;
 
 use crate::types::AffineFlow;
+use integrate::integrate;
 
 /// A map of the plane, prepared once for a time.
 pub type PointMap<'a> = Box<dyn Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a>;

@@ -1,6 +1,6 @@
 //! A random velocity field without divergence.
 
-use super::{Motion, PointMap};
+use super::{Motion, PointMap, integrate};
 use crate::math::random::CounterRng;
 use crate::types::AffineFlow;
 use std::f64::consts::TAU;
@@ -81,19 +81,7 @@ impl Motion for Turbulence {
     }
 
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
-        let steps = ((to - from).abs() * STEPS_PER_FRAME).ceil();
-        let h = if steps > 0.0 { (to - from) / steps } else { 0.0 };
-        Box::new(move |mut x, mut y| {
-            for _ in 0..steps as usize {
-                let (a_u, a_v) = self.speed(x, y);
-                let (b_u, b_v) = self.speed(x + 0.5 * h * a_u, y + 0.5 * h * a_v);
-                let (c_u, c_v) = self.speed(x + 0.5 * h * b_u, y + 0.5 * h * b_v);
-                let (d_u, d_v) = self.speed(x + h * c_u, y + h * c_v);
-                x += h / 6.0 * (a_u + 2.0 * b_u + 2.0 * c_u + d_u);
-                y += h / 6.0 * (a_v + 2.0 * b_v + 2.0 * c_v + d_v);
-            }
-            (x, y)
-        })
+        integrate(move |x, y| self.speed(x, y), to - from, STEPS_PER_FRAME)
     }
 }
 

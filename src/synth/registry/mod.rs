@@ -13,6 +13,7 @@ mod shear;
 mod speckle;
 mod turbulence;
 mod vortex;
+mod waves;
 
 use super::Scene;
 use super::carried::Carried;
@@ -22,7 +23,7 @@ use crate::error::{Error, Result};
 
 /// Every scene, by name.
 pub const SCENES: &[SceneKind] =
-    &[ramp::KIND, affine::KIND, plane::KIND, disc::KIND, vortex::KIND, shear::KIND, turbulence::KIND];
+    &[ramp::KIND, affine::KIND, plane::KIND, disc::KIND, vortex::KIND, shear::KIND, turbulence::KIND, waves::KIND];
 
 /// Everything that a motion can carry, by name. The first is the default.
 pub const CARRIERS: &[CarrierKind] = &[noise::KIND, speckle::KIND, particles::KIND];

@@ -1,0 +1,24 @@
+//! Particle paths of steady fields without a closed form.
+
+use super::PointMap;
+
+/// The map along the paths of the steady field `velocity` for `duration` frames, backwards where it is negative: Runge-Kutta of fourth order.
+pub(super) fn integrate<'a>(
+    velocity: impl Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a,
+    duration: f64,
+    steps_per_frame: f64,
+) -> PointMap<'a> {
+    let steps = (duration.abs() * steps_per_frame).ceil();
+    let h = if steps > 0.0 { duration / steps } else { 0.0 };
+    Box::new(move |mut x, mut y| {
+        for _ in 0..steps as usize {
+            let (a_u, a_v) = velocity(x, y);
+            let (b_u, b_v) = velocity(x + 0.5 * h * a_u, y + 0.5 * h * a_v);
+            let (c_u, c_v) = velocity(x + 0.5 * h * b_u, y + 0.5 * h * b_v);
+            let (d_u, d_v) = velocity(x + h * c_u, y + h * c_v);
+            x += h / 6.0 * (a_u + 2.0 * b_u + 2.0 * c_u + d_u);
+            y += h / 6.0 * (a_v + 2.0 * b_v + 2.0 * c_v + d_v);
+        }
+        (x, y)
+    })
+}

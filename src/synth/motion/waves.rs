@@ -1,0 +1,137 @@
+//! A smooth random velocity field of one scale.
+
+use super::{Motion, PointMap, integrate};
+use crate::math::random::CounterRng;
+use crate::types::AffineFlow;
+use std::f64::consts::TAU;
+
+/// Number of waves.
+const WAVES: usize = 8;
+/// Radians of the waves that the matter may pass in one step of the path integration, at root-mean-square speed.
+const RADIANS_PER_STEP: f64 = 0.03;
+/// Fewest steps of the path integration in one frame.
+const FEWEST_STEPS: f64 = 4.0;
+
+/// One wave `(u, v) = (along_x, along_y) sin(k . p + phase)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Wave {
+    kx: f64,
+    ky: f64,
+    phase: f64,
+    along_x: f64,
+    along_y: f64,
+}
+
+/// A steady smooth velocity field of one scale with divergence and curl: eight waves of equal strength and random phase, their wavelengths within a factor
+/// `2^(1/4)` of the one asked for, their directions and polarisations spread evenly.
+///
+/// Velocity and Jacobian are exact; paths have no closed form and are integrated (Runge-Kutta, fourth order; steps short enough for 1e-6 px a frame up to
+/// 8 px/frame and 64 px waves).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Waves {
+    waves: [Wave; WAVES],
+    steps_per_frame: f64,
+}
+
+impl Waves {
+    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose waves are about `wavelength` px long.
+    pub fn new(speed: f64, wavelength: f64, seed: u64) -> Self {
+        let rng = CounterRng::new(seed);
+        let share = |place: usize, draw: u64| TAU * (place as f64 + rng.uniform(draw)) / WAVES as f64;
+        let amplitude = speed * (2.0 / WAVES as f64).sqrt();
+        let waves = std::array::from_fn(|i| {
+            let draw = 4 * i as u64;
+            let wave_number = TAU / wavelength * 2f64.powf(0.5 * rng.uniform(draw) - 0.25);
+            // Half a turn of directions, a whole turn between a wave and what it moves: along the wave is divergence, across it is curl.
+            let direction = 0.5 * share(i, draw + 1);
+            let polarisation = direction + share(i * 3 % WAVES, draw + 2);
+            Wave {
+                kx: wave_number * direction.cos(),
+                ky: wave_number * direction.sin(),
+                phase: TAU * rng.uniform(draw + 3),
+                along_x: amplitude * polarisation.cos(),
+                along_y: amplitude * polarisation.sin(),
+            }
+        });
+        let radians = TAU / wavelength * speed.abs();
+        Self { waves, steps_per_frame: (radians / RADIANS_PER_STEP).ceil().clamp(FEWEST_STEPS, 1e6) }
+    }
+
+    /// Velocity alone: what the path integration needs.
+    fn speed(&self, x: f64, y: f64) -> (f64, f64) {
+        self.waves.iter().fold((0.0, 0.0), |(u, v), w| {
+            let sine = (w.kx * x + w.ky * y + w.phase).sin();
+            (u + w.along_x * sine, v + w.along_y * sine)
+        })
+    }
+}
+
+impl Motion for Waves {
+    fn velocity(&self, x: f64, y: f64, _t: f64) -> AffineFlow<f64> {
+        let mut m = AffineFlow::default();
+        for w in &self.waves {
+            let (sine, cosine) = (w.kx * x + w.ky * y + w.phase).sin_cos();
+            m.u += w.along_x * sine;
+            m.v += w.along_y * sine;
+            m.u_x += w.along_x * w.kx * cosine;
+            m.u_y += w.along_x * w.ky * cosine;
+            m.v_x += w.along_y * w.kx * cosine;
+            m.v_y += w.along_y * w.ky * cosine;
+        }
+        m
+    }
+
+    fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
+        integrate(move |x, y| self.speed(x, y), to - from, self.steps_per_frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance;
+    use super::*;
+
+    #[test]
+    fn velocity_jacobian_and_paths_agree() {
+        conformance::check(&Waves::new(2.0, 64.0, 3), 1e-5);
+        conformance::check(&Waves::new(8.0, 256.0, 5), 1e-5);
+    }
+
+    #[test]
+    fn paths_are_as_good_as_much_finer_steps() {
+        for (speed, wavelength) in [(8.0, 64.0), (4.0, 64.0), (8.0, 256.0), (0.5, 32.0)] {
+            let field = Waves::new(speed, wavelength, 7);
+            for i in 0..100 {
+                let start = (f64::from(i) * 37.1, f64::from(i) * 11.7);
+                for sign in [1.0, -1.0] {
+                    let (x, y) = field.path_map(0.0, sign)(start.0, start.1);
+                    let fine = (0..16).fold(start, |(x, y), _| field.path_map(0.0, sign / 16.0)(x, y));
+                    let off = (x - fine.0).hypot(y - fine.1);
+                    assert!(off < 1e-6, "{speed} px/frame, {wavelength} px: {off} px");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn has_the_speed_and_scale_asked_for_with_divergence_and_curl() {
+        for seed in 0..6 {
+            let field = Waves::new(1.3, 100.0, seed);
+            let n = 10_000;
+            let (mut energy, mut slopes, mut divergence, mut curl) = (0.0, 0.0, 0.0, 0.0);
+            for i in 0..n {
+                let m = field.velocity((i % 100) as f64 * 137.3, (i / 100) as f64 * 91.7, 0.0);
+                energy += m.u * m.u + m.v * m.v;
+                slopes += m.u_x * m.u_x + m.u_y * m.u_y + m.v_x * m.v_x + m.v_y * m.v_y;
+                divergence += (m.u_x + m.v_y).powi(2);
+                curl += (m.v_x - m.u_y).powi(2);
+            }
+            assert!(((energy / f64::from(n)).sqrt() - 1.3).abs() < 0.05);
+            let wave_number = (slopes / energy).sqrt();
+            assert!((wave_number * 100.0 / TAU - 1.0).abs() < 0.2, "{wave_number}");
+            for part in [divergence, curl] {
+                assert!(part / (divergence + curl) > 0.25, "{divergence} {curl}");
+            }
+        }
+    }
+}

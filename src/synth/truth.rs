@@ -1,0 +1,153 @@
+//! The truth of whole frames, as flow fields.
+
+use super::Scene;
+use crate::error::{Error, Result};
+use crate::parallel::for_each_band;
+use crate::types::{AffineFlow, FieldLayout, FlowField, MOTION_NAMES, Sites, Status};
+
+/// Half the step of the central differences of displacements, px: errors of the paths' third derivatives and of rounding are both near 1e-9.
+const STEP: f64 = 1e-3;
+
+/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN where the scene has none.
+///
+/// # Errors
+/// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
+pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
+    field(scene, t, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
+}
+
+/// What two frames can tell of the motion: the mean velocity, between the times `t + from` and `t + to`, of the matter that is at each pixel at time `t`.
+///
+/// With `d(t1)` the displacement since time `t` the flow is `(d(t + to) - d(t + from)) / (to - from)`, px/frame; the Jacobian is its derivative with
+/// respect to the place at time `t`, by central differences (good to 1e-8 /frame). `(0, 1)` is the displacement from a frame to the next,
+/// `(-1, 1)` the mean of the displacements since the last frame and to the next, `(-0.5, 0.5)` with `t` in the middle of two frames what
+/// joins them. It differs from [`truth`] wherever paths are curved. [`Status::Masked`] and NaN where the scene does not know.
+///
+/// # Errors
+/// [`Error::Argument`] naming `between` where its times are not finite or equal.
+pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<FlowField<f64>> {
+    if !(from.is_finite() && to.is_finite() && from != to) {
+        return Err(Error::argument("between", "two different times, frames", format!("({from}, {to})")));
+    }
+    let since = |x: f64, y: f64, duration: f64| {
+        if duration == 0.0 { scene.motion(x, y, t).map(|_| (0.0, 0.0)) } else { scene.displacement(x, y, t, duration) }
+    };
+    let mean = |x: f64, y: f64| {
+        let (before, after) = (since(x, y, from)?, since(x, y, to)?);
+        Some(((after.0 - before.0) / (to - from), (after.1 - before.1) / (to - from)))
+    };
+    field(scene, t, |x, y| {
+        let (u, v) = mean(x, y)?;
+        let (right, left, below, above) =
+            (mean(x + STEP, y)?, mean(x - STEP, y)?, mean(x, y + STEP)?, mean(x, y - STEP)?);
+        let slope = |ahead: f64, behind: f64| (ahead - behind) / (2.0 * STEP);
+        let m =
+            [u, v, slope(right.0, left.0), slope(right.1, left.1), slope(below.0, above.0), slope(below.1, above.1)];
+        m.iter().all(|value| value.is_finite()).then_some(m)
+    })
+}
+
+/// The field whose motion at scene point `(x, y)` is `motion(x, y)`; rows are spread over the threads of the current pool.
+fn field(scene: &dyn Scene, t: f64, motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync) -> Result<FlowField<f64>> {
+    let layout = FieldLayout {
+        frame_size: scene.size(),
+        sites: Sites::default(),
+        model: "truth".into(),
+        parameters: MOTION_NAMES.map(String::from).to_vec(),
+        frame_period: None,
+        pixel_pitch: (1.0, 1.0),
+        frame_index: t.max(0.0).round() as usize,
+        correlation_length: 0.0,
+    };
+    let mut field = FlowField::<f64>::empty(layout, false)?;
+    let (n, width, origin) = (field.len(), field.width, scene.origin());
+    let mut motions = vec![None; n];
+    for_each_band(&mut motions, width, |_, rows, band| {
+        for (row, motions) in rows.zip(band.chunks_exact_mut(width)) {
+            for (column, here) in motions.iter_mut().enumerate() {
+                *here = motion(origin.0 + column as f64, origin.1 + row as f64);
+            }
+        }
+    });
+    for (index, motion) in motions.into_iter().enumerate() {
+        field.status[index] = if motion.is_some() { Status::Ok } else { Status::Masked };
+        for (p, value) in motion.into_iter().flatten().enumerate() {
+            field.motion[p * n + index] = value;
+        }
+    }
+    Ok(field)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{SceneOptions, build};
+    use super::*;
+
+    fn options(values: &[(&str, f64)]) -> SceneOptions {
+        let values = values.iter().map(|(name, value)| ((*name).to_string(), *value)).collect();
+        SceneOptions { width: 24, height: 20, origin: (3.0, -2.0), seed: 4, values, ..SceneOptions::default() }
+    }
+
+    #[test]
+    fn a_rotation_moves_by_its_chord() {
+        let angle = 0.2f64;
+        let scene = build(
+            "affine",
+            &options(&[("u", 0.0), ("v", 0.0), ("u_x", 0.0), ("v_x", angle), ("u_y", -angle), ("v_y", 0.0)]),
+        );
+        let field = mean_truth(scene.unwrap().as_ref(), 0.0, (0.0, 1.0)).unwrap();
+        // R(angle) - 1, the same everywhere.
+        let (c, s) = (angle.cos() - 1.0, angle.sin());
+        for index in [0, 77, field.len() - 1] {
+            let m = field.affine(index);
+            for (got, want) in [(m.u_x, c), (m.v_x, s), (m.u_y, -s), (m.v_y, c)] {
+                assert!((got - want).abs() < 1e-8, "{m:?}");
+            }
+        }
+        // From the middle of both frames the chord is along the velocity: no divergence.
+        let scene = build(
+            "affine",
+            &options(&[("u", 0.0), ("v", 0.0), ("u_x", 0.0), ("v_x", angle), ("u_y", -angle), ("v_y", 0.0)]),
+        );
+        let m = mean_truth(scene.unwrap().as_ref(), 0.5, (-0.5, 0.5)).unwrap().affine(77);
+        assert!((m.u_x + m.v_y).abs() < 1e-8 && (m.v_x - 2.0 * (angle / 2.0).sin()).abs() < 1e-8, "{m:?}");
+    }
+
+    #[test]
+    fn flow_is_the_scenes_displacement() {
+        let scene = build("waves", &options(&[("speed", 3.0), ("wavelength", 64.0)])).unwrap();
+        let (forward, both) =
+            (mean_truth(scene.as_ref(), 1.0, (0.0, 1.0)), mean_truth(scene.as_ref(), 1.0, (-1.0, 1.0)));
+        let (forward, both) = (forward.unwrap(), both.unwrap());
+        for index in [0usize, 100, 479] {
+            let (x, y) = (3.0 + (index % 24) as f64, -2.0 + (index / 24) as f64);
+            let (ahead, behind) =
+                (scene.displacement(x, y, 1.0, 1.0).unwrap(), scene.displacement(x, y, 1.0, -1.0).unwrap());
+            assert_eq!((forward.affine(index).u, forward.affine(index).v), ahead);
+            assert!((both.affine(index).u - 0.5 * (ahead.0 - behind.0)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn short_times_tell_the_velocity() {
+        let scene = build("vortex", &options(&[])).unwrap();
+        let (short, exact) =
+            (mean_truth(scene.as_ref(), 2.0, (-0.01, 0.01)).unwrap(), truth(scene.as_ref(), 2.0).unwrap());
+        for index in 0..exact.len() {
+            for (got, want) in short.affine(index).to_array().into_iter().zip(exact.affine(index).to_array()) {
+                assert!((got - want).abs() < 1e-4, "{got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_truth_is_masked_and_bad_times_are_named() {
+        let scene = build("disc", &options(&[("disc_radius", 6.0)])).unwrap();
+        let field = mean_truth(scene.as_ref(), 0.0, (0.0, 1.0)).unwrap();
+        let masked = field.status.iter().filter(|&&status| status == Status::Masked).count();
+        assert!(masked > 20 && masked < 400, "{masked}");
+        for between in [(1.0, 1.0), (0.0, f64::NAN), (f64::INFINITY, 1.0)] {
+            assert!(mean_truth(scene.as_ref(), 0.0, between).unwrap_err().to_string().contains("between"));
+        }
+    }
+}
