@@ -1,10 +1,10 @@
 """Speed and accuracy beside the usual tools, both sides in one process; writes a dated table.
 
-    python benchmarks/compare.py [--quick] [--data FOLDER] [--out FOLDER] [--simd avx2]
+    python benchmarks/compare.py [--quick] [--only SECTION ...] [--data FOLDER] [--out FOLDER] [--simd avx2]
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
-of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it that table
-is left out.
+of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
+are left out. `--only flow filter accuracy controlled` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,39 +19,62 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
+SECTIONS = ("flow", "filter", "controlled", "accuracy")
 
 
 def main() -> None:
-    """Runs every comparison and writes `<date>.md` and `<date>.json`."""
+    """Runs the comparisons; writes `<date>.md` and `<date>.json` when it was all of them or a folder was named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds, frames and scenes")
+    parser.add_argument("--only", choices=SECTIONS, nargs="+", default=SECTIONS, help="sections to run")
     parser.add_argument("--data", type=Path, default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results", help="where the table goes")
+    parser.add_argument("--out", type=Path, help="where the table goes")
     parser.add_argument("--simd", default="avx2", help="instruction set of our side: scalar, avx2 or avx512")
     options = parser.parse_args()
     # Read once, when the compiled part is first used.
     os.environ["JACOFLOW_SIMD"] = options.simd
-
-    rounds = 3 if options.quick else 10
-    import accuracy
-    import filter_speed
-    import flow_speed
-
-    sections: dict[str, Rows] = {
-        "Flow per second, 640 x 480": flow_speed.speed(rounds),
-        "Flow filter, microseconds per pixel and frame, 640 x 480": filter_speed.speed(max(2, rounds // 2)),
-        "Flow filter, agreement with the reference": filter_speed.agreement(60 if options.quick else 400),
-    }
-    if options.data is not None:
-        sections["Accuracy on recordings"] = accuracy.table(Path(options.data))
+    data = None if options.data is None else Path(options.data)
+    sections: dict[str, Rows] = {}
+    for name in SECTIONS:
+        if name in options.only:
+            sections |= run(name, options.quick, data)
     machine = describe_machine(options.simd)
     date = datetime.date.today().isoformat()
-    options.out.mkdir(parents=True, exist_ok=True)
     text = markdown(date, machine, sections)
-    (options.out / f"{date}.md").write_text(text, encoding="utf-8")
-    record = {"date": date, "machine": machine, "sections": sections}
-    (options.out / f"{date}.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     print(text)
+    if options.out is None and set(options.only) != set(SECTIONS):
+        return
+    folder = options.out or Path(__file__).parent / "results"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{date}.md").write_text(text, encoding="utf-8")
+    record = {"date": date, "machine": machine, "sections": sections}
+    (folder / f"{date}.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
+    """The tables of one section, by title."""
+    rounds = 3 if quick else 10
+    if name == "flow":
+        import flow_speed
+
+        sizes = flow_speed.SIZES[:1] if quick else flow_speed.SIZES
+        return {f"Flow per second, {width} x {height}": flow_speed.speed(rounds, width, height) for width, height in sizes}
+    if name == "filter":
+        import filter_speed
+
+        return {
+            "Flow filter, microseconds per pixel and frame, 640 x 480": filter_speed.speed(max(2, rounds // 2)),
+            "Flow filter, agreement with the reference": filter_speed.agreement(60 if quick else 400),
+        }
+    if name == "controlled":
+        import controlled
+
+        return {"Accuracy on scenes with exact truth": controlled.default_table(quick)}
+    if data is None:
+        return {}
+    import accuracy
+
+    return {"Accuracy on recordings": accuracy.table(data), "Strain from image correlation": accuracy.strain(data)}
 
 
 def describe_machine(simd: str) -> dict[str, str]:
@@ -83,12 +106,15 @@ def markdown(date: str, machine: dict[str, str], sections: dict[str, Rows]) -> s
         if not rows:
             parts += ["Skipped: the rival is missing.", ""]
             continue
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        parts.append("| " + " | ".join(name.replace("_", " ") for name in columns) + " |")
-        parts.append("|" + "---|" * len(columns))
-        parts += ["| " + " | ".join(show(row.get(name)) for name in columns) + " |" for row in rows]
-        parts.append("")
+        parts += [*table_lines(rows), ""]
     return "\n".join(parts)
+
+
+def table_lines(rows: Rows) -> list[str]:
+    """The rows as a table; a cell is empty where a row has no such column."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    lines = ["| " + " | ".join(name.replace("_", " ") for name in columns) + " |", "|" + "---|" * len(columns)]
+    return lines + ["| " + " | ".join(show(row.get(name, "")) for name in columns) + " |" for row in rows]
 
 
 def show(value: object) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
+Name = TypeVar("Name", bound=Hashable)
 _TASKS = Path("/proc/self/task")
 
 
@@ -38,9 +40,9 @@ def once(work: Callable[[], object]) -> Time:
     return Time(max(spent - before.get(thread, 0.0) for thread, spent in after.items()), wall)
 
 
-def race(contestants: dict[str, Callable[[], object]], rounds: int) -> dict[str, Time]:
+def race(contestants: dict[Name, Callable[[], object]], rounds: int) -> dict[Name, Time]:
     """The best of `rounds` runs of each, taken in turns so that a noisy neighbour hits all alike; one run of each goes unmeasured before."""
-    best: dict[str, Time] = {}
+    best: dict[Name, Time] = {}
     for work in contestants.values():
         work()
     for _ in range(rounds):

@@ -1,0 +1,58 @@
+"""Our side of every table: settings of `jacoflow.estimate`. A new one is one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import jacoflow
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Options of `jacoflow.estimate` under a name."""
+
+    name: str
+    options: dict[str, Any]
+    frames: int = 3
+    """The most frames it is given: 2 for a pair even where there are three."""
+    moment: float = 0.5
+    """Where between the two frames of a pair its field belongs: 0 the first, 0.5 the middle. Three frames: always the middle one."""
+    window: float | None = None
+    """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it has no single one."""
+
+    def field(self, frames: Sequence[NDArray[Any]], **more: Any) -> jacoflow.FlowField:
+        """The estimate from two or three frames."""
+        return jacoflow.estimate(frames, **{**self.options, **more})
+
+    def estimate(self, frames: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
+        """Flow (H, W, 2) and Jacobian (H, W, 2, 2)."""
+        field = self.field(frames)
+        return field.flow.astype(float), field.jacobian.astype(float)
+
+
+def windowed(smooth: float, window: float, **more: Any) -> Setting:
+    """The single-level windowed estimator."""
+    options = {"method": "windowed", "smooth": smooth, "window_sigma": window, "covariance": False, "precision": "float64", **more}
+    return Setting(f"windowed, one level, smoothed {smooth:g} px, window {window:g} px", options, window=window)
+
+
+RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0)]
+"""The same for every recording."""
+
+CONTROLLED = [windowed(1.5, 4.0, rows="brightness")]
+"""The same for every scene with exact truth."""
+
+SPEED = [
+    Setting("instantaneous", {"method": "instantaneous", "covariance": False}),
+    Setting("instantaneous with covariance", {"method": "instantaneous", "covariance": True}),
+    Setting("windowed", {"method": "windowed", "covariance": False}),
+    Setting("windowed, pair", {"method": "windowed", "covariance": False}, frames=2),
+]
+"""Timed with one thread and with two."""

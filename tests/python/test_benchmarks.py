@@ -1,0 +1,97 @@
+"""What the comparisons measure with: masks, errors and the noise bound (no rival is needed here)."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from jacoflow import scenes
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import contestants
+import controlled
+import noise_bound
+import scoring
+
+
+def test_the_jacobian_counts_away_from_edges_and_unknown_truth():
+    truth = np.zeros((60, 70, 2))
+    truth[30, 20] = np.nan
+    truth[:, 50:, 0] = 5.0
+    where = scoring.usable(truth)
+    assert not where[:12].any() and not where[:, :12].any() and not where[-12:].any() and not where[:, -12:].any()
+    # The differences of the four neighbours are unknown too, hence 4 px around a cross.
+    assert not where[26:35, 15:26].any() and not where[25:36, 16:25].any()
+    assert where[25, 15] and where[24, 20] and where[30, 14] and where[36, 20]
+    assert not where[12:48, 49:51].any() and where[14, 48] and where[14, 51]
+
+
+def test_errors_count_what_is_known():
+    truth = np.zeros((30, 40, 2))
+    truth[0, 0] = np.nan
+    flow = np.broadcast_to([3.0, 4.0], truth.shape).copy()
+    flow[:15] = np.nan
+    error, share = scoring.end_point_error(flow, truth)
+    assert error == pytest.approx(5.0) and share == pytest.approx(600 / 1199)
+    assert scoring.jacobian_error(np.full((30, 40, 2, 2), 0.1), np.zeros((30, 40, 2, 2)), scoring.inside((30, 40), 5)) == pytest.approx(0.1)
+    mask = np.zeros((9, 9), bool)
+    mask[4, 0] = True
+    assert_array_equal(np.argwhere(scoring.widened(mask, 1)), [[3, 0], [3, 1], [4, 0], [4, 1], [5, 0], [5, 1]])
+
+
+def test_the_noise_bound_is_the_spread_of_least_squares():
+    """The window's equations written out and solved for many draws of the noise."""
+    rng = np.random.default_rng(3)
+    gradient = rng.normal(size=(41, 41, 2)) * 8
+    window, noise, middle = 2.5, 2.0, 20
+    offsets = np.arange(-10, 11)
+    dx, dy = np.meshgrid(offsets, offsets)
+    weights = np.exp(-0.5 * (dx**2 + dy**2) / window**2).ravel()
+    g_x, g_y = np.moveaxis(gradient[middle - 10 : middle + 11, middle - 10 : middle + 11].reshape(-1, 2), -1, 0)
+    rows = np.stack([g_x, g_y, g_x * dx.ravel(), g_y * dx.ravel(), g_x * dy.ravel(), g_y * dy.ravel()], axis=-1)
+    draws = rng.normal(size=(441, 20000)) * np.sqrt(2 * (noise**2 + 1 / 12))
+    solved = np.linalg.solve(rows.T @ (weights[:, None] * rows), rows.T @ (weights[:, None] * draws))
+    bound = noise_bound.covariance(gradient, window, noise)[middle, middle]
+    assert_allclose(np.diagonal(bound), solved.var(axis=1), rtol=0.06)
+    triple = noise_bound.covariance(gradient, window, noise, frames=3)[middle, middle]
+    assert_allclose(triple, bound / 4)
+    where = np.zeros((41, 41), bool)
+    where[middle, middle] = True
+    assert noise_bound.jacobian_bound(gradient, window, noise, where) == pytest.approx(np.sqrt(np.diagonal(bound)[2:].mean()))
+
+
+def test_controlled_scenes_have_the_speed_asked_for_and_exact_truth():
+    case = controlled.Case(64.0, 3.0, 0.0, seed=2)
+    assert np.linalg.norm(case.scene().truth(0.0).flow, axis=-1).max() == pytest.approx(3.0)
+
+    def knows(frames):
+        return answer
+
+    for frames, moment, t, between in ((2, 0.0, 0.0, (0, 1)), (2, 0.5, 0.5, (-0.5, 0.5)), (3, 0.0, 0.0, (-1, 1))):
+        truth = case.scene().truth(t, between=between)
+        answer = truth.flow, truth.jacobian
+        contestant = controlled.Contestant("exact", knows, frames=frames, moment=moment)
+        assert contestant.errors(case) == (0.0, 1.0, 0.0)
+    assert len(controlled.cases()) == 16
+
+
+def test_the_gradient_of_a_controlled_scene_is_its_textures():
+    case = controlled.Case(256.0, 1.0, 0.0)
+    exact = controlled.gradient(case.wavelength, case.speed, case.seed, 0.0)
+    along_y, along_x = np.gradient(case.scene().frame(0.0))
+    inner = scoring.inside(along_x.shape, 2)
+    # Central differences over 2 px fall short of the slope of a texture smoothed by 2 px by about a tenth.
+    for axis, difference in ((0, along_x), (1, along_y)):
+        fit = (exact[..., axis] * difference)[inner].sum() / (exact[..., axis] ** 2)[inner].sum()
+        assert 0.8 < fit < 1.0
+
+
+def test_settings_are_called_with_their_options():
+    setting = contestants.Setting("windowed", {"method": "windowed", "window_sigma": 3.0}, frames=2, window=3.0)
+    frames = list(scenes.Scene("affine", width=48, height=40).frames(2))
+    flow, jacobian = setting.estimate(frames)
+    assert flow.shape == (40, 48, 2) and jacobian.shape == (40, 48, 2, 2)
+    contestant = controlled.Contestant.of(setting)
+    assert (contestant.times(), contestant.moment, contestant.window) == ((0.0, 1.0), 0.5, 3.0)
