@@ -12,6 +12,7 @@
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 
 pub mod baseline;
+mod coarse_to_fine;
 pub mod derived;
 mod estimator;
 pub mod instantaneous;

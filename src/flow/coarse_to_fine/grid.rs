@@ -1,0 +1,91 @@
+//! Planes of values on the sites of one pyramid level.
+
+use crate::simd::SimdReal;
+
+/// Free samples before each row, so that a kernel may read the left neighbour of its first site.
+pub(super) const LEFT: usize = 16;
+/// Rows are as long as a multiple of this many samples (plus [`LEFT`]), so that no kernel needs a tail.
+pub(super) const CHUNK: usize = 32;
+
+/// Some planes of `width x height` values. The planes of one row lie together, row after row: kernels walk along rows and need all planes of a site.
+///
+/// What lies beside the sites of a row ([`LEFT`] before, at least one after) may hold anything finite.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Planes<T> {
+    pub width: usize,
+    pub height: usize,
+    /// Number of planes.
+    pub count: usize,
+    data: Vec<T>,
+}
+
+impl<T: SimdReal> Planes<T> {
+    /// Zeros.
+    pub fn new(width: usize, height: usize, count: usize) -> Self {
+        let mut planes = Self { width, height, count, data: Vec::new() };
+        planes.data.resize(planes.row_len() * height, T::from_f64(0.0));
+        planes
+    }
+
+    /// Sites that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
+    pub fn padded(&self) -> usize {
+        self.width.div_ceil(CHUNK) * CHUNK
+    }
+
+    /// Samples from a plane's row to the next plane's.
+    pub fn stride(&self) -> usize {
+        LEFT + self.padded() + LEFT
+    }
+
+    /// Samples from a row to the next.
+    pub fn row_len(&self) -> usize {
+        self.stride() * self.count
+    }
+
+    /// The row `y` of every plane; plane `k`, site `x` is at `k * stride() + LEFT + x`.
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.row_len()..(y + 1) * self.row_len()]
+    }
+
+    /// As [`Planes::row`].
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let len = self.row_len();
+        &mut self.data[y * len..(y + 1) * len]
+    }
+
+    /// Everything, to be cut into rows of [`Planes::row_len`].
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// The sites of row `y` of plane `k`.
+    pub fn line(&self, k: usize, y: usize) -> &[T] {
+        let first = k * self.stride() + LEFT;
+        &self.row(y)[first..first + self.width]
+    }
+
+    /// As [`Planes::line`].
+    pub fn line_mut(&mut self, k: usize, y: usize) -> &mut [T] {
+        let (first, width) = (k * self.stride() + LEFT, self.width);
+        &mut self.row_mut(y)[first..first + width]
+    }
+
+    /// The value of plane `k` at a site.
+    pub fn at(&self, k: usize, x: usize, y: usize) -> T {
+        self.line(k, y)[x]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_where_rows_say() {
+        let mut p = Planes::<f32>::new(33, 3, 2);
+        assert_eq!((p.padded(), p.stride(), p.row_len()), (64, 96, 192));
+        p.line_mut(1, 2)[5] = 7.0;
+        assert_eq!((p.at(1, 5, 2), p.row(2)[p.stride() + LEFT + 5]), (7.0, 7.0));
+        assert!(p.line(0, 2).iter().all(|v| *v == 0.0));
+    }
+}

@@ -1,0 +1,4 @@
+//! The everyday estimator: affine flow from coarse to fine.
+
+#[allow(dead_code)]
+mod grid;
