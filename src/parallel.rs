@@ -90,13 +90,25 @@ pub fn for_each_band<T: Send>(
     row_len: usize,
     work: impl Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync,
 ) {
+    for_each_band_of(BAND_ROWS, buffer, row_len, work);
+}
+
+/// As [`for_each_band`], for work whose bands need more rows than [`BAND_ROWS`] to be worth their overlap.
+///
+/// `band_rows` must be a constant: were it to depend on the number of threads, so would the results.
+pub(crate) fn for_each_band_of<T: Send>(
+    band_rows: usize,
+    buffer: &mut [T],
+    row_len: usize,
+    work: impl Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync,
+) {
     if row_len == 0 {
         return;
     }
     let rows = buffer.len() / row_len;
-    buffer.par_chunks_mut(BAND_ROWS * row_len).enumerate().for_each(|(band, slice)| {
-        let start = band * BAND_ROWS;
-        work(band, start..(start + BAND_ROWS).min(rows), slice);
+    buffer.par_chunks_mut(band_rows * row_len).enumerate().for_each(|(band, slice)| {
+        let start = band * band_rows;
+        work(band, start..(start + band_rows).min(rows), slice);
     });
 }
 

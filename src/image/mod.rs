@@ -1,5 +1,6 @@
 //! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling; and pictures of results.
 
+mod blocks;
 mod border;
 mod luminance;
 pub mod picture;
@@ -7,6 +8,8 @@ mod preprocess;
 mod quantise;
 mod sample;
 mod smooth;
+#[allow(dead_code)] // offered to the estimators that warp
+mod spline;
 
 pub use border::Border;
 pub use luminance::luminance;
@@ -17,3 +20,5 @@ pub use smooth::GaussianSmoother;
 
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};
+#[allow(unused_imports)] // as above
+pub(crate) use spline::Spline;

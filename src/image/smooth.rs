@@ -1,6 +1,7 @@
 //! Gaussian smoothing: a symmetric separable convolution, vectorised along rows and parallel over row bands.
 
 use super::Border;
+use super::blocks::{cover, load, store};
 use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};
@@ -202,27 +203,6 @@ fn extend<T: Copy>(row: &mut [T], radius: usize, width: usize, border: Border) {
     }
 }
 
-/// Vectors summed side by side, so that one addition need not wait for the last.
-const BLOCK: usize = 4;
-
-/// Calls `$block::<V, N>(x)` so that every column of `0..width` is covered, `width >= LANES`: blocks, single vectors, and one last vector that overlaps.
-macro_rules! cover {
-    ($width:expr, $V:ty, |$x:ident, $N:ident| $body:expr) => {{
-        let mut $x = 0;
-        while $x + BLOCK * <$V>::LANES <= $width {
-            const $N: usize = BLOCK;
-            $body;
-            $x += BLOCK * <$V>::LANES;
-        }
-        while $x < $width {
-            const $N: usize = 1;
-            $x = $x.min($width - <$V>::LANES);
-            $body;
-            $x += <$V>::LANES;
-        }
-    }};
-}
-
 /// `out = half[0] centre + sum_k half[k] (above_k + below_k)`.
 #[inline(always)]
 fn sum_down<V: Lanes>(
@@ -251,20 +231,6 @@ fn sum_along<V: Lanes>(row: &[V::Scalar], half: &[V::Scalar], out: &mut [V::Scal
         }
         store::<V, N>(&sums, &mut out[x..]);
     });
-}
-
-#[inline(always)]
-fn load<V: Lanes, const N: usize>(source: &[V::Scalar]) -> [V; N] {
-    let source = &source[..N * V::LANES];
-    std::array::from_fn(|i| V::load(&source[i * V::LANES..]))
-}
-
-#[inline(always)]
-fn store<V: Lanes, const N: usize>(values: &[V; N], target: &mut [V::Scalar]) {
-    let target = &mut target[..N * V::LANES];
-    for i in 0..N {
-        values[i].store(&mut target[i * V::LANES..]);
-    }
 }
 
 #[inline(always)]

@@ -37,6 +37,13 @@ pub(crate) trait Lanes:
     fn lt(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// The greatest whole number not above the value.
+    fn floor(self) -> Self;
+    /// Sums four rows of four neighbours down their columns, a patch of its own for every lane `l`:
+    /// `result[k][l] = sum_j weights[j][l] plane[(row[l] + j) stride + column[l] + k]`, `j, k = 0..4`.
+    ///
+    /// `column` and `row` hold whole numbers below 2^31. Panics where a patch reaches beyond `plane`.
+    fn sum_patches(plane: &[Self::Scalar], stride: usize, column: Self, row: Self, weights: [Self; 4]) -> [Self; 4];
 
     /// Zero in every lane.
     #[inline(always)]
@@ -104,6 +111,20 @@ macro_rules! scalar_lanes {
             #[inline(always)]
             fn select(mask: bool, yes: $t, no: $t) -> $t {
                 if mask { yes } else { no }
+            }
+            #[inline(always)]
+            fn floor(self) -> $t {
+                <$t>::floor(self)
+            }
+            #[inline(always)]
+            fn sum_patches(plane: &[$t], stride: usize, column: $t, row: $t, weights: [$t; 4]) -> [$t; 4] {
+                let patch = &plane[row as usize * stride + column as usize..][..3 * stride + 4];
+                std::array::from_fn(|k| {
+                    let sum = patch[k] * weights[0];
+                    let sum = Lanes::mul_add(patch[stride + k], weights[1], sum);
+                    let sum = Lanes::mul_add(patch[2 * stride + k], weights[2], sum);
+                    Lanes::mul_add(patch[3 * stride + k], weights[3], sum)
+                })
             }
         }
         impl SimdReal for $t {

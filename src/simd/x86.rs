@@ -5,17 +5,23 @@
 //! [`dispatch`](super::dispatch) enters after checking the processor: the types are private to `simd`
 //! and reach kernels only as `SimdReal::Avx2` and `SimdReal::Avx512`.
 
+mod patches;
+
 use super::lanes::Lanes;
 #[allow(clippy::wildcard_imports)]
 use core::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Round towards minus infinity, without a flag for inexact results.
+const FLOOR: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
 
 macro_rules! lanes {
     (
         $name:ident, $vector:ty, $scalar:ty, $count:literal, $mask:ty,
         $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident, $div:ident,
         $fmadd:ident, $fnmadd:ident, $sqrt:ident, $min:ident, $max:ident,
-        |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr
+        |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr,
+        |$fa:ident| $floor:expr, $patches:path
     ) => {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($vector);
@@ -118,6 +124,17 @@ macro_rules! lanes {
                 // SAFETY: see the module's note.
                 Self(unsafe { $select })
             }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                let $fa = self.0;
+                // SAFETY: see the module's note.
+                Self(unsafe { $floor })
+            }
+            #[inline(always)]
+            fn sum_patches(plane: &[$scalar], stride: usize, column: Self, row: Self, weights: [Self; 4]) -> [Self; 4] {
+                // SAFETY: see the module's note.
+                unsafe { $patches(plane, stride, column.0, row.0, weights.map(|w| w.0)) }.map(Self)
+            }
         }
     };
 }
@@ -141,7 +158,9 @@ lanes!(
     _mm256_min_ps,
     _mm256_max_ps,
     |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm256_blendv_ps(n, y, m)
+    |m, y, n| _mm256_blendv_ps(n, y, m),
+    |a| _mm256_floor_ps(a),
+    patches::f32x8
 );
 lanes!(
     F64x4,
@@ -162,7 +181,9 @@ lanes!(
     _mm256_min_pd,
     _mm256_max_pd,
     |a, b| _mm256_cmp_pd::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm256_blendv_pd(n, y, m)
+    |m, y, n| _mm256_blendv_pd(n, y, m),
+    |a| _mm256_floor_pd(a),
+    patches::f64x4
 );
 lanes!(
     F32x16,
@@ -183,7 +204,9 @@ lanes!(
     _mm512_min_ps,
     _mm512_max_ps,
     |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm512_mask_blend_ps(m, n, y)
+    |m, y, n| _mm512_mask_blend_ps(m, n, y),
+    |a| _mm512_roundscale_ps::<FLOOR>(a),
+    patches::f32x16
 );
 lanes!(
     F64x8,
@@ -204,5 +227,7 @@ lanes!(
     _mm512_min_pd,
     _mm512_max_pd,
     |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b),
-    |m, y, n| _mm512_mask_blend_pd(m, n, y)
+    |m, y, n| _mm512_mask_blend_pd(m, n, y),
+    |a| _mm512_roundscale_pd::<FLOOR>(a),
+    patches::f64x8
 );

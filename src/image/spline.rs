@@ -1,0 +1,143 @@
+//! Brightness between the pixels as a cubic spline: exact at the pixels, twice continuously differentiable, and fast to read.
+
+mod prefilter;
+
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::Frame;
+
+/// Coefficients before the first column and row, so that the first pixel's taps exist.
+const BEFORE: usize = 1;
+/// Coefficients before and after together: the last pixel's taps reach two further.
+const MARGIN: usize = BEFORE + 2;
+
+/// The cubic spline through the samples of a frame, which it continues by mirroring at the outermost pixel centres
+/// (M. Unser, "Splines: a perfect fit for signal and image processing", 1999).
+///
+/// `f(x, y) = sum_j sum_i c_ij b(x - i) b(y - j)` with the cubic B-spline `b`; the coefficients `c` are such that `f` meets every sample. Finite samples
+/// are asked for: anything else spreads along its column and row.
+#[derive(Debug, Clone)]
+pub(crate) struct Spline<T> {
+    width: usize,
+    height: usize,
+    /// Values a row.
+    stride: usize,
+    /// `height + MARGIN` rows; pixel (0, 0) is at (BEFORE, BEFORE).
+    coefficients: Vec<T>,
+}
+
+impl<T: SimdReal> Spline<T> {
+    /// The spline through the samples of `frame`; identical for any number of threads.
+    pub(crate) fn new(level: Level, frame: &Frame<T>) -> Self {
+        let mut spline = Self { width: 0, height: 0, stride: 0, coefficients: Vec::new() };
+        spline.refill(level, frame);
+        spline
+    }
+
+    /// The spline through the samples of another frame, in the same memory when it is of the same size.
+    pub(crate) fn refill(&mut self, level: Level, frame: &Frame<T>) {
+        let (width, height) = frame.size();
+        if (width, height) != self.size() {
+            (self.width, self.height) = (width, height);
+            self.stride = stride::<T>(width);
+            let rows = if frame.data().is_empty() { 0 } else { height + MARGIN };
+            self.coefficients.clear();
+            self.coefficients.resize(rows * self.stride, T::from_f64(0.0));
+        }
+        prefilter::prefilter(level, frame, self.stride, &mut self.coefficients);
+    }
+
+    /// `(width, height)` of the frame.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// `out[i] = f(x[i], y[i])`, positions in px; those outside are moved to the nearest edge, NaN to the first pixel's. All NaN for an empty frame.
+    ///
+    /// Panics when `x` or `y` are shorter than `out`.
+    pub(crate) fn sample_row(&self, level: Level, x: &[T], y: &[T], out: &mut [T]) {
+        dispatch(level, SampleRow { spline: self, x, y, out });
+    }
+
+    /// As [`Spline::sample_row`], for use inside another kernel.
+    #[inline(always)]
+    pub(crate) fn sample_row_in<V: Lanes<Scalar = T>>(&self, x: &[T], y: &[T], out: &mut [T]) {
+        let count = out.len();
+        let (x, y) = (&x[..count], &y[..count]);
+        if self.coefficients.is_empty() {
+            out.fill(T::nan());
+            return;
+        }
+        if count < V::LANES {
+            for i in 0..count {
+                out[i] = self.sample_in::<T>(x[i], y[i]);
+            }
+            return;
+        }
+        let mut i = 0;
+        while i < count {
+            // The last vector overlaps the one before.
+            i = i.min(count - V::LANES);
+            self.sample_in(V::load(&x[i..]), V::load(&y[i..])).store(&mut out[i..]);
+            i += V::LANES;
+        }
+    }
+
+    /// `f(x, y)` in lanes; the frame is not empty.
+    #[inline(always)]
+    pub(crate) fn sample_in<V: Lanes<Scalar = T>>(&self, x: V, y: V) -> V {
+        let (x, y) = (clamp(x, self.width), clamp(y, self.height));
+        let (column, row) = (x.floor(), y.floor());
+        // The first tap of pixel (0, 0) is the coefficient at (0, 0): the margin makes up for its lying one further up and left.
+        let down = weights(y - row);
+        let sums = V::sum_patches(&self.coefficients, self.stride, column, row, down);
+        let across = weights(x - column);
+        let sum = sums[1].mul_add(across[1], sums[0] * across[0]);
+        sum + sums[3].mul_add(across[3], sums[2] * across[2])
+    }
+}
+
+/// Values a row: room for the margin, a whole number of cache lines, but not of pages, whose columns would fight for the same lines of a cache.
+fn stride<T>(width: usize) -> usize {
+    let (line, page) = (64 / size_of::<T>(), 4096 / size_of::<T>());
+    let stride = (width + MARGIN).next_multiple_of(line);
+    if stride.is_multiple_of(page) { stride + line } else { stride }
+}
+
+/// `position` moved into `0..=len - 1`; NaN becomes 0.
+#[inline(always)]
+fn clamp<V: Lanes>(position: V, len: usize) -> V {
+    position.max(V::zero()).min(V::constant(len as f64 - 1.0))
+}
+
+/// The cubic B-spline at `f + 1`, `f`, `1 - f` and `2 - f`: the weights of the pixels at -1, 0, 1 and 2 for a position `f` past pixel 0.
+#[inline(always)]
+fn weights<V: Lanes>(f: V) -> [V; 4] {
+    let (sixth, half, two_thirds) = (V::constant(1.0 / 6.0), V::constant(0.5), V::constant(2.0 / 3.0));
+    let g = V::constant(1.0) - f;
+    let (f2, g2) = (f * f, g * g);
+    [
+        g2 * g * sixth,
+        f.mul_add(half, V::constant(-1.0)).mul_add(f2, two_thirds),
+        g.mul_add(half, V::constant(-1.0)).mul_add(g2, two_thirds),
+        f2 * f * sixth,
+    ]
+}
+
+struct SampleRow<'a, T> {
+    spline: &'a Spline<T>,
+    x: &'a [T],
+    y: &'a [T],
+    out: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for SampleRow<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        self.spline.sample_row_in::<V>(self.x, self.y, self.out);
+    }
+}
+
+#[cfg(test)]
+mod tests;
