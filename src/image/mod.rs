@@ -2,13 +2,17 @@
 
 mod blocks;
 mod border;
+#[allow(dead_code)] // offered to the estimators that warp
+mod fill;
 mod luminance;
 pub mod picture;
 mod preprocess;
+#[allow(dead_code)] // as above
+mod pyramid;
 mod quantise;
 mod sample;
 mod smooth;
-#[allow(dead_code)] // offered to the estimators that warp
+#[allow(dead_code)] // as above
 mod spline;
 
 pub use border::Border;
@@ -18,6 +22,10 @@ pub use quantise::Quantiser;
 pub use sample::Interpolation;
 pub use smooth::GaussianSmoother;
 
+#[allow(unused_imports)] // offered to the estimators that warp
+pub(crate) use fill::{fill_holes, usable_pixels};
+#[allow(unused_imports)] // as above
+pub(crate) use pyramid::{halve, halve_into, halve_mask, halved_size};
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};
 #[allow(unused_imports)] // as above
