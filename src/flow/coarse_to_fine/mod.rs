@@ -1,4 +1,6 @@
 //! The everyday estimator: affine flow from coarse to fine.
 
 #[allow(dead_code)]
+mod data;
+#[allow(dead_code)]
 mod grid;

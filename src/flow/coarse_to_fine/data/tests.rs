@@ -1,0 +1,165 @@
+//! The data term against its oracle; what must not change a bit; how long it takes.
+
+mod oracle;
+
+use super::*;
+use crate::parallel::Threads;
+use oracle::Case;
+
+impl Case {
+    fn check<T: SimdReal>(&self, tolerance: f64) {
+        let (want, mut want_residuals) = self.oracle();
+        want_residuals.sort_by(f64::total_cmp);
+        // Of the greatest of the six moments of a product, or of the three: a moment of its own may cancel.
+        let family = |k: usize| match k {
+            0..18 => k / 6 * 6..k / 6 * 6 + 6,
+            18..24 => 18..24,
+            _ => k..k + 1,
+        };
+        for level in Level::available() {
+            let (got, residuals) = self.run::<T>(level, 1);
+            assert_eq!((got.width, got.height, got.count), (self.size.0.div_ceil(2), self.size.1.div_ceil(2), COUNT));
+            for k in 0..COUNT {
+                let most = want[family(k)].iter().flatten().fold(1e-3f64, |m, v| m.max(v.abs()));
+                for (i, want) in want[k].iter().enumerate() {
+                    let got = got.at(k, i % got.width, i / got.width).to_f64();
+                    let close = (got - want).abs() <= tolerance * most;
+                    assert!(close, "{level:?} {:?} plane {k} site {i}: {got} {want}", self.size);
+                }
+            }
+            let mut residuals: Vec<f64> = residuals.iter().map(|r| r.to_f64()).collect();
+            residuals.sort_by(f64::total_cmp);
+            assert_eq!(residuals.len(), want_residuals.len(), "{level:?} {:?}", self.size);
+            for (got, want) in residuals.iter().zip(&want_residuals) {
+                assert!((got - want).abs() <= 300.0 * tolerance, "{level:?}: {got} {want}");
+            }
+        }
+    }
+
+    fn check_both(&self) {
+        self.check::<f64>(1e-12);
+        self.check::<f32>(2e-5);
+    }
+}
+
+#[test]
+fn pairs_and_triples_of_any_size_are_the_formulas() {
+    for size in [(37, 29), (38, 30), (8, 8), (3, 3), (5, 64)] {
+        for views in [2, 3] {
+            Case::new(size, views, 1.3).check_both();
+        }
+    }
+}
+
+#[test]
+fn levels_of_nearly_nothing_are_empty_not_a_panic() {
+    for size in [(1, 1), (2, 1), (1, 9), (2, 2), (4, 2)] {
+        let case = Case::new(size, 2, 0.7);
+        for level in Level::available() {
+            let (planes, residuals) = case.run::<f32>(level, 1);
+            assert!(residuals.is_empty());
+            for y in 0..planes.height {
+                assert!((0..COUNT).all(|k| planes.line(k, y).iter().all(|v| *v == 0.0)));
+            }
+        }
+    }
+    assert!(Case::new((0, 5), 2, 0.7).run::<f32>(Level::SCALAR, 1).1.is_empty());
+}
+
+#[test]
+fn positions_outside_and_hidden_pixels_weigh_nothing() {
+    let mut case = Case::new((41, 34), 3, 9.0);
+    case.check_both();
+    case.masks[0] = Some(Mask::from_fn(41, 34, |x, y| (x / 5 + y / 7) % 3 != 0));
+    case.check_both();
+    case.masks[2] = Some(Mask::from_fn(41, 34, |x, y| x + y > 20));
+    case.check_both();
+    let (planes, _) = case.oracle();
+    let share = planes[VALID].iter().sum::<f64>() / planes[VALID].len() as f64;
+    assert!(share > 0.05 && share < 0.5, "the case is no case: {share}");
+}
+
+#[test]
+fn options_reach_the_sums() {
+    let mut case = Case::new((26, 21), 2, 0.9);
+    case.scale = None;
+    case.check_both();
+    for sigma in [0.6, 1.0, 2.1, 4.0] {
+        case.options = DataOptions { gradient: 0.5, sigma, robust: 1.0 };
+        case.scale = Some(2.0);
+        case.check_both();
+    }
+}
+
+#[test]
+fn tiles_and_bands_leave_no_seams() {
+    // Two tiles of columns, two bands of rows.
+    let mut case = Case::new((670, 111), 2, 1.1);
+    case.check::<f64>(1e-12);
+    // Single precision rounds a position by 3e-5 px beyond column 512, and the waves rise by some ten parts of themselves a px.
+    case.check::<f32>(2e-4);
+    case.options.sigma = 3.4;
+    case.check::<f64>(1e-12);
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let case = Case::new((131, 250), 3, 1.6);
+    let bits = |threads| {
+        let (planes, residuals) = case.run::<f32>(Level::detect(), threads);
+        let lines =
+            (0..COUNT).flat_map(|k| (0..planes.height).flat_map(move |y| (0..planes.width).map(move |x| (k, x, y))));
+        let bits: Vec<u32> = lines.map(|(k, x, y)| planes.at(k, x, y).to_bits()).collect();
+        (bits, residuals.iter().map(|r| r.to_bits()).collect::<Vec<_>>())
+    };
+    assert_eq!(bits(1), bits(2));
+}
+
+#[test]
+#[ignore = "prints how long a pixel takes; build with --release"]
+#[allow(clippy::print_stderr)]
+fn time_of_a_pixel() {
+    for size in [(640, 480), (1920, 1080), (160, 120)] {
+        for views in [2, 3] {
+            let case = Case::new(size, views, 1.5);
+            let splines: Vec<Spline<f32>> =
+                case.frames.iter().map(|f| Spline::new(Level::detect(), &f.map(|v| *v as f32))).collect();
+            let views: Vec<_> = match splines.as_slice() {
+                [a, b] => View::pair([a, b], [None; 2]).to_vec(),
+                [a, b, c] => View::triple([a, b, c], [None; 3]).to_vec(),
+                _ => unreachable!(),
+            };
+            let mut motion = Planes::new(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
+            for k in 0..MOTION {
+                for y in 0..motion.height {
+                    let row = motion.width * y;
+                    for (x, v) in motion.line_mut(k, y).iter_mut().enumerate() {
+                        *v = case.motion[k][row + x] as f32;
+                    }
+                }
+            }
+            for level in [Level::avx2(), Level::avx512()].into_iter().flatten() {
+                let term = DataTerm::<f32>::new(level, DataOptions::default());
+                let mut out = Planes::default();
+                Threads::new(Some(1)).unwrap().install(|| {
+                    let mut times: Vec<f64> = (0..40)
+                        .map(|_| {
+                            let start = std::time::Instant::now();
+                            term.linearise(size, &views, &motion, Some(3.0), &mut out);
+                            start.elapsed().as_secs_f64()
+                        })
+                        .collect();
+                    times.sort_by(f64::total_cmp);
+                    let pixels = (size.0 * size.1) as f64;
+                    eprintln!(
+                        "{size:?} {} views {}: {:.2} ns/px (median {:.2})",
+                        views.len(),
+                        level.name(),
+                        times[0] / pixels * 1e9,
+                        times[20] / pixels * 1e9
+                    );
+                });
+            }
+        }
+    }
+}
