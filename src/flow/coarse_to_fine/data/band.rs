@@ -3,7 +3,7 @@
 use super::super::grid::{LEFT as GRID_LEFT, Planes};
 use super::View;
 use super::dense::dense_row;
-use super::moments::{horizontal, vertical};
+use super::moments::{ERROR, horizontal, normal, right, vertical};
 use super::products::{Weights, products_row, residuals, vertical_stencils};
 use super::scratch::{CHUNK, Columns, IMAGE, PRODUCTS, RING, Scratch};
 use super::warp::warp_row;
@@ -120,33 +120,34 @@ impl<T: SimdReal> Band<'_, T> {
         let products = self.scratch.products.all();
         let planes = self.scratch.vertical.all();
         let row = columns.row(1);
+        let out = &mut self.out[(site - self.rows.start) * len..(site + 1 - self.rows.start) * len];
+        let at = |plane: usize| plane * self.task.stride + GRID_LEFT + columns.from;
         let mut starts = [0; 64];
+        // Plane by plane: what the one filter writes is still in the nearest cache when the other reads it.
         for plane in 0..PRODUCTS {
             for (k, start) in starts[..ring].iter_mut().enumerate() {
                 *start = (2 * site + k) % ring * columns.row(PRODUCTS) + plane * row;
             }
             let rows = &starts[..ring];
             match plane {
-                0..3 => vertical::<V, 3>(columns, products, rows, taps, &mut planes[3 * plane * row..]),
-                3..5 => vertical::<V, 2>(columns, products, rows, taps, &mut planes[(2 * plane + 3) * row..]),
-                _ => vertical::<V, 1>(columns, products, rows, taps, &mut planes[(plane + 8) * row..]),
+                0..3 => {
+                    let first = normal(0, 0) + 6 * plane;
+                    vertical::<V, 3>(columns, products, rows, taps, planes);
+                    horizontal::<V, 3>(columns, &planes[..row], taps, out, [0, 1, 3].map(|k| at(first + k)));
+                    horizontal::<V, 2>(columns, &planes[row..2 * row], taps, out, [2, 4].map(|k| at(first + k)));
+                    horizontal::<V, 1>(columns, &planes[2 * row..], taps, out, [at(first + 5)]);
+                }
+                3..5 => {
+                    let first = right(plane - 3);
+                    vertical::<V, 2>(columns, products, rows, taps, planes);
+                    horizontal::<V, 2>(columns, &planes[..row], taps, out, [0, 1].map(|k| at(first + k)));
+                    horizontal::<V, 1>(columns, &planes[row..2 * row], taps, out, [at(first + 2)]);
+                }
+                _ => {
+                    vertical::<V, 1>(columns, products, rows, taps, planes);
+                    horizontal::<V, 1>(columns, &planes[..row], taps, out, [at(ERROR + plane - 5)]);
+                }
             }
-        }
-        let out = &mut self.out[(site - self.rows.start) * len..(site + 1 - self.rows.start) * len];
-        let at = |plane: usize| plane * self.task.stride + GRID_LEFT + columns.from;
-        for p in 0..3 {
-            let [g, y, yy] = [0, 1, 2].map(|k| &planes[(3 * p + k) * row..(3 * p + k + 1) * row]);
-            horizontal::<V, 3>(columns, g, taps, out, [0, 1, 3].map(|k| at(6 * p + k)));
-            horizontal::<V, 2>(columns, y, taps, out, [2, 4].map(|k| at(6 * p + k)));
-            horizontal::<V, 1>(columns, yy, taps, out, [at(6 * p + 5)]);
-        }
-        for q in 0..2 {
-            let [g, y] = [9, 10].map(|k| &planes[(2 * q + k) * row..(2 * q + k + 1) * row]);
-            horizontal::<V, 2>(columns, g, taps, out, [18, 19].map(|k| at(3 * q + k)));
-            horizontal::<V, 1>(columns, y, taps, out, [at(3 * q + 20)]);
-        }
-        for (k, plane) in [(13, super::ERROR), (14, super::VALID)] {
-            horizontal::<V, 1>(columns, &planes[k * row..(k + 1) * row], taps, out, [at(plane)]);
         }
     }
 }

@@ -83,8 +83,8 @@ pub(super) const IMAGE: usize = 5;
 pub(super) const STENCIL: usize = 5;
 /// Planes of products: `P_uu, P_uv, P_vv, q_u, q_v, e`, validity.
 pub(super) const PRODUCTS: usize = 7;
-/// Planes after the vertical filters: three of each `P`, two of each `q`, one of the others.
-pub(super) const VERTICAL: usize = 15;
+/// Most planes that the vertical filters make of one.
+pub(super) const VERTICAL: usize = 3;
 
 /// All of it.
 #[derive(Debug, Default)]
