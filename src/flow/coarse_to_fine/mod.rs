@@ -1,6 +1,8 @@
 //! The everyday estimator: affine flow from coarse to fine.
 
 #[allow(dead_code)]
+mod couple;
+#[allow(dead_code)]
 mod data;
 #[allow(dead_code)]
 mod grid;
