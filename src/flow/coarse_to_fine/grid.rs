@@ -53,6 +53,11 @@ impl<T: SimdReal> Planes<T> {
         &mut self.data[y * len..(y + 1) * len]
     }
 
+    /// Everything, row after row.
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+
     /// Everything, to be cut into rows of [`Planes::row_len`].
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data

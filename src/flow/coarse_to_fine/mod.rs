@@ -6,3 +6,5 @@ mod couple;
 mod data;
 #[allow(dead_code)]
 mod grid;
+#[allow(dead_code)]
+mod refine;

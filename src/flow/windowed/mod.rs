@@ -57,7 +57,7 @@ mod solve;
 mod sound;
 mod support;
 mod tile;
-mod window;
+pub(in crate::flow) mod window;
 
 pub use options::{RowSet, WindowedOptions};
 pub(super) use run::Windowed;

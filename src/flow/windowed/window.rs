@@ -57,7 +57,7 @@ impl<T: SimdReal> Window<T> {
 }
 
 /// Weights at distance 0 ..= radius of the one-dimensional Gaussian whose full sum is 1.
-pub(super) fn weights(sigma: f64, radius: usize) -> Vec<f64> {
+pub(in crate::flow) fn weights(sigma: f64, radius: usize) -> Vec<f64> {
     let raw: Vec<f64> = (0..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().rev().sum::<f64>();
     raw.iter().map(|w| w / sum).collect()
@@ -78,7 +78,7 @@ pub(super) const CHUNK: usize = 32;
 
 /// Filters `len` samples (a multiple of [`CHUNK`]) of `source` from `centre` on with the first `N` filters of `taps`, neighbours being `stride` apart.
 #[inline(always)]
-pub(super) fn filter<V: Lanes, const N: usize>(
+pub(in crate::flow) fn filter<V: Lanes, const N: usize>(
     source: &[V::Scalar],
     centre: usize,
     stride: usize,

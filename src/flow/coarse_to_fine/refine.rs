@@ -1,0 +1,184 @@
+//! The last stage: how far around each site the motion may be averaged, and across which sites it may not.
+//!
+//! The coupled motion is as good as its data at each site, hence noisy. Wider windows suppress noise, but smooth away what is not affine in them. Three parts decide:
+//!
+//! * *Ladder.* Affine least-squares fits `K_l` to the flow in Gaussian windows of growing sigma, each twiced, `K + K (1 - K)` (J. W. Tukey, *Exploratory Data Analysis*,
+//!   1977): the leading bias cancels.
+//! * *Choice* ([`choose`]). O. V. Lepski's comparison of scales (1991), softened: from one window to the next the flow may change by what noise explains. With `D_l` the squared change,
+//!   `d_l` its variance for white noise of unit density and `a` the noise density of the flow, `R_l = level(D_l) / (d_l a)`, the acceptance is
+//!   `A_0 = 1`, `A_{l+1} = A_l / (1 + (R_l / kappa)^4)`, and window l has the weight `A_l - A_{l+1}`.
+//! * *Edges* ([`mix`]). Nine windows around the site, each fit transported to it, weighed by how affine the flow is in the window and how near the fit comes to the site's flow
+//!   (after M. Kuwahara et al., 1976). They take over where the misfit of the plain window stands out of its region.
+//!
+//! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before taking sites is part of the window, since variances of Gaussians add.
+
+mod choose;
+mod field;
+mod fit;
+mod grow;
+mod ladder;
+mod mix;
+mod region;
+
+use super::grid::{LEFT, Planes};
+use crate::simd::{Level, SimdReal};
+use choose::Choice;
+use field::Field;
+use fit::{FIT, FLOW};
+use ladder::Ladder;
+use region::Fitted;
+
+/// Distance of the sites, px.
+pub(super) const PITCH: f64 = 2.0;
+
+/// How motion is refined. Lengths are standard deviations of Gaussians, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Options {
+    /// Windows, growing; at least one.
+    pub ladder: &'static [f64],
+    /// Change, over what noise explains, that the plain fits accept.
+    pub kappa: f64,
+    /// The same for edge fits, whose change is that of the calm part of a wider region.
+    pub kappa_edge: f64,
+    /// Region of the changes.
+    pub region: f64,
+    /// Region whose calm part judges the edge fits.
+    pub calm_region: f64,
+    /// Region that a misfit stands out of.
+    pub misfit_region: f64,
+    /// Region of the noise density.
+    pub noise_region: f64,
+    /// Relative misfit at which edge fits and plain fits count equally.
+    pub gate: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            ladder: &[1.5, 2.5, 4.0, 6.0, 9.0, 13.0, 18.0],
+            kappa: 7.0,
+            kappa_edge: 6.0,
+            region: 10.0,
+            calm_region: 20.0,
+            misfit_region: 14.0,
+            noise_region: 8.0,
+            gate: 2.5,
+        }
+    }
+}
+
+/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px.
+pub(super) const SIGMA: usize = 6;
+/// The noise density a of the flow that came in, px^4: its variance times the area over which the noise is independent.
+pub(super) const DENSITY: usize = 7;
+
+/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the last data term: planes 0, 6, 12 the
+/// windows' means of Puu, Puv, Pvv (grey^2/px^2) and 24 that of the residual energy (grey^2).
+///
+/// Eight planes: the motion, [`SIGMA`], [`DENSITY`]. Both inputs must have the same size and be finite; without sites there is nothing to do.
+/// Bit-identical for any number of threads.
+pub(super) fn refine<T: SimdReal>(simd: Level, options: &Options, motion: &Planes<T>, data: &Planes<T>) -> Planes<T> {
+    if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
+        return Planes::new(motion.width, motion.height, mix::RESULT);
+    }
+    let ladder = Ladder::new(options.ladder, PITCH);
+    let base = mean_motion(motion);
+    let grids = grids(simd, &ladder, motion, &base);
+    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, &grids[s.octave], s)).collect();
+    let samples = ladder.scales.iter().zip(&fits);
+    let samples = samples.map(|(s, f)| fit::samples(simd, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    let fitted = Fitted { fits, samples };
+    let means = region::regional_means(simd, options, &ladder, &fitted, data);
+    let choice = choose::choose(simd, options, &ladder, &means);
+
+    let mut coarser: Option<Field<T>> = None;
+    for octave in (1..grids.len()).rev() {
+        let plain = plain(&ladder, &fitted, &choice, &grids[octave], octave, coarser.as_ref());
+        let complete = mix::collapse(simd, &plain);
+        coarser = Some(complete);
+    }
+
+    let wanted: Vec<usize> = (0..ladder.scales.len()).filter(|l| choice.wants_edges(*l)).collect();
+    let grown: Vec<Option<Field<T>>> = wanted
+        .iter()
+        .map(|&l| {
+            (0..ladder.scales[l].octave).rev().fold(None, |coarse: Option<Field<T>>, octave| {
+                let from = coarse.as_ref().unwrap_or(&fitted.fits[l]);
+                Some(grow::grow(simd, from, FIT, &grids[octave]))
+            })
+        })
+        .collect();
+    let edges = wanted.iter().zip(&grown);
+    let edges = edges.map(|(&l, g)| (l, ladder.scales[l].sigma, g.as_ref().unwrap_or(&fitted.fits[l]))).collect();
+    let plain = plain(&ladder, &fitted, &choice, &grids[0], 0, coarser.as_ref());
+    mix::finish(simd, &mix::Final { plain, edges, options, base, pitch: PITCH })
+}
+
+/// The windows of the grid `octave`, to complete what coarser grids have.
+fn plain<'a, T: SimdReal>(
+    ladder: &'a Ladder<T>,
+    fitted: &'a Fitted<T>,
+    choice: &'a Choice<T>,
+    grid: &'a Field<T>,
+    octave: usize,
+    coarser: Option<&'a Field<T>>,
+) -> mix::Plain<'a, T> {
+    let rungs = ladder.scales.iter().zip(&fitted.fits).enumerate();
+    let rungs = rungs.filter(|(_, (s, _))| s.octave == octave).map(|(l, (s, f))| (l, s, f)).collect();
+    mix::Plain { choice, octave, rungs, coarser, grid }
+}
+
+/// The flow on every grid of the ladder, finest first, less the `base` motion.
+fn grids<T: SimdReal>(simd: Level, ladder: &Ladder<T>, motion: &Planes<T>, base: &[f64; 6]) -> Vec<Field<T>> {
+    let mut finest = Field::new(motion.width, motion.height, FLOW);
+    for k in 0..2 {
+        for y in 0..motion.height {
+            let start = finest.start(k, y as isize) + LEFT;
+            let target = &mut finest.data_mut()[start..start + motion.width];
+            let (first, slope) = (base[k] + base[4 + k] * PITCH * y as f64, base[2 + k] * PITCH);
+            let (first, slope) = (T::from_f64(first), T::from_f64(slope));
+            for (x, (t, m)) in target.iter_mut().zip(motion.line(k, y)).enumerate() {
+                *t = *m - (first + slope * T::from_f64(x as f64));
+            }
+        }
+    }
+    fit::finish(&mut finest);
+    let mut grids = vec![finest];
+    for octave in 0..ladder.octaves() {
+        let next = fit::halve(simd, &grids[octave], &ladder.halving);
+        grids.push(next);
+    }
+    grids
+}
+
+/// The affine motion nearest to all sites, about site (0, 0): u, v, u_x, v_x, u_y, v_y. Without it, squares of large motion would drown the misfits of single precision.
+fn mean_motion<T: SimdReal>(motion: &Planes<T>) -> [f64; 6] {
+    let (width, height) = (motion.width as f64, motion.height as f64);
+    let (middle_x, middle_y) = ((width - 1.0) / 2.0, (height - 1.0) / 2.0);
+    let mut base = [0.0; 6];
+    for k in 0..2 {
+        let mut sums = [0.0; 3];
+        for y in 0..motion.height {
+            let mut row = [0.0; 2];
+            for (x, value) in motion.line(k, y).iter().enumerate() {
+                let value = value.to_f64();
+                row[0] += value;
+                row[1] += value * (x as f64 - middle_x);
+            }
+            sums[0] += row[0];
+            sums[1] += row[1];
+            sums[2] += row[0] * (y as f64 - middle_y);
+        }
+        // Sums of squared distances from the middle, over all sites; a single column or row has no slope.
+        let spread = |n: f64, other: f64| (other * n * (n * n - 1.0) / 12.0).max(f64::MIN_POSITIVE);
+        let slope_x = sums[1] / spread(width, height);
+        let slope_y = sums[2] / spread(height, width);
+        base[2 + k] = slope_x / PITCH;
+        base[4 + k] = slope_y / PITCH;
+        base[k] = sums[0] / (width * height) - slope_x * middle_x - slope_y * middle_y;
+    }
+    base
+}
+
+#[cfg(test)]
+mod tests;

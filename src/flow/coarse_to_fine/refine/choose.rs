@@ -1,0 +1,140 @@
+//! Which windows a site uses: O. V. Lepski's comparison of scales, softened.
+//!
+//! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider windows as long as the estimate changes by no more than noise
+//! explains.
+
+use super::Options;
+use super::ladder::{Ladder, difference_variance};
+use super::region::Layout;
+use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+
+/// Weights below this count as none, so that whole rows can pass a window by.
+const NONE: f64 = 1e-3;
+/// Least noise density, px^4: below what frames of any kind show.
+const QUIET: f64 = 1e-9;
+/// Added to the determinant of the information, (grey^2/px^2)^2.
+const FLAT: f64 = 1e-6;
+
+/// Planes of the choice, for `windows` windows: weights of the plain fits, of the edge fits, of the misfits; then the noise density and the mean sigma of
+/// either kind, px.
+pub(super) struct Choice<T> {
+    pub planes: Planes<T>,
+    pub windows: usize,
+}
+
+impl<T: SimdReal> Choice<T> {
+    pub fn edge(&self, l: usize) -> usize {
+        self.windows + l
+    }
+    pub fn misfit(&self, l: usize) -> usize {
+        2 * self.windows + l
+    }
+    pub fn density(&self) -> usize {
+        3 * self.windows
+    }
+    pub fn sigma(&self, edge: bool) -> usize {
+        3 * self.windows + 1 + usize::from(edge)
+    }
+
+    /// Whether any site uses the edge fits of window `l`.
+    pub fn wants_edges(&self, l: usize) -> bool {
+        let zero = T::from_f64(0.0);
+        (0..self.planes.height).any(|y| self.planes.line(self.edge(l), y).iter().any(|w| *w > zero))
+    }
+}
+
+/// The choice at the sites of the regional `means`.
+pub(super) fn choose<T: SimdReal>(simd: Level, options: &Options, ladder: &Ladder<T>, means: &Planes<T>) -> Choice<T> {
+    let windows = ladder.scales.len();
+    let sigmas: Vec<f64> = ladder.scales.iter().map(|s| s.sigma).collect();
+    let noise: Vec<f64> = sigmas.windows(2).map(|s| difference_variance(s[0], s[1])).collect();
+    let mut planes = Planes::new(means.width, means.height, 3 * windows + 3);
+    let len = planes.row_len();
+    for_each_band(planes.data_mut(), len, |_, rows, out| {
+        for (y, out) in rows.zip(out.chunks_exact_mut(len)) {
+            dispatch(simd, Weights { means, options, sigmas: &sigmas, noise: &noise, y, out });
+        }
+    });
+    Choice { planes, windows }
+}
+
+struct Weights<'a, T> {
+    means: &'a Planes<T>,
+    options: &'a Options,
+    sigmas: &'a [f64],
+    noise: &'a [f64],
+    y: usize,
+    out: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { means, options, sigmas, noise, y, out } = self;
+        let (row, stride, windows) = (means.row(y), means.stride(), sigmas.len());
+        let layout = Layout { windows };
+        for x in (0..means.padded()).step_by(V::LANES) {
+            let mean = |k: usize| V::load(&row[k * stride + LEFT + x..]);
+            let density = density(mean(0), mean(1), mean(2), mean(Layout::ENERGY));
+            let mut store = |k: usize, value: V| value.store(&mut out[k * stride + LEFT + x..]);
+            let mut sum = [V::zero(); 2];
+            for (kind, sum) in sum.iter_mut().enumerate() {
+                let kappa = if kind == 0 { options.kappa } else { options.kappa_edge };
+                let (mut accepted, mut sigma) = (V::constant(1.0), V::zero());
+                for l in 0..windows {
+                    let mut next = V::zero();
+                    if l + 1 < windows {
+                        let change = if kind == 0 {
+                            power4(mean(Layout::change(l)))
+                        } else {
+                            V::constant(1.0) / power4(mean(layout.calm(l)))
+                        };
+                        let ratio = change / (density * V::constant(noise[l] * kappa));
+                        next = accepted / (V::constant(1.0) + power4(ratio));
+                    }
+                    let weight = (accepted - next - V::constant(NONE)).max(V::zero());
+                    accepted = next;
+                    sigma = weight.mul_add(V::constant(sigmas[l]), sigma);
+                    *sum = *sum + weight;
+                    store(kind * windows + l, weight);
+                }
+                store(3 * windows + 1 + kind, sigma / *sum);
+            }
+            store(3 * windows, density);
+            let scale = sum.map(|sum| V::constant(1.0) / sum);
+            for l in 0..windows {
+                let mut rescaled = |kind: usize| {
+                    let at = (kind * windows + l) * stride + LEFT + x;
+                    let weight = V::load(&out[at..]) * scale[kind];
+                    weight.store(&mut out[at..]);
+                    weight
+                };
+                let plain = rescaled(0);
+                rescaled(1);
+                let misfit = plain * power4(mean(layout.misfit(l)));
+                misfit.store(&mut out[(2 * windows + l) * stride + LEFT + x..]);
+            }
+        }
+        // The last site goes on, for those finer ones that lie beyond it.
+        for line in out.chunks_exact_mut(stride) {
+            let end = LEFT + means.width;
+            line[end] = line[end - 1];
+        }
+    }
+}
+
+#[inline(always)]
+fn power4<V: Lanes>(value: V) -> V {
+    let square = value * value;
+    square * square
+}
+
+/// Noise density of the flow, px^2 per px^-2: the residual energy over the information, averaged over directions (trace of its inverse).
+#[inline(always)]
+fn density<V: Lanes>(uu: V, uv: V, vv: V, energy_root: V) -> V {
+    let determinant = uv.neg_mul_add(uv, uu * vv).max(V::zero()) + V::constant(FLAT);
+    (power4(energy_root) * (uu + vv) / determinant).max(V::constant(QUIET))
+}

@@ -1,0 +1,212 @@
+//! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
+
+use super::field::{Beyond, Field, RIM};
+use super::ladder::{Scale, Taps};
+use crate::flow::coarse_to_fine::grid::LEFT;
+use crate::flow::windowed::window::filter;
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use std::ops::Range;
+
+/// Planes of flow to be fitted: u, v and the mean of `u^2 + v^2` (of the flow itself, where u and v are smoothed).
+pub(super) const FLOW: usize = 3;
+/// Planes of a fit: u, v, u_x, v_x, u_y, v_y and the misfit's variance in the window, px^2.
+pub(super) const FIT: usize = 7;
+/// Least misfit that is told apart from none, px^2.
+pub(super) const LEAST: f64 = 1e-6;
+
+/// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds four lines.
+#[inline(always)]
+pub(super) fn fit_row<V: Lanes>(
+    from: &Field<V::Scalar>,
+    taps: &Taps<V::Scalar>,
+    y: usize,
+    down: &mut [V::Scalar],
+    out: &mut [V::Scalar],
+) {
+    let (stride, padded, taps) = (from.stride(), from.padded(), taps.taps.as_slice());
+    for k in 0..2 {
+        let (mean, slope) = down[2 * k * stride..].split_at_mut(stride);
+        filter::<V, 2>(from.data(), from.start(k, y as isize), from.row_len(), stride, taps, [mean, slope]);
+    }
+    for k in 0..2 {
+        let (mean, slope) = down[2 * k * stride..2 * (k + 1) * stride].split_at(stride);
+        let mut lines = out.chunks_exact_mut(stride).skip(k).step_by(2).map(|line| &mut line[LEFT..]);
+        let (Some(value), Some(along), Some(across)) = (lines.next(), lines.next(), lines.next()) else { return };
+        filter::<V, 2>(mean, LEFT, 1, padded, taps, [value, along]);
+        filter::<V, 1>(slope, LEFT, 1, padded, taps, [across]);
+    }
+}
+
+/// Single fits of one window at every site of its grid.
+struct Fits<'a, T> {
+    from: &'a Field<T>,
+    scale: &'a Scale<T>,
+    rows: Range<usize>,
+    out: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { from, scale, rows, out } = self;
+        let (stride, padded, taps) = (from.stride(), from.padded(), scale.first.taps.as_slice());
+        let mut down = vec![T::from_f64(0.0); 4 * stride];
+        let variance = V::constant(scale.variance);
+        for (y, out) in rows.zip(out.chunks_exact_mut(FIT * stride)) {
+            fit_row::<V>(from, &scale.first, y, &mut down, out);
+            filter::<V, 1>(from.data(), from.start(2, y as isize), from.row_len(), stride, taps, [&mut down[..stride]]);
+            let (fit, square) = out.split_at_mut((FIT - 1) * stride);
+            let square = &mut square[LEFT..];
+            filter::<V, 1>(&down[..stride], LEFT, 1, padded, taps, [&mut *square]);
+            for x in (0..padded).step_by(V::LANES) {
+                let at = |k: usize| V::load(&fit[k * stride + LEFT + x..]);
+                let means = at(0).mul_add(at(0), at(1) * at(1));
+                let mut slopes = at(2) * at(2);
+                for k in 3..6 {
+                    slopes = at(k).mul_add(at(k), slopes);
+                }
+                let misfit = slopes.neg_mul_add(variance, V::load(&square[x..]) - means);
+                misfit.max(V::constant(LEAST)).store(&mut square[x..]);
+            }
+        }
+    }
+}
+
+/// Single fits of the window `scale` to `from` (planes of [`FLOW`]): planes of [`FIT`].
+pub(super) fn fits<T: SimdReal>(simd: Level, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
+    let mut out = Field::new(from.width, from.height, FIT);
+    let len = out.row_len();
+    for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Fits { from, scale, rows, out }));
+    out.extend(0..2, Beyond::Odd, RIM);
+    out.extend(2..FIT, Beyond::Even, RIM);
+    out
+}
+
+/// Every second site of a smoothed grid.
+struct Halve<'a, T> {
+    from: &'a Field<T>,
+    taps: &'a Taps<T>,
+    rows: Range<usize>,
+    out: &'a mut [T],
+    stride: usize,
+    width: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Halve<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { from, taps, rows, out, stride, width } = self;
+        let mut buffer = vec![T::from_f64(0.0); 2 * from.stride()];
+        for (y, out) in rows.zip(out.chunks_exact_mut(FLOW * stride)) {
+            for k in 0..FLOW {
+                smooth_row::<V>(from, k, 2 * y, taps, &mut buffer);
+                pick(&buffer[from.stride()..], 2, &mut out[k * stride + LEFT..][..width]);
+            }
+            // What the smoothing took away, kept as a variance so that it can be mirrored.
+            let (flow, square) = out.split_at_mut(2 * stride);
+            for (x, s) in square[LEFT..LEFT + width].iter_mut().enumerate() {
+                let (u, v) = (flow[LEFT + x], flow[stride + LEFT + x]);
+                *s = *s - u * u - v * v;
+            }
+        }
+    }
+}
+
+/// Plane `k` along row `y`, smoothed: from the second line of `buffer` on, without free samples before it.
+#[inline(always)]
+pub(super) fn smooth_row<V: Lanes>(
+    from: &Field<V::Scalar>,
+    k: usize,
+    y: usize,
+    taps: &Taps<V::Scalar>,
+    buffer: &mut [V::Scalar],
+) {
+    let (stride, taps) = (from.stride(), taps.taps.as_slice());
+    let (down, along) = buffer.split_at_mut(stride);
+    filter::<V, 1>(from.data(), from.start(k, y as isize), from.row_len(), stride, taps, [&mut *down]);
+    filter::<V, 1>(down, LEFT, 1, from.padded(), taps, [along]);
+}
+
+/// Every `step`-th value.
+#[inline(always)]
+pub(super) fn pick<T: Copy>(from: &[T], step: usize, out: &mut [T]) {
+    if step == 2 {
+        for (o, pair) in out.iter_mut().zip(from.chunks_exact(2)) {
+            *o = pair[0];
+        }
+    } else {
+        for (o, value) in out.iter_mut().zip(from.iter().step_by(step)) {
+            *o = *value;
+        }
+    }
+}
+
+/// The next coarser grid: planes of [`FLOW`], ready to be fitted.
+pub(super) fn halve<T: SimdReal>(simd: Level, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
+    let (width, height) = (from.width.div_ceil(2), from.height.div_ceil(2));
+    let mut out = Field::new(width, height, FLOW);
+    let (len, stride) = (out.row_len(), out.stride());
+    for_each_band(out.rows_mut(), len, |_, rows, out| {
+        dispatch(simd, Halve { from, taps, rows, out, stride, width });
+    });
+    finish(&mut out);
+    out
+}
+
+/// Continues a flow beyond the frame and completes its third plane, which holds the variance that smoothing took away.
+pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
+    flow.extend(0..2, Beyond::Odd, RIM);
+    flow.extend(2..3, Beyond::Even, RIM);
+    let (len, stride) = (flow.row_len(), flow.stride());
+    for row in flow.data_mut().chunks_exact_mut(len) {
+        let (flow, square) = row.split_at_mut(2 * stride);
+        let (u, v) = flow.split_at(stride);
+        for ((s, u), v) in square.iter_mut().zip(u).zip(v) {
+            *s = *s + *u * *u + *v * *v;
+        }
+    }
+}
+
+/// The twiced flow at every `step`-th site.
+struct Samples<'a, T> {
+    fits: &'a Field<T>,
+    taps: &'a Taps<T>,
+    step: usize,
+    rows: Range<usize>,
+    out: &'a mut [T],
+    stride: usize,
+    width: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { fits, taps, step, rows, out, stride, width } = self;
+        let mut buffer = vec![T::from_f64(0.0); 2 * fits.stride()];
+        for (y, out) in rows.zip(out.chunks_exact_mut(2 * stride)) {
+            for k in 0..2 {
+                smooth_row::<V>(fits, k, step * y, taps, &mut buffer);
+                let again = &mut buffer[fits.stride()..];
+                for (a, once) in again.iter_mut().zip(&fits.line(k, (step * y) as isize)[LEFT..]) {
+                    *a = *once + *once - *a;
+                }
+                pick(again, step, &mut out[k * stride + LEFT..][..width]);
+            }
+        }
+    }
+}
+
+/// u and v of the twiced fit (`2 K - K K`) at every `step`-th site.
+pub(super) fn samples<T: SimdReal>(simd: Level, fits: &Field<T>, scale: &Scale<T>, step: usize) -> Field<T> {
+    let (width, height) = (fits.width.div_ceil(step), fits.height.div_ceil(step));
+    let mut out = Field::new(width, height, 2);
+    let (len, stride, taps) = (out.row_len(), out.stride(), &scale.second);
+    for_each_band(out.rows_mut(), len, |_, rows, out| {
+        dispatch(simd, Samples { fits, taps, step, rows, out, stride, width });
+    });
+    out
+}

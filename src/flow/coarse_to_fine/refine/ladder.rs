@@ -1,0 +1,137 @@
+//! The ladder of windows: which grid each is computed on, its taps, and how noise passes from one to the next.
+
+use super::field::RIM;
+use crate::flow::windowed::window::weights;
+use crate::simd::SimdReal;
+use std::f64::consts::PI;
+
+/// Each coarser grid takes every second site.
+pub(super) const MAX_OCTAVE: usize = 2;
+/// The widest window of a grid, sites: beyond it, the next grid is fine enough.
+const WIDEST: f64 = 2.9;
+/// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a thousand times.
+const BEFORE_HALVING: f64 = 1.5;
+
+/// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a weighted straight line.
+#[derive(Debug, Clone)]
+pub(super) struct Taps<T> {
+    /// Distance 0 ..= radius; the third filter of the type is not used.
+    pub taps: Vec<[T; 3]>,
+    /// The window's variance, px^2.
+    pub variance: f64,
+}
+
+impl<T: SimdReal> Taps<T> {
+    /// A Gaussian of `sigma` sites, `pitch` px apart, cut off at 3 sigma and at the rim.
+    pub fn gaussian(sigma: f64, pitch: f64) -> Self {
+        let radius = ((3.0 * sigma + 0.5) as usize).clamp(1, RIM);
+        let g = weights(sigma, radius);
+        let second = 2.0 * g.iter().enumerate().map(|(k, g)| (k * k) as f64 * g).sum::<f64>();
+        let taps = g
+            .iter()
+            .enumerate()
+            .map(|(k, &g)| [T::from_f64(g), T::from_f64(k as f64 * g / (second * pitch)), T::from_f64(0.0)])
+            .collect();
+        Self { taps, variance: second * pitch * pitch }
+    }
+
+    pub fn radius(&self) -> usize {
+        self.taps.len() - 1
+    }
+}
+
+/// One window of the ladder.
+#[derive(Debug, Clone)]
+pub(super) struct Scale<T> {
+    /// Standard deviation, px.
+    pub sigma: f64,
+    /// It is computed on every `2^octave`-th site.
+    pub octave: usize,
+    /// What is left of the window after the smoothing that came with the grid.
+    pub first: Taps<T>,
+    /// The whole window, for the second pass of twicing: fits are as good as smooth.
+    pub second: Taps<T>,
+    /// Variance of the whole window as it comes out, px^2.
+    pub variance: f64,
+}
+
+/// All windows, and what makes one grid from the other.
+#[derive(Debug, Clone)]
+pub(super) struct Ladder<T> {
+    pub scales: Vec<Scale<T>>,
+    /// Smoothing before each halving.
+    pub halving: Taps<T>,
+    /// Distance of the finest sites, px.
+    pub pitch: f64,
+}
+
+impl<T: SimdReal> Ladder<T> {
+    /// For windows of `sigmas` px, growing, on sites `pitch` px apart.
+    pub fn new(sigmas: &[f64], pitch: f64) -> Self {
+        let halving = Taps::gaussian(BEFORE_HALVING.sqrt(), 1.0);
+        let scales = sigmas.iter().map(|&sigma| {
+            let (mut octave, mut whole, mut smoothed, mut distance) = (0, sigma / pitch, 0.0, pitch);
+            while whole > WIDEST && octave < MAX_OCTAVE {
+                smoothed = (smoothed + halving.variance) / 4.0;
+                (octave, whole, distance) = (octave + 1, whole / 2.0, 2.0 * distance);
+            }
+            let first = Taps::gaussian((whole * whole - smoothed).sqrt(), distance);
+            let variance = first.variance + smoothed * distance * distance;
+            Scale { sigma, octave, first, second: Taps::gaussian(whole, distance), variance }
+        });
+        Self { scales: scales.collect(), halving: halving.clone(), pitch }
+    }
+
+    /// The coarsest grid in use.
+    pub fn octaves(&self) -> usize {
+        self.scales.iter().map(|s| s.octave).max().unwrap_or(0)
+    }
+}
+
+/// Variance of the difference between the twiced fits of two windows, for white noise of unit density (per px^2).
+///
+/// Twicing makes `H = 2 G - G^2` of the transfer function `G = exp(-sigma^2 w^2 / 2)`; the result is `integral (H_a - H_b)^2 w dw / (2 pi)`, each
+/// term of which is a Gaussian.
+pub(super) fn difference_variance(a: f64, b: f64) -> f64 {
+    let terms = [(2.0, a * a), (-1.0, 2.0 * a * a), (-2.0, b * b), (1.0, 2.0 * b * b)];
+    terms.iter().flat_map(|(c, s)| terms.iter().map(move |(d, t)| c * d / (2.0 * PI * (s + t)))).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_of_lines_are_exact_and_grids_follow_the_window() {
+        let ladder = Ladder::<f64>::new(&[1.5, 2.5, 4.0, 6.0, 9.0, 13.0, 18.0], 2.0);
+        assert_eq!(ladder.scales.iter().map(|s| s.octave).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2]);
+        for s in &ladder.scales {
+            let pitch = 2.0 * f64::from(1 << s.octave as u32);
+            for taps in [&s.first, &s.second] {
+                let slope: f64 = taps.taps.iter().enumerate().map(|(k, t)| 2.0 * t[1] * k as f64 * pitch).sum();
+                assert!((slope - 1.0).abs() < 1e-13 && taps.radius() <= RIM);
+            }
+            // Cut off at 3 sigma, a Gaussian keeps 97 % of its variance.
+            assert!((s.variance / (s.sigma * s.sigma) - 0.98).abs() < 0.04, "{} {}", s.sigma, s.variance);
+        }
+    }
+
+    #[test]
+    fn variance_of_differences_is_the_integral() {
+        let h = |s: f64, w: f64| {
+            let g = (-0.5 * (s * w).powi(2)).exp();
+            2.0 * g - g * g
+        };
+        for (a, b) in [(1.5, 2.5), (13.0, 18.0)] {
+            let n = 40_000;
+            let step = 8.0 / a / f64::from(n);
+            let sum: f64 = (0..n)
+                .map(|i| {
+                    let w = (f64::from(i) + 0.5) * step;
+                    (h(a, w) - h(b, w)).powi(2) * w * step / (2.0 * PI)
+                })
+                .sum();
+            assert!((sum / difference_variance(a, b) - 1.0).abs() < 1e-5, "{a} {b}");
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Each piece against the plainest form of its definition, in double precision.
+
+use super::*;
+use crate::flow::coarse_to_fine::refine::ladder::{Scale, Taps, difference_variance};
+use crate::flow::coarse_to_fine::refine::region::Layout;
+
+const WIDTH: usize = 37;
+const HEIGHT: usize = 26;
+
+fn rough(k: usize, x: f64, y: f64) -> f64 {
+    (x / 9.0 + k as f64).sin() * (y / 13.0).cos() + 0.3 * noise((x * 311.0 + y * 7.0) as usize + k)
+}
+
+/// A plane beyond its edges, reflected at the points on them.
+fn beyond(z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> f64 {
+    let (w, h) = (WIDTH as isize - 1, HEIGHT as isize - 1);
+    if x < 0 {
+        2.0 * beyond(z, 0, y) - beyond(z, -x, y)
+    } else if x > w {
+        2.0 * beyond(z, w, y) - beyond(z, 2 * w - x, y)
+    } else if y < 0 {
+        2.0 * beyond(z, x, 0) - beyond(z, x, -y)
+    } else if y > h {
+        2.0 * beyond(z, x, h) - beyond(z, x, 2 * h - y)
+    } else {
+        z(x, y)
+    }
+}
+
+/// Weighted least squares by a value and two slopes (per px) in a Gaussian window about (x, y), and the misfit's variance.
+fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize) -> [f64; 4] {
+    let radius = (3.0 * sigma + 0.5) as isize;
+    let (mut sum, mut mean, mut square, mut along, mut across, mut spread) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for j in -radius..=radius {
+        for i in -radius..=radius {
+            let g = (-0.5 * (i * i + j * j) as f64 / (sigma * sigma)).exp();
+            let value = beyond(z, x + i, y + j);
+            sum += g;
+            mean += g * value;
+            square += g * value * value;
+            along += g * value * i as f64 * PITCH;
+            across += g * value * j as f64 * PITCH;
+            spread += g * (i as f64 * PITCH).powi(2);
+        }
+    }
+    let (a, b, c) = (mean / sum, along / spread, across / spread);
+    [a, b, c, square / sum - a * a - (b * b + c * c) * spread / sum]
+}
+
+fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
+    let ladder = Ladder::new(Options::default().ladder, PITCH);
+    let grids = grids(Level::detect(), &ladder, motion, &[0.0; 6]);
+    (ladder, grids)
+}
+
+#[test]
+fn fits_are_least_squares_and_samples_are_twiced() {
+    let motion = field::<f64>(WIDTH, HEIGHT, rough);
+    let (ladder, grids) = finest(&motion);
+    for scale in &ladder.scales[..3] {
+        let fits = fit::fits(Level::detect(), &grids[0], scale);
+        let samples = fit::samples(Level::detect(), &fits, scale, 2);
+        for (x, y) in [(0, 0), (3, 1), (18, 12), (36, 25), (20, 24)] {
+            let mut misfit = 0.0;
+            for k in 0..2 {
+                let z = |x: isize, y: isize| motion.at(k, x as usize, y as usize);
+                let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
+                misfit += want[3];
+                for (n, want) in want[..3].iter().enumerate() {
+                    assert!((fits.at(k + 2 * n, x, y) - want).abs() < 1e-12, "{} {x} {y} {n}", scale.sigma);
+                }
+                let once = |x: isize, y: isize| fits.at(k, x as usize, y as usize);
+                let again = least_squares(&once, scale.sigma / PITCH, x as isize & !1, y as isize & !1);
+                let twiced = 2.0 * fits.at(k, x & !1, y & !1) - again[0];
+                assert!((samples.at(k, x / 2, y / 2) - twiced).abs() < 1e-12);
+            }
+            assert!((fits.at(6, x, y) - misfit.max(fit::LEAST)).abs() < 1e-12, "{} {x} {y}", scale.sigma);
+        }
+    }
+}
+
+#[test]
+fn coarse_grids_give_nearly_the_fit_of_the_whole_window() {
+    let motion = field::<f64>(WIDTH, HEIGHT, rough);
+    let (ladder, grids) = finest(&motion);
+    for scale in &ladder.scales[3..] {
+        let fits = fit::fits(Level::detect(), &grids[scale.octave], scale);
+        let step = 1 << scale.octave;
+        for (x, y) in [(8, 8), (16, 12), (24, 16)] {
+            let z = |x: isize, y: isize| motion.at(0, x as usize, y as usize);
+            let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
+            let got = [0, 2, 4].map(|k| fits.at(k, x / step, y / step));
+            assert!((got[0] - want[0]).abs() < 0.02, "{}: {got:?} {want:?}", scale.sigma);
+            assert!((got[1] - want[1]).abs() < 0.003 && (got[2] - want[2]).abs() < 0.003, "{got:?} {want:?}");
+        }
+    }
+}
+
+#[test]
+fn grids_grow_back_without_bending_cubics() {
+    let cubic = |x: f64, y: f64| 1.0 + x - 0.2 * y + 0.01 * x * x - 0.002 * x * y * y + 0.001 * x * x * x;
+    let mut coarse = Field::<f64>::new(20, 14, 2);
+    for y in -4..18 {
+        for x in -4..24 {
+            let at = coarse.start(0, y) + (LEFT as isize + x) as usize;
+            coarse.data_mut()[at] = cubic(2.0 * x as f64, 2.0 * y as f64);
+        }
+    }
+    let fine = grow::grow(Level::detect(), &coarse, 2, &Field::new(39, 28, 1));
+    for (x, y) in (0..39).flat_map(|x| (0..28).map(move |y| (x, y))) {
+        assert!((fine.at(0, x, y) - cubic(x as f64, y as f64)).abs() < 1e-11, "{x} {y}");
+    }
+}
+
+#[test]
+fn choices_follow_the_formulas() {
+    let options = Options::default();
+    let ladder = Ladder::<f64>::new(options.ladder, PITCH);
+    let layout = Layout { windows: 7 };
+    let mut means = Planes::<f64>::new(9, 1, layout.count());
+    let roots = |l: usize, x: usize| 0.02 + 0.02 * x as f64 - 0.002 * l as f64;
+    for x in 0..9 {
+        for (k, value) in [(0, 50.0), (1, 10.0), (2, 80.0), (3, 0.4)] {
+            means.line_mut(k, 0)[x] = value;
+        }
+        for l in 0..6 {
+            means.line_mut(Layout::change(l), 0)[x] = roots(l, x);
+            means.line_mut(layout.calm(l), 0)[x] = 1.2 / roots(l, x);
+        }
+        (0..7).for_each(|l| means.line_mut(layout.misfit(l), 0)[x] = 2.0 + l as f64);
+    }
+    let choice = choose::choose(Level::detect(), &options, &ladder, &means);
+    let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
+    for x in 0..9 {
+        assert!((choice.planes.at(choice.density(), x, 0) / a - 1.0).abs() < 1e-12);
+        for edge in [false, true] {
+            let (kappa, root) = if edge { (6.0, 1.0 / 1.2) } else { (7.0, 1.0) };
+            let (mut accepted, mut weights) = (1.0, Vec::new());
+            for l in 0..7 {
+                let next = if l == 6 {
+                    0.0
+                } else {
+                    let d = difference_variance(options.ladder[l], options.ladder[l + 1]);
+                    let ratio = (roots(l, x) * root).powi(4) / (d * a);
+                    accepted / (1.0 + (ratio / kappa).powi(4))
+                };
+                weights.push((accepted - next - 1e-3f64).max(0.0));
+                accepted = next;
+            }
+            let sum: f64 = weights.iter().sum();
+            let mut sigma = 0.0;
+            for (l, weight) in weights.iter().enumerate() {
+                let k = if edge { choice.edge(l) } else { l };
+                assert!((choice.planes.at(k, x, 0) - weight / sum).abs() < 1e-12, "{x} {l}");
+                if !edge {
+                    let misfit = weight / sum * (2.0 + l as f64).powi(4);
+                    assert!((choice.planes.at(choice.misfit(l), x, 0) - misfit).abs() < 1e-9);
+                }
+                sigma += weight / sum * options.ladder[l];
+            }
+            assert!((choice.planes.at(choice.sigma(edge), x, 0) - sigma).abs() < 1e-12);
+        }
+    }
+    // The ladder was climbed to different heights.
+    assert!(choice.planes.at(choice.sigma(false), 0, 0) > 10.0 && choice.planes.at(choice.sigma(false), 8, 0) < 2.5);
+}
+
+#[test]
+fn regional_levels_are_power_means() {
+    let (options, level) = (Options::default(), Level::detect());
+    let motion = field::<f64>(WIDTH, HEIGHT, rough);
+    let data = {
+        let mut data = evidence::<f64>(WIDTH, HEIGHT, 1.0);
+        (0..HEIGHT).for_each(|y| (0..WIDTH).for_each(|x| data.line_mut(24, y)[x] = 1.0 + (x * y % 7) as f64));
+        data
+    };
+    let (ladder, grids) = finest(&motion);
+    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(level, &grids[s.octave], s)).collect();
+    let samples = ladder.scales.iter().zip(&fits);
+    let samples = samples.map(|(s, f)| fit::samples(level, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    let fitted = Fitted { fits, samples };
+    let means = region::regional_means(level, &options, &ladder, &fitted, &data);
+    let (half_width, half_height) = (WIDTH.div_ceil(2), HEIGHT.div_ceil(2));
+    let mean = |sigma: f64, x: usize, y: usize, f: &dyn Fn(usize, usize) -> f64| {
+        let taps = Taps::<f64>::gaussian(sigma / 4.0, 1.0);
+        let radius = taps.radius() as isize;
+        let mirror = |i: isize, n: usize| {
+            let m = i.rem_euclid(2 * (n as isize - 1));
+            m.min(2 * (n as isize - 1) - m) as usize
+        };
+        let mut sum = 0.0;
+        for j in -radius..=radius {
+            for i in -radius..=radius {
+                let g = taps.taps[i.unsigned_abs()][0] * taps.taps[j.unsigned_abs()][0];
+                sum += g * f(mirror(2 * x as isize + i, half_width), mirror(2 * y as isize + j, half_height));
+            }
+        }
+        sum
+    };
+    let root = |v: f64| (v + 1e-12).powf(0.25);
+    let layout = Layout { windows: 7 };
+    for (x, y) in [(0, 0), (4, 3), (9, 6)] {
+        let want = mean(8.0, x, y, &|i, j| root(data.at(24, 2 * i, 2 * j)));
+        assert!((means.at(Layout::ENERGY, x, y) - want).abs() < 1e-10);
+        let change = |i: usize, j: usize| {
+            let at = |l: usize, k: usize| fitted.samples[l].at(k, i, j);
+            (at(1, 0) - at(2, 0)).powi(2) + (at(1, 1) - at(2, 1)).powi(2)
+        };
+        let want = mean(10.0, x, y, &|i, j| root(change(i, j)));
+        assert!((means.at(Layout::change(1), x, y) - want).abs() < 1e-10);
+        let want = mean(20.0, x, y, &|i, j| 1.0 / root(change(i, j)));
+        assert!((means.at(layout.calm(1), x, y) - want).abs() < 1e-9);
+        let want = mean(14.0, x, y, &|i, j| 1.0 / root(fitted.fits[0].at(6, 2 * i, 2 * j)));
+        assert!((means.at(layout.misfit(0), x, y) - want).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn edge_fits_are_the_mixture_of_nine_windows() {
+    let motion = field::<f64>(WIDTH, HEIGHT, |k, x, y| if x > 30.0 { 2.0 } else { rough(k, x, y) });
+    let data = evidence::<f64>(WIDTH, HEIGHT, 1e6);
+    let options = Options { ladder: &[2.5], gate: 1e-9, ..Options::default() };
+    let got = refine(Level::detect(), &options, &motion, &data);
+    let base = mean_motion(&motion);
+    let ladder = Ladder::<f64>::new(options.ladder, PITCH);
+    let grids = grids(Level::detect(), &ladder, &motion, &base);
+    let scale: &Scale<f64> = &ladder.scales[0];
+    let fits = fit::fits(Level::detect(), &grids[0], scale);
+    for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
+        let (mut sum, mut total) = ([0.0; 6], 0.0);
+        // 1.5 sigma is 1.9 sites, and 1.3 along the diagonals.
+        for (dx, dy) in [(0, 0), (2, 0), (-2, 0), (0, 2), (0, -2), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
+            let (i, j) = ((x as isize + dx) as usize, (y as isize + dy) as usize);
+            let mut m: [f64; 6] = std::array::from_fn(|k| fits.at(k, i, j));
+            (0..2).for_each(|k| m[k] -= PITCH * (m[2 + k] * dx as f64 + m[4 + k] * dy as f64));
+            let own: f64 = (0..2).map(|k| (m[k] - grids[0].at(k, x, y)).powi(2)).sum();
+            let weight = (fits.at(6, i, j) + own + 1e-4).powi(-2);
+            total += weight;
+            sum.iter_mut().zip(m).for_each(|(s, m)| *s += weight * m);
+        }
+        for k in 0..6 {
+            let mut want = sum[k] / total + base[k];
+            if k < 2 {
+                want += PITCH * (base[2 + k] * x as f64 + base[4 + k] * y as f64);
+            }
+            assert!((got.at(k, x, y) - want).abs() < 1e-9, "{x} {y} {k}: {} {want}", got.at(k, x, y));
+        }
+    }
+}
