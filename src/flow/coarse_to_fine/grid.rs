@@ -27,9 +27,26 @@ impl<T: SimdReal> Planes<T> {
         planes
     }
 
+    /// As [`Planes::new`] in memory used before, whose content remains: for whoever writes all sites.
+    pub fn reuse(width: usize, height: usize, count: usize, data: Vec<T>) -> Self {
+        let mut planes = Self { width, height, count, data };
+        planes.data.resize(planes.row_len() * height, T::from_f64(0.0));
+        planes
+    }
+
+    /// The memory, for [`Planes::reuse`].
+    pub fn into_data(self) -> Vec<T> {
+        self.data
+    }
+
     /// Sites that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
     pub fn padded(&self) -> usize {
         self.width.div_ceil(CHUNK) * CHUNK
+    }
+
+    /// Samples of so many planes together.
+    pub fn len(width: usize, height: usize, count: usize) -> usize {
+        (width.div_ceil(CHUNK) * CHUNK + 2 * LEFT) * count * height
     }
 
     /// Samples from a plane's row to the next plane's.

@@ -24,6 +24,7 @@ use super::grid::{LEFT, Planes};
 use crate::simd::{Level, SimdReal};
 use choose::Choice;
 use field::Field;
+pub(super) use field::Space;
 use fit::{FIT, FLOW};
 use ladder::Ladder;
 use region::Fitted;
@@ -77,41 +78,57 @@ pub(super) const DENSITY: usize = 7;
 ///
 /// Eight planes: the motion, [`SIGMA`], [`DENSITY`]. Both inputs must have the same size and be finite; without sites there is nothing to do.
 /// Bit-identical for any number of threads.
-pub(super) fn refine<T: SimdReal>(simd: Level, options: &Options, motion: &Planes<T>, data: &Planes<T>) -> Planes<T> {
+pub(super) fn refine<T: SimdReal>(
+    simd: Level,
+    space: &mut Space<T>,
+    options: &Options,
+    motion: &Planes<T>,
+    data: &Planes<T>,
+) -> Planes<T> {
     if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
         return Planes::new(motion.width, motion.height, mix::RESULT);
     }
+    let space = &*space;
     let ladder = Ladder::new(options.ladder, PITCH);
     let base = mean_motion(motion);
-    let grids = grids(simd, &ladder, motion, &base);
-    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, &grids[s.octave], s)).collect();
+    let grids = grids(simd, space, &ladder, motion, &base);
+    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
     let samples = ladder.scales.iter().zip(&fits);
-    let samples = samples.map(|(s, f)| fit::samples(simd, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    let samples = samples.map(|(s, f)| fit::samples(simd, space, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
     let fitted = Fitted { fits, samples };
-    let means = region::regional_means(simd, options, &ladder, &fitted, data);
-    let choice = choose::choose(simd, options, &ladder, &means);
+    let means = region::regional_means(simd, space, options, &ladder, &fitted, data);
+    let choice = choose::choose(simd, space, options, &ladder, &means);
 
     let mut coarser: Option<Field<T>> = None;
     for octave in (1..grids.len()).rev() {
         let plain = plain(&ladder, &fitted, &choice, &grids[octave], octave, coarser.as_ref());
-        let complete = mix::collapse(simd, &plain);
-        coarser = Some(complete);
+        let complete = mix::collapse(simd, space, &plain);
+        space.keep(coarser.replace(complete));
     }
 
     let wanted: Vec<usize> = (0..ladder.scales.len()).filter(|l| choice.wants_edges(*l)).collect();
-    let grown: Vec<Option<Field<T>>> = wanted
-        .iter()
-        .map(|&l| {
-            (0..ladder.scales[l].octave).rev().fold(None, |coarse: Option<Field<T>>, octave| {
-                let from = coarse.as_ref().unwrap_or(&fitted.fits[l]);
-                Some(grow::grow(simd, from, FIT, &grids[octave]))
-            })
-        })
-        .collect();
+    let mut grown: Vec<Option<Field<T>>> = Vec::new();
+    for &l in &wanted {
+        let mut finer: Option<Field<T>> = None;
+        for octave in (0..ladder.scales[l].octave).rev() {
+            let next = grow::grow(simd, space, finer.as_ref().unwrap_or(&fitted.fits[l]), FIT, &grids[octave]);
+            space.keep(finer.replace(next));
+        }
+        grown.push(finer);
+    }
     let edges = wanted.iter().zip(&grown);
-    let edges = edges.map(|(&l, g)| (l, ladder.scales[l].sigma, g.as_ref().unwrap_or(&fitted.fits[l]))).collect();
+    let edges = edges.map(|(&l, g)| {
+        let fits = g.as_ref().unwrap_or(&fitted.fits[l]);
+        mix::Edges::new(l, ladder.scales[l].sigma, PITCH, fits)
+    });
+    let edges = edges.collect();
     let plain = plain(&ladder, &fitted, &choice, &grids[0], 0, coarser.as_ref());
-    mix::finish(simd, &mix::Final { plain, edges, options, base, pitch: PITCH })
+    let out = mix::finish(simd, space, &mix::Final { plain, edges, options, base, pitch: PITCH });
+    space.keep(coarser);
+    space.keep(grown.into_iter().flatten().chain(fitted.fits).chain(fitted.samples).chain(grids));
+    space.reclaim(choice.planes);
+    space.reclaim(means);
+    out
 }
 
 /// The windows of the grid `octave`, to complete what coarser grids have.
@@ -129,8 +146,14 @@ fn plain<'a, T: SimdReal>(
 }
 
 /// The flow on every grid of the ladder, finest first, less the `base` motion.
-fn grids<T: SimdReal>(simd: Level, ladder: &Ladder<T>, motion: &Planes<T>, base: &[f64; 6]) -> Vec<Field<T>> {
-    let mut finest = Field::new(motion.width, motion.height, FLOW);
+fn grids<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    ladder: &Ladder<T>,
+    motion: &Planes<T>,
+    base: &[f64; 6],
+) -> Vec<Field<T>> {
+    let mut finest = space.field(motion.width, motion.height, FLOW);
     for k in 0..2 {
         for y in 0..motion.height {
             let start = finest.start(k, y as isize) + LEFT;
@@ -145,7 +168,7 @@ fn grids<T: SimdReal>(simd: Level, ladder: &Ladder<T>, motion: &Planes<T>, base:
     fit::finish(&mut finest);
     let mut grids = vec![finest];
     for octave in 0..ladder.octaves() {
-        let next = fit::halve(simd, &grids[octave], &ladder.halving);
+        let next = fit::halve(simd, space, &grids[octave], &ladder.halving);
         grids.push(next);
     }
     grids

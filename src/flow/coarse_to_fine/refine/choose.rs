@@ -4,6 +4,7 @@
 //! explains.
 
 use super::Options;
+use super::field::Space;
 use super::ladder::{Ladder, difference_variance};
 use super::region::Layout;
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
@@ -11,7 +12,7 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 
 /// Weights below this count as none, so that whole rows can pass a window by.
-const NONE: f64 = 1e-3;
+const NONE: f64 = 1e-2;
 /// Least noise density, px^4: below what frames of any kind show.
 const QUIET: f64 = 1e-9;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
@@ -46,11 +47,17 @@ impl<T: SimdReal> Choice<T> {
 }
 
 /// The choice at the sites of the regional `means`.
-pub(super) fn choose<T: SimdReal>(simd: Level, options: &Options, ladder: &Ladder<T>, means: &Planes<T>) -> Choice<T> {
+pub(super) fn choose<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    options: &Options,
+    ladder: &Ladder<T>,
+    means: &Planes<T>,
+) -> Choice<T> {
     let windows = ladder.scales.len();
     let sigmas: Vec<f64> = ladder.scales.iter().map(|s| s.sigma).collect();
     let noise: Vec<f64> = sigmas.windows(2).map(|s| difference_variance(s[0], s[1])).collect();
-    let mut planes = Planes::new(means.width, means.height, 3 * windows + 3);
+    let mut planes = space.planes(means.width, means.height, 3 * windows + 3);
     let len = planes.row_len();
     for_each_band(planes.data_mut(), len, |_, rows, out| {
         for (y, out) in rows.zip(out.chunks_exact_mut(len)) {
@@ -77,9 +84,9 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
         let (row, stride, windows) = (means.row(y), means.stride(), sigmas.len());
         let layout = Layout { windows };
         for x in (0..means.padded()).step_by(V::LANES) {
-            let mean = |k: usize| V::load(&row[k * stride + LEFT + x..]);
-            let density = density(mean(0), mean(1), mean(2), mean(Layout::ENERGY));
-            let mut store = |k: usize, value: V| value.store(&mut out[k * stride + LEFT + x..]);
+            let means = &row[LEFT + x..];
+            let out = &mut out[LEFT + x..];
+            let density = density::<V>(means, stride);
             let mut sum = [V::zero(); 2];
             for (kind, sum) in sum.iter_mut().enumerate() {
                 let kappa = if kind == 0 { options.kappa } else { options.kappa_edge };
@@ -88,9 +95,9 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                     let mut next = V::zero();
                     if l + 1 < windows {
                         let change = if kind == 0 {
-                            power4(mean(Layout::change(l)))
+                            power4(V::load(&means[Layout::change(l) * stride..]))
                         } else {
-                            V::constant(1.0) / power4(mean(layout.calm(l)))
+                            V::constant(1.0) / power4(V::load(&means[layout.calm(l) * stride..]))
                         };
                         let ratio = change / (density * V::constant(noise[l] * kappa));
                         next = accepted / (V::constant(1.0) + power4(ratio));
@@ -99,23 +106,19 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                     accepted = next;
                     sigma = weight.mul_add(V::constant(sigmas[l]), sigma);
                     *sum = *sum + weight;
-                    store(kind * windows + l, weight);
+                    weight.store(&mut out[(kind * windows + l) * stride..]);
                 }
-                store(3 * windows + 1 + kind, sigma / *sum);
+                (sigma / *sum).store(&mut out[(3 * windows + 1 + kind) * stride..]);
             }
-            store(3 * windows, density);
-            let scale = sum.map(|sum| V::constant(1.0) / sum);
+            density.store(&mut out[3 * windows * stride..]);
             for l in 0..windows {
-                let mut rescaled = |kind: usize| {
-                    let at = (kind * windows + l) * stride + LEFT + x;
-                    let weight = V::load(&out[at..]) * scale[kind];
-                    weight.store(&mut out[at..]);
-                    weight
-                };
-                let plain = rescaled(0);
-                rescaled(1);
-                let misfit = plain * power4(mean(layout.misfit(l)));
-                misfit.store(&mut out[(2 * windows + l) * stride + LEFT + x..]);
+                let weight = &mut out[l * stride..];
+                let plain = V::load(weight) / sum[0];
+                plain.store(weight);
+                let weight = &mut out[(windows + l) * stride..];
+                (V::load(weight) / sum[1]).store(weight);
+                let misfit = plain * power4(V::load(&means[layout.misfit(l) * stride..]));
+                misfit.store(&mut out[(2 * windows + l) * stride..]);
             }
         }
         // The last site goes on, for those finer ones that lie beyond it.
@@ -134,7 +137,9 @@ fn power4<V: Lanes>(value: V) -> V {
 
 /// Noise density of the flow, px^2 per px^-2: the residual energy over the information, averaged over directions (trace of its inverse).
 #[inline(always)]
-fn density<V: Lanes>(uu: V, uv: V, vv: V, energy_root: V) -> V {
+fn density<V: Lanes>(means: &[V::Scalar], stride: usize) -> V {
+    let (uu, uv, vv) = (V::load(means), V::load(&means[stride..]), V::load(&means[2 * stride..]));
+    let energy = power4(V::load(&means[Layout::ENERGY * stride..]));
     let determinant = uv.neg_mul_add(uv, uu * vv).max(V::zero()) + V::constant(FLAT);
-    (power4(energy_root) * (uu + vv) / determinant).max(V::constant(QUIET))
+    (energy * (uu + vv) / determinant).max(V::constant(QUIET))
 }

@@ -1,6 +1,6 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
-use super::field::{Beyond, Field, RIM};
+use super::field::{Beyond, Field, RIM, Space};
 use super::ladder::{Scale, Taps};
 use crate::flow::coarse_to_fine::grid::LEFT;
 use crate::flow::windowed::window::filter;
@@ -61,12 +61,13 @@ impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
             let square = &mut square[LEFT..];
             filter::<V, 1>(&down[..stride], LEFT, 1, padded, taps, [&mut *square]);
             for x in (0..padded).step_by(V::LANES) {
-                let at = |k: usize| V::load(&fit[k * stride + LEFT + x..]);
-                let means = at(0).mul_add(at(0), at(1) * at(1));
-                let mut slopes = at(2) * at(2);
-                for k in 3..6 {
-                    slopes = at(k).mul_add(at(k), slopes);
+                let (u, v) = (V::load(&fit[LEFT + x..]), V::load(&fit[stride + LEFT + x..]));
+                let mut slopes = V::zero();
+                for k in 2..6 {
+                    let slope = V::load(&fit[k * stride + LEFT + x..]);
+                    slopes = slope.mul_add(slope, slopes);
                 }
+                let means = u.mul_add(u, v * v);
                 let misfit = slopes.neg_mul_add(variance, V::load(&square[x..]) - means);
                 misfit.max(V::constant(LEAST)).store(&mut square[x..]);
             }
@@ -75,8 +76,8 @@ impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
 }
 
 /// Single fits of the window `scale` to `from` (planes of [`FLOW`]): planes of [`FIT`].
-pub(super) fn fits<T: SimdReal>(simd: Level, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
-    let mut out = Field::new(from.width, from.height, FIT);
+pub(super) fn fits<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
+    let mut out = space.field(from.width, from.height, FIT);
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Fits { from, scale, rows, out }));
     out.extend(0..2, Beyond::Odd, RIM);
@@ -145,9 +146,9 @@ pub(super) fn pick<T: Copy>(from: &[T], step: usize, out: &mut [T]) {
 }
 
 /// The next coarser grid: planes of [`FLOW`], ready to be fitted.
-pub(super) fn halve<T: SimdReal>(simd: Level, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
+pub(super) fn halve<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
     let (width, height) = (from.width.div_ceil(2), from.height.div_ceil(2));
-    let mut out = Field::new(width, height, FLOW);
+    let mut out = space.field(width, height, FLOW);
     let (len, stride) = (out.row_len(), out.stride());
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Halve { from, taps, rows, out, stride, width });
@@ -201,9 +202,15 @@ impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
 }
 
 /// u and v of the twiced fit (`2 K - K K`) at every `step`-th site.
-pub(super) fn samples<T: SimdReal>(simd: Level, fits: &Field<T>, scale: &Scale<T>, step: usize) -> Field<T> {
+pub(super) fn samples<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    fits: &Field<T>,
+    scale: &Scale<T>,
+    step: usize,
+) -> Field<T> {
     let (width, height) = (fits.width.div_ceil(step), fits.height.div_ceil(step));
-    let mut out = Field::new(width, height, 2);
+    let mut out = space.field(width, height, 2);
     let (len, stride, taps) = (out.row_len(), out.stride(), &scale.second);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Samples { fits, taps, step, rows, out, stride, width });

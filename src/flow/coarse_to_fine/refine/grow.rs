@@ -1,7 +1,7 @@
 //! From coarse sites to fine ones.
 
 use super::choose::Choice;
-use super::field::{Beyond, Field, RIM};
+use super::field::{Beyond, Field, RIM, Space};
 use super::ladder::MAX_OCTAVE;
 use crate::flow::coarse_to_fine::grid::LEFT;
 use crate::math::Real;
@@ -106,8 +106,14 @@ impl<T: SimdReal> Kernel<T> for Grow<'_, T> {
 }
 
 /// The first `count` planes on the next finer grid, with the sites of `like`.
-pub(super) fn grow<T: SimdReal>(simd: Level, from: &Field<T>, count: usize, like: &Field<T>) -> Field<T> {
-    let mut out = Field::new(like.width, like.height, count);
+pub(super) fn grow<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    from: &Field<T>,
+    count: usize,
+    like: &Field<T>,
+) -> Field<T> {
+    let mut out = space.field(like.width, like.height, count);
     let (len, stride, width) = (out.row_len(), out.stride(), out.width);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Grow { from, rows, out, count, stride, width });

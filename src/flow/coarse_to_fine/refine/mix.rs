@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::choose::Choice;
-use super::field::{Beyond, Field, RIM};
+use super::field::{Beyond, Field, RIM, Space};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
 use super::ladder::Scale;
@@ -109,8 +109,8 @@ impl<T: SimdReal> Kernel<T> for Collapse<'_, T> {
 }
 
 /// The plain estimate of a coarse grid.
-pub(super) fn collapse<T: SimdReal>(simd: Level, plain: &Plain<'_, T>) -> Field<T> {
-    let mut out = Field::new(plain.grid.width, plain.grid.height, FIT);
+pub(super) fn collapse<T: SimdReal>(simd: Level, space: &Space<T>, plain: &Plain<'_, T>) -> Field<T> {
+    let mut out = space.field(plain.grid.width, plain.grid.height, FIT);
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Collapse { plain, rows, out }));
     out.extend(0..2, Beyond::Odd, 2);
@@ -118,11 +118,43 @@ pub(super) fn collapse<T: SimdReal>(simd: Level, plain: &Plain<'_, T>) -> Field<
     out
 }
 
+/// One of the windows around a site.
+struct Aside<T> {
+    /// Samples from the site to the window's centre.
+    offset: isize,
+    /// The same, px.
+    dx: T,
+    dy: T,
+}
+
+/// Edge fits of one window of the ladder.
+pub(super) struct Edges<'a, T> {
+    place: usize,
+    /// Single fits at the finest sites.
+    fits: &'a Field<T>,
+    windows: [Aside<T>; 9],
+}
+
+impl<'a, T: SimdReal> Edges<'a, T> {
+    /// For the window `place` of the ladder, of `sigma` px, on sites `pitch` px apart.
+    pub fn new(place: usize, sigma: f64, pitch: f64, fits: &'a Field<T>) -> Self {
+        let aside = (ASIDE * sigma / pitch).min(RIM as f64);
+        let (a, d) = (aside.round() as isize, (aside / std::f64::consts::SQRT_2).round() as isize);
+        let around = [(0, 0), (a, 0), (-a, 0), (0, a), (0, -a), (d, d), (d, -d), (-d, d), (-d, -d)];
+        let windows = around.map(|(dx, dy)| Aside {
+            offset: dy * fits.row_len() as isize + dx,
+            dx: T::from_f64(dx as f64 * pitch),
+            dy: T::from_f64(dy as f64 * pitch),
+        });
+        Self { place, fits, windows }
+    }
+}
+
 /// What the last step needs beside the plain estimate.
 pub(super) struct Final<'a, T> {
     pub plain: Plain<'a, T>,
-    /// Single fits at the finest sites, of the windows whose edge fits are wanted, with the window's place.
-    pub edges: Vec<(usize, f64, &'a Field<T>)>,
+    /// The windows whose edge fits are wanted.
+    pub edges: Vec<Edges<'a, T>>,
     pub options: &'a Options,
     /// Added to the result: u, v, then the slopes, about site (0, 0).
     pub base: [f64; 6],
@@ -147,7 +179,7 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
         for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
             job.plain.row::<V>(y, &mut scratch, &mut row);
             let planes = [choice.density(), choice.sigma(false), choice.sigma(true)];
-            let planes = planes.into_iter().chain(job.edges.iter().map(|(l, ..)| choice.edge(*l)));
+            let planes = planes.into_iter().chain(job.edges.iter().map(|edge| choice.edge(edge.place)));
             for (k, line) in planes.zip(weights.chunks_exact_mut(2 * stride)) {
                 widen::<V>(choice, k, 0, y, &mut scratch.down, line);
             }
@@ -166,9 +198,10 @@ impl<T: SimdReal> Final<'_, T> {
     fn chunk<V: Lanes<Scalar = T>>(&self, x: usize, y: usize, plain: &[T], weights: &[T], out: &mut [T]) {
         let stride = self.plain.grid.stride();
         let mut sums = [[T::from_f64(0.0); CHUNK]; 6];
-        for ((_, sigma, fits), weight) in self.edges.iter().zip(weights.chunks_exact(2 * stride).skip(3)) {
-            if any(&weight[x..x + CHUNK]) {
-                self.edge::<V>(*sigma, fits, [x, y], &weight[x..x + CHUNK], &mut sums);
+        for (edge, weight) in self.edges.iter().zip(weights.chunks_exact(2 * stride).skip(3)) {
+            let weight = chunk_of(&weight[x..]);
+            if any(weight) {
+                self.edge::<V>(edge, [x, y], weight, &mut sums);
             }
         }
         let cube = V::constant(self.options.gate.powi(3));
@@ -202,44 +235,39 @@ impl<T: SimdReal> Final<'_, T> {
     #[inline(always)]
     fn edge<V: Lanes<Scalar = T>>(
         &self,
-        sigma: f64,
-        fits: &Field<T>,
+        edge: &Edges<'_, T>,
         site: [usize; 2],
-        weights: &[T],
+        weights: &[T; CHUNK],
         sums: &mut [[T; CHUNK]; 6],
     ) {
-        let windows = around(sigma / self.pitch);
-        let (stride, [x, y]) = (fits.stride(), site);
-        let (data, soft) = (fits.data(), V::constant(SOFT));
-        let (u, v) =
-            (&self.plain.grid.line(0, y as isize)[LEFT + x..], &self.plain.grid.line(1, y as isize)[LEFT + x..]);
+        let ([x, y], fits) = (site, edge.fits);
+        let at = fits.start(0, y as isize) + LEFT + x;
+        // Cut to a known length here, so that the loop below has nothing to check.
+        let windows: [[&[T; CHUNK]; FIT]; 9] = std::array::from_fn(|n| {
+            let window = &fits.data()[at.wrapping_add_signed(edge.windows[n].offset)..];
+            std::array::from_fn(|k| chunk_of(&window[k * fits.stride()..]))
+        });
+        let own = [0, 1].map(|k| chunk_of(&self.plain.grid.line(k, y as isize)[LEFT + x..]));
         for i in (0..CHUNK).step_by(V::LANES) {
-            let own = [V::load(&u[i..]), V::load(&v[i..])];
+            let (own_u, own_v) = (V::load(&own[0][i..]), V::load(&own[1][i..]));
             let (mut total, mut sum) = (V::zero(), [V::zero(); 6]);
-            for [dx, dy] in windows {
-                let from = (fits.start(0, y as isize + dy) + LEFT + x + i).wrapping_add_signed(dx);
-                let fit = &data[from..from + 6 * stride + V::LANES];
-                let (back, up) = (V::constant(dx as f64 * self.pitch), V::constant(dy as f64 * self.pitch));
-                let slopes = [
-                    V::load(&fit[2 * stride..]),
-                    V::load(&fit[3 * stride..]),
-                    V::load(&fit[4 * stride..]),
-                    V::load(&fit[5 * stride..]),
-                ];
-                let here = [
-                    slopes[2].neg_mul_add(up, slopes[0].neg_mul_add(back, V::load(fit))),
-                    slopes[3].neg_mul_add(up, slopes[1].neg_mul_add(back, V::load(&fit[stride..]))),
-                ];
-                let (du, dv) = (here[0] - own[0], here[1] - own[1]);
-                let misfit = V::load(&fit[6 * stride..]).max(V::zero()) + soft;
+            for (fit, window) in windows.iter().zip(&edge.windows) {
+                let (back, up) = (V::splat(window.dx), V::splat(window.dy));
+                let (u_x, v_x) = (V::load(&fit[2][i..]), V::load(&fit[3][i..]));
+                let (u_y, v_y) = (V::load(&fit[4][i..]), V::load(&fit[5][i..]));
+                let u = u_y.neg_mul_add(up, u_x.neg_mul_add(back, V::load(&fit[0][i..])));
+                let v = v_y.neg_mul_add(up, v_x.neg_mul_add(back, V::load(&fit[1][i..])));
+                let (du, dv) = (u - own_u, v - own_v);
+                let misfit = V::load(&fit[6][i..]).max(V::zero()) + V::constant(SOFT);
                 let error = du.mul_add(du, dv.mul_add(dv, misfit));
                 let weight = V::constant(1.0) / (error * error);
                 total = total + weight;
-                sum[0] = here[0].mul_add(weight, sum[0]);
-                sum[1] = here[1].mul_add(weight, sum[1]);
-                for k in 0..4 {
-                    sum[2 + k] = slopes[k].mul_add(weight, sum[2 + k]);
-                }
+                sum[0] = u.mul_add(weight, sum[0]);
+                sum[1] = v.mul_add(weight, sum[1]);
+                sum[2] = u_x.mul_add(weight, sum[2]);
+                sum[3] = v_x.mul_add(weight, sum[3]);
+                sum[4] = u_y.mul_add(weight, sum[4]);
+                sum[5] = v_y.mul_add(weight, sum[5]);
             }
             let share = V::load(&weights[i..]) / total;
             for k in 0..6 {
@@ -249,11 +277,9 @@ impl<T: SimdReal> Final<'_, T> {
     }
 }
 
-/// Offsets of the nine windows, sites.
-fn around(sigma: f64) -> [[isize; 2]; 9] {
-    let aside = (ASIDE * sigma).min(RIM as f64);
-    let (a, d) = (aside.round() as isize, (aside / std::f64::consts::SQRT_2).round() as isize);
-    [[0, 0], [a, 0], [-a, 0], [0, a], [0, -a], [d, d], [d, -d], [-d, d], [-d, -d]]
+#[inline(always)]
+fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
+    values.first_chunk().expect("rows end with a rim")
 }
 
 /// 0, 1, 2, ...
@@ -263,8 +289,8 @@ fn ramp<T: SimdReal>() -> [T; CHUNK] {
 }
 
 /// The refined motion, with the window's sigma and the noise density: planes of [`RESULT`].
-pub(super) fn finish<T: SimdReal>(simd: Level, job: &Final<'_, T>) -> Planes<T> {
-    let mut out = Planes::new(job.plain.grid.width, job.plain.grid.height, RESULT);
+pub(super) fn finish<T: SimdReal>(simd: Level, space: &Space<T>, job: &Final<'_, T>) -> Planes<T> {
+    let mut out = space.planes(job.plain.grid.width, job.plain.grid.height, RESULT);
     let len = out.row_len();
     for_each_band(out.data_mut(), len, |_, rows, out| dispatch(simd, Finish { job, rows, out }));
     out

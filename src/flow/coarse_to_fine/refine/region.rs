@@ -3,7 +3,7 @@
 //! The level is a power mean `(G * f^p)^(1/p)`: with p = 1/4 it lies near a median, with p = -1/4 near the calm part of the region.
 
 use super::Options;
-use super::field::{Beyond, Field, RIM};
+use super::field::{Beyond, Field, RIM, Space};
 use super::fit::{FIT, pick, smooth_row};
 use super::ladder::{Ladder, MAX_OCTAVE, Taps};
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
@@ -65,6 +65,7 @@ pub(super) struct Fitted<T> {
 /// The regional means of everything in the [`Layout`], on every fourth site.
 pub(super) fn regional_means<T: SimdReal>(
     simd: Level,
+    space: &Space<T>,
     options: &Options,
     ladder: &Ladder<T>,
     fitted: &Fitted<T>,
@@ -72,14 +73,14 @@ pub(super) fn regional_means<T: SimdReal>(
 ) -> Planes<T> {
     let layout = Layout { windows: ladder.scales.len() };
     let quarter = |n: usize| n.div_ceil(1 << MAX_OCTAVE);
-    let mut out = Planes::new(quarter(data.width), quarter(data.height), layout.count());
+    let mut out = space.planes(quarter(data.width), quarter(data.height), layout.count());
     for octave in 1..=MAX_OCTAVE {
         let features = collect(options, ladder, fitted, octave);
         if features.items.is_empty() {
             continue;
         }
         let half = |n: usize| n.div_ceil(1 << octave);
-        let mut field = Field::new(half(data.width), half(data.height), features.targets.len());
+        let mut field = space.field(half(data.width), half(data.height), features.targets.len());
         let (len, stride, width) = (field.row_len(), field.stride(), field.width);
         let (items, step) = (features.items.as_slice(), 1 << octave);
         for_each_band(field.rows_mut(), len, |_, rows, out| {
@@ -91,6 +92,7 @@ pub(super) fn regional_means<T: SimdReal>(
         for_each_band(out.data_mut(), len, |_, rows, out| {
             dispatch(simd, Means { from, targets, step, rows, out, len, stride, width });
         });
+        space.keep([field]);
     }
     out
 }

@@ -49,7 +49,7 @@ fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize
 
 fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
     let ladder = Ladder::new(Options::default().ladder, PITCH);
-    let grids = grids(Level::detect(), &ladder, motion, &[0.0; 6]);
+    let grids = grids(Level::detect(), &Space::default(), &ladder, motion, &[0.0; 6]);
     (ladder, grids)
 }
 
@@ -58,8 +58,8 @@ fn fits_are_least_squares_and_samples_are_twiced() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[..3] {
-        let fits = fit::fits(Level::detect(), &grids[0], scale);
-        let samples = fit::samples(Level::detect(), &fits, scale, 2);
+        let fits = fit::fits(Level::detect(), &Space::default(), &grids[0], scale);
+        let samples = fit::samples(Level::detect(), &Space::default(), &fits, scale, 2);
         for (x, y) in [(0, 0), (3, 1), (18, 12), (36, 25), (20, 24)] {
             let mut misfit = 0.0;
             for k in 0..2 {
@@ -84,7 +84,7 @@ fn coarse_grids_give_nearly_the_fit_of_the_whole_window() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[3..] {
-        let fits = fit::fits(Level::detect(), &grids[scale.octave], scale);
+        let fits = fit::fits(Level::detect(), &Space::default(), &grids[scale.octave], scale);
         let step = 1 << scale.octave;
         for (x, y) in [(8, 8), (16, 12), (24, 16)] {
             let z = |x: isize, y: isize| motion.at(0, x as usize, y as usize);
@@ -106,7 +106,7 @@ fn grids_grow_back_without_bending_cubics() {
             coarse.data_mut()[at] = cubic(2.0 * x as f64, 2.0 * y as f64);
         }
     }
-    let fine = grow::grow(Level::detect(), &coarse, 2, &Field::new(39, 28, 1));
+    let fine = grow::grow(Level::detect(), &Space::default(), &coarse, 2, &Field::new(39, 28, 1));
     for (x, y) in (0..39).flat_map(|x| (0..28).map(move |y| (x, y))) {
         assert!((fine.at(0, x, y) - cubic(x as f64, y as f64)).abs() < 1e-11, "{x} {y}");
     }
@@ -129,7 +129,7 @@ fn choices_follow_the_formulas() {
         }
         (0..7).for_each(|l| means.line_mut(layout.misfit(l), 0)[x] = 2.0 + l as f64);
     }
-    let choice = choose::choose(Level::detect(), &options, &ladder, &means);
+    let choice = choose::choose(Level::detect(), &Space::default(), &options, &ladder, &means);
     let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
     for x in 0..9 {
         assert!((choice.planes.at(choice.density(), x, 0) / a - 1.0).abs() < 1e-12);
@@ -144,7 +144,7 @@ fn choices_follow_the_formulas() {
                     let ratio = (roots(l, x) * root).powi(4) / (d * a);
                     accepted / (1.0 + (ratio / kappa).powi(4))
                 };
-                weights.push((accepted - next - 1e-3f64).max(0.0));
+                weights.push((accepted - next - 1e-2f64).max(0.0));
                 accepted = next;
             }
             let sum: f64 = weights.iter().sum();
@@ -175,11 +175,12 @@ fn regional_levels_are_power_means() {
         data
     };
     let (ladder, grids) = finest(&motion);
-    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(level, &grids[s.octave], s)).collect();
+    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(level, &Space::default(), &grids[s.octave], s)).collect();
     let samples = ladder.scales.iter().zip(&fits);
-    let samples = samples.map(|(s, f)| fit::samples(level, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    let samples =
+        samples.map(|(s, f)| fit::samples(level, &Space::default(), f, s, if s.octave == 0 { 2 } else { 1 })).collect();
     let fitted = Fitted { fits, samples };
-    let means = region::regional_means(level, &options, &ladder, &fitted, &data);
+    let means = region::regional_means(level, &Space::default(), &options, &ladder, &fitted, &data);
     let (half_width, half_height) = (WIDTH.div_ceil(2), HEIGHT.div_ceil(2));
     let mean = |sigma: f64, x: usize, y: usize, f: &dyn Fn(usize, usize) -> f64| {
         let taps = Taps::<f64>::gaussian(sigma / 4.0, 1.0);
@@ -220,12 +221,12 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let motion = field::<f64>(WIDTH, HEIGHT, |k, x, y| if x > 30.0 { 2.0 } else { rough(k, x, y) });
     let data = evidence::<f64>(WIDTH, HEIGHT, 1e6);
     let options = Options { ladder: &[2.5], gate: 1e-9, ..Options::default() };
-    let got = refine(Level::detect(), &options, &motion, &data);
+    let got = refine(Level::detect(), &mut Space::default(), &options, &motion, &data);
     let base = mean_motion(&motion);
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
-    let grids = grids(Level::detect(), &ladder, &motion, &base);
+    let grids = grids(Level::detect(), &Space::default(), &ladder, &motion, &base);
     let scale: &Scale<f64> = &ladder.scales[0];
-    let fits = fit::fits(Level::detect(), &grids[0], scale);
+    let fits = fit::fits(Level::detect(), &Space::default(), &grids[0], scale);
     for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
         let (mut sum, mut total) = ([0.0; 6], 0.0);
         // 1.5 sigma is 1.9 sites, and 1.3 along the diagonals.
