@@ -1,6 +1,7 @@
 //! One door to all methods.
 
 use super::baseline::{HornSchunck, LucasKanade};
+use super::coarse_to_fine::CoarseToFine;
 use super::instantaneous::Instantaneous;
 use super::model::{ModelKind, Parameter};
 use super::options::{Common, Method};
@@ -31,6 +32,7 @@ pub struct Estimator {
 
 #[derive(Debug)]
 enum Engine {
+    CoarseToFine(CoarseToFine),
     Instantaneous(Box<Instantaneous>),
     Windowed(Box<Windowed>),
     LucasKanade(LucasKanade),
@@ -45,6 +47,7 @@ impl Estimator {
     pub fn new(method: Method, common: Common) -> Result<Self> {
         common.check()?;
         let engine = match &method {
+            Method::CoarseToFine(o) => Engine::CoarseToFine(CoarseToFine::new(o)?),
             Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &common)?)),
             Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o, &common)?)),
             Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &common)?),
@@ -65,6 +68,7 @@ impl Estimator {
     /// Frames that one field is estimated from: 3, or 2 for a baseline that differences a pair.
     pub fn frames_needed(&self) -> usize {
         match &self.engine {
+            Engine::CoarseToFine(e) => e.frames_needed(),
             Engine::Instantaneous(_) => 3,
             Engine::Windowed(e) => e.frames_needed(),
             Engine::LucasKanade(e) => e.frames_needed(),
@@ -75,6 +79,7 @@ impl Estimator {
     /// Which of the frames the field belongs to, 0 being the oldest.
     pub fn reference_frame(&self) -> usize {
         match &self.engine {
+            Engine::CoarseToFine(e) => e.frame(),
             Engine::Instantaneous(e) => e.frame(),
             Engine::Windowed(e) => e.frame(),
             Engine::LucasKanade(e) => e.frame(),
@@ -86,7 +91,7 @@ impl Estimator {
     pub fn model(&self) -> ModelKind {
         match &self.engine {
             Engine::Instantaneous(e) => e.model(),
-            Engine::Windowed(_) => ModelKind::Affine,
+            Engine::CoarseToFine(_) | Engine::Windowed(_) => ModelKind::Affine,
             Engine::LucasKanade(_) | Engine::HornSchunck(_) => ModelKind::Translational,
         }
     }
@@ -198,6 +203,7 @@ impl Estimator {
         match (&self.engine, frames) {
             (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field),
             (Engine::Instantaneous(_), _) => {}
+            (Engine::CoarseToFine(e), _) => e.estimate_into(frames, &self.common, field),
             (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field),
             (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.common, field)?,
             (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.common, field)?,

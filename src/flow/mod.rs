@@ -5,6 +5,7 @@
 //!
 //! * [`instantaneous`]: per pixel, WO2010/098160 (34): flow and Jacobian from nothing but a 3x3x3 block of brightness. Its domain is images that are
 //!   locally quadratic and motion that makes them observable; on busy 8-bit texture use the windowed form.
+//! * [`coarse_to_fine`]: affine flow with a pyramid, warping and robust coupling: the one for everyday frames.
 //! * [`windowed`]: the same equations over a window in which the motion is affine.
 //! * [`baseline`]: Lucas-Kanade and Horn-Schunck, for comparison.
 //! * [`model`]: the motion models; one file and one line each.
@@ -12,7 +13,7 @@
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 
 pub mod baseline;
-mod coarse_to_fine;
+pub mod coarse_to_fine;
 pub mod derived;
 mod estimator;
 pub mod instantaneous;

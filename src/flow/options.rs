@@ -1,6 +1,7 @@
 //! What every estimator of this room is told.
 
 use super::baseline::{HornSchunckOptions, LucasKanadeOptions, Window};
+use super::coarse_to_fine::{CORRELATION_LENGTH, CoarseToFineOptions};
 use super::instantaneous::InstantaneousOptions;
 use super::windowed::WindowedOptions;
 use crate::error::{Error, Result};
@@ -110,6 +111,8 @@ impl Common {
 /// The ways to estimate flow from two or three frames.
 #[derive(Debug, Clone)]
 pub enum Method {
+    /// Affine flow from coarse to fine: large motions, edges, untextured areas; the method for everyday frames.
+    CoarseToFine(CoarseToFineOptions),
     /// Per pixel, (34): flow and Jacobian from a 3x3x3 block of brightness.
     Instantaneous(InstantaneousOptions),
     /// The same equations summed over a window in which the motion is affine.
@@ -121,23 +124,29 @@ pub enum Method {
 }
 
 impl Method {
-    /// The method called `name` (`instantaneous`, `windowed`, `lucas_kanade`, `horn_schunck`) with its default options.
+    /// The method called `name` (`coarse_to_fine`, `windowed`, `instantaneous`, `lucas_kanade`, `horn_schunck`) with its default options.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `method` for another word.
     pub fn parse(name: &str) -> Result<Self> {
         match name {
+            "coarse_to_fine" => Ok(Self::CoarseToFine(CoarseToFineOptions::default())),
             "instantaneous" => Ok(Self::Instantaneous(InstantaneousOptions::default())),
             "windowed" => Ok(Self::Windowed(WindowedOptions::default())),
             "lucas_kanade" => Ok(Self::LucasKanade(LucasKanadeOptions::default())),
             "horn_schunck" => Ok(Self::HornSchunck(HornSchunckOptions::default())),
-            other => Err(Error::argument("method", "instantaneous, windowed, lucas_kanade or horn_schunck", other)),
+            other => Err(Error::argument(
+                "method",
+                "coarse_to_fine, windowed, instantaneous, lucas_kanade or horn_schunck",
+                other,
+            )),
         }
     }
 
     /// The method's name, as [`Method::parse`] takes it.
     pub fn name(&self) -> &'static str {
         match self {
+            Self::CoarseToFine(_) => "coarse_to_fine",
             Self::Instantaneous(_) => "instantaneous",
             Self::Windowed(_) => "windowed",
             Self::LucasKanade(_) => "lucas_kanade",
@@ -149,6 +158,7 @@ impl Method {
     /// standard deviation of everything that an estimate is a weighted sum over.
     pub fn correlation_length(&self) -> f64 {
         match self {
+            Self::CoarseToFine(_) => CORRELATION_LENGTH,
             Self::Instantaneous(o) => o.neighbourhood.spread(),
             Self::Windowed(o) => {
                 let smoothing = o.presmooth.or(o.already_smoothed).unwrap_or(0.0);

@@ -3,6 +3,7 @@
 use super::{parse_not_negative, parse_pair, parse_positive, parse_size};
 use crate::error::{Error, Result};
 use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
+use crate::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
 use crate::flow::instantaneous::InstantaneousOptions;
 use crate::flow::model::ModelKind;
 use crate::flow::windowed::{RowSet, WindowedOptions};
@@ -19,6 +20,12 @@ pub struct MethodArguments {
     /// lucas-kanade and horn-schunck
     #[arg(long, value_name = "NAME", default_value = "windowed")]
     pub method: String,
+    /// coarse-to-fine: cost against error, fast, balanced (default) or accurate
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
+    /// coarse-to-fine: pyramid levels [default: as many as the frame allows]
+    #[arg(long, value_name = "N")]
+    pub levels: Option<usize>,
     /// instantaneous: motion model, affine (default), translational or accelerating
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
@@ -74,6 +81,11 @@ impl MethodArguments {
         self.refuse_foreign(&method)?;
         let pair = self.pair || frames == Some(2);
         Ok(match method {
+            Method::CoarseToFine(options) => Method::CoarseToFine(CoarseToFineOptions {
+                preset: self.preset.as_deref().map_or(Ok(options.preset), Preset::parse)?,
+                frames: if pair { 2 } else { options.frames },
+                levels: self.levels,
+            }),
             Method::Windowed(_) => Method::Windowed(self.windowed(pair, smooth)?),
             Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
             Method::LucasKanade(mut options) => {
@@ -121,7 +133,10 @@ impl MethodArguments {
         let (windowed, instantaneous) =
             (matches!(method, Method::Windowed(_)), matches!(method, Method::Instantaneous(_)));
         let lucas_kanade = matches!(method, Method::LucasKanade(_));
-        let given: [(&'static str, bool, bool); 8] = [
+        let coarse_to_fine = matches!(method, Method::CoarseToFine(_));
+        let given: [(&'static str, bool, bool); 10] = [
+            ("preset", self.preset.is_some(), coarse_to_fine),
+            ("levels", self.levels.is_some(), coarse_to_fine),
             ("model", self.model.is_some(), instantaneous),
             ("scheme", self.scheme.is_some(), windowed || instantaneous),
             ("pair", self.pair, !instantaneous),

@@ -56,8 +56,8 @@ pub(super) struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            ladder: &[1.5, 2.5, 4.0, 6.0, 9.0, 13.0, 18.0],
-            kappa: 7.0,
+            ladder: &[1.25, 1.9, 2.8, 4.2, 6.3, 9.5, 14.0, 21.0],
+            kappa: 10.0,
             kappa_edge: 6.0,
             region: 10.0,
             calm_region: 20.0,

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::flow::baseline::{Differences, HornSchunckOptions, LucasKanadeOptions, Smoothness, Window};
+use crate::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
 use crate::flow::instantaneous::InstantaneousOptions;
 use crate::flow::model::ModelKind;
 use crate::flow::windowed::{RowSet, WindowedOptions};
@@ -20,6 +21,8 @@ macro_rules! estimator_options {
         with_common! {
             $then $target
             method: String as &str = "windowed",
+            preset: Option<String> as Option<String> = None,
+            levels: Option<Integer> as Option<Integer> = None,
             model: String as &str = "affine",
             time_scheme: Option<String> as Option<String> = None,
             neighbourhood: Object as Object = None,
@@ -104,13 +107,30 @@ impl Arguments {
         let fit = |default: &Neighbourhood| {
             options::neighbourhood(py, &self.neighbourhood, self.neighbourhood_sigma, default)
         };
+        if !matches!(method, Method::CoarseToFine(_)) {
+            self.refuse(&["preset", "levels"])?;
+        }
         match &mut method {
+            Method::CoarseToFine(o) => self.coarse_to_fine(o)?,
             Method::Instantaneous(o) => self.instantaneous(o, fit(&o.neighbourhood)?)?,
             Method::Windowed(o) => self.windowed(o, fit(&o.neighbourhood)?)?,
             Method::LucasKanade(o) => self.lucas_kanade(o)?,
             Method::HornSchunck(o) => self.horn_schunck(o)?,
         }
         Ok(method)
+    }
+
+    fn coarse_to_fine(&self, o: &mut CoarseToFineOptions) -> PyResult<()> {
+        self.refuse(&["neighbourhood", "window_sigma", "rows", "smoothness", "iterations", "rank_deficient"])?;
+        self.expect_model("affine")?;
+        match self.time_scheme.as_deref() {
+            None | Some("central") => {}
+            Some(PAIR) => o.frames = 2,
+            Some(_) => return Err(unknown_scheme(self, "central or pair").into()),
+        }
+        o.preset = self.preset.as_deref().map_or(Ok(o.preset), Preset::parse)?;
+        o.levels = self.levels.map(|levels| options::count("levels", levels)).transpose()?;
+        Ok(())
     }
 
     fn instantaneous(&self, o: &mut InstantaneousOptions, neighbourhood: Neighbourhood) -> Result<()> {
@@ -182,6 +202,8 @@ impl Arguments {
     fn refuse(&self, names: &[&'static str]) -> Result<()> {
         for &name in names {
             let given = match name {
+                "preset" => self.preset.is_some(),
+                "levels" => self.levels.is_some(),
                 "neighbourhood" => self.neighbourhood.is_some() || self.neighbourhood_sigma.is_some(),
                 "window_sigma" => self.window_sigma.is_some(),
                 "rows" => self.rows.is_some(),

@@ -1,0 +1,107 @@
+//! What the coarse-to-fine estimator may be told.
+
+use super::couple::Coupling;
+use crate::error::{Error, Result};
+
+/// How much work an estimate may cost. Errors and times of each are measured by `benchmarks/compare.py`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Preset {
+    /// One linearisation on the finest level and few sweeps.
+    Fast,
+    /// Two linearisations on the finest level.
+    #[default]
+    Balanced,
+    /// More of everything, for offline work.
+    Accurate,
+}
+
+impl Preset {
+    /// Every preset, the cheapest first.
+    pub const EVERY: [Self; 3] = [Self::Fast, Self::Balanced, Self::Accurate];
+
+    /// The name used in options: `fast`, `balanced`, `accurate`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Balanced => "balanced",
+            Self::Accurate => "accurate",
+        }
+    }
+
+    /// The preset called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `preset` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::EVERY
+            .into_iter()
+            .find(|preset| preset.name() == name)
+            .ok_or_else(|| Error::argument("preset", "fast, balanced or accurate", name))
+    }
+
+    /// What it means.
+    pub(super) fn effort(self) -> Effort {
+        let coupling = Coupling::default();
+        match self {
+            Self::Fast => Effort { coarse: 3, finest: 1, coupling: Coupling { sweeps: 3, ..coupling } },
+            Self::Balanced => Effort { coarse: 5, finest: 2, coupling },
+            Self::Accurate => Effort { coarse: 6, finest: 4, coupling: Coupling { sweeps: 10, ..coupling } },
+        }
+    }
+}
+
+/// Numbers of iterations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effort {
+    /// Linearisations on every level but the finest.
+    pub coarse: usize,
+    /// Linearisations on the finest level.
+    pub finest: usize,
+    /// Coupling after each.
+    pub coupling: Coupling,
+}
+
+/// Options of the coarse-to-fine estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoarseToFineOptions {
+    /// Cost against error. Default [`Preset::Balanced`].
+    pub preset: Preset,
+    /// Frames of one estimate: 3 (default), the field then belongs to the middle frame, or 2: it belongs to the first, and tells where its pixels are in
+    /// the second.
+    pub frames: usize,
+    /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels` px. `None` (default): as many as the frame
+    /// allows, down to [`LEAST_SIDE`] px.
+    pub levels: Option<usize>,
+}
+
+impl Default for CoarseToFineOptions {
+    fn default() -> Self {
+        Self { preset: Preset::default(), frames: 3, levels: None }
+    }
+}
+
+/// Smallest width and height of a pyramid level, px.
+pub const LEAST_SIDE: usize = 12;
+/// Most pyramid levels.
+const MOST_LEVELS: usize = 12;
+
+impl CoarseToFineOptions {
+    /// The default for two frames.
+    pub fn pair() -> Self {
+        Self { frames: 2, ..Self::default() }
+    }
+
+    /// Refuses values that mean nothing.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        if !(2..=3).contains(&self.frames) {
+            return Err(Error::argument("frames", "2 or 3 for a coarse-to-fine estimate", self.frames));
+        }
+        if let Some(levels) = self.levels.filter(|levels| !(1..=MOST_LEVELS).contains(levels)) {
+            return Err(Error::argument("levels", format!("1 to {MOST_LEVELS} pyramid levels"), levels));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,144 @@
+//! Motion between the sites, and on the sites of the next finer level.
+
+use super::data::MOTION;
+use super::grid::{LEFT, Planes};
+use super::rows::RowReader;
+use crate::simd::SimdReal;
+use rayon::prelude::*;
+
+/// Rows of one task.
+const ROWS: usize = 32;
+
+/// The affine motions of the sites around a place, each carried there, blended by their distance.
+///
+/// `(x, y)`: in px of the level whose sites are `step` px apart; beyond the last site its own model goes on.
+pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
+    let split = |at: f64, count: usize| {
+        let at = (at / step).clamp(0.0, (count - 1) as f64);
+        let first = (at as usize).min(count.saturating_sub(2));
+        (first, at - first as f64)
+    };
+    let ((i, fx), (j, fy)) = (split(x, motion.width), split(y, motion.height));
+    let stride = motion.stride();
+    let mut blend = [0.0; MOTION];
+    for (row, weight_y) in [(j, 1.0 - fy), (j + 1, fy)] {
+        if weight_y == 0.0 {
+            continue;
+        }
+        let (values, dy) = (&motion.row(row)[LEFT..], y - row as f64 * step);
+        for (column, weight_x) in [(i, 1.0 - fx), (i + 1, fx)] {
+            let m: [f64; MOTION] = std::array::from_fn(|k| values[k * stride + column].to_f64());
+            let (weight, dx) = (weight_x * weight_y, x - column as f64 * step);
+            blend[0] += weight * (m[0] + m[2] * dx + m[4] * dy);
+            blend[1] += weight * (m[1] + m[3] * dx + m[5] * dy);
+            for k in 2..MOTION {
+                blend[k] += weight * m[k];
+            }
+        }
+    }
+    blend
+}
+
+/// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles, the Jacobian stays.
+///
+/// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
+pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Planes<T> {
+    let mut fine = Planes::new(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
+    let (width, stride, len) = (fine.width, fine.stride(), fine.row_len().max(1));
+    let two = T::from_f64(2.0);
+    fine.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
+        let mut reader = RowReader::new(width);
+        for (y, row) in rows.chunks_mut(len).enumerate() {
+            reader.read_motion(coarse, task * ROWS + y);
+            for k in 0..MOTION {
+                let target = &mut row[k * stride + LEFT..][..width];
+                target.copy_from_slice(reader.plane(k));
+                if k < 2 {
+                    target.iter_mut().for_each(|value| *value *= two);
+                }
+            }
+        }
+    });
+    fine
+}
+
+/// Makes the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites' affine models.
+///
+/// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the Jacobian catch up.
+pub(super) fn rederive<T: SimdReal>(motion: &mut Planes<T>) {
+    let (width, height) = (motion.width, motion.height);
+    let old = motion.clone();
+    let quarter = T::from_f64(0.25);
+    // From the values and slopes at the sites before, here and after: the blend a pixel after minus that a pixel before, over 2 px.
+    let slope = |value: [T; 3], slope: [T; 3]| {
+        quarter * ((value[2] - value[0]) + (slope[1] - slope[0]) + (slope[1] - slope[2]))
+    };
+    for y in 0..height {
+        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+        for k in 0..2 {
+            let (flow, along_x) = (old.line(k, y), old.line(2 + k, y));
+            for (x, out) in motion.line_mut(2 + k, y).iter_mut().enumerate() {
+                if x > 0 && x + 1 < width {
+                    *out = slope([flow[x - 1], flow[x], flow[x + 1]], [along_x[x - 1], along_x[x], along_x[x + 1]]);
+                }
+            }
+            if above + 2 == below {
+                let lines = [above, y, below].map(|y| (old.line(k, y), old.line(4 + k, y)));
+                for (x, out) in motion.line_mut(4 + k, y).iter_mut().enumerate() {
+                    *out = slope(lines.map(|l| l.0[x]), lines.map(|l| l.1[x]));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An affine motion on the sites of a level `scale` times coarser than the finest.
+    fn affine(width: usize, height: usize, scale: f64) -> Planes<f64> {
+        let m = [1.5, -2.0, 0.02, -0.01, 0.03, 0.015];
+        let mut planes = Planes::new(width, height, MOTION);
+        for y in 0..height {
+            for x in 0..width {
+                let (px, py) = (2.0 * x as f64 * scale, 2.0 * y as f64 * scale);
+                let here = [
+                    (m[0] + m[2] * px + m[4] * py) / scale,
+                    (m[1] + m[3] * px + m[5] * py) / scale,
+                    m[2],
+                    m[3],
+                    m[4],
+                    m[5],
+                ];
+                for (k, value) in here.into_iter().enumerate() {
+                    planes.line_mut(k, y)[x] = value;
+                }
+            }
+        }
+        planes
+    }
+
+    #[test]
+    fn affine_motion_survives_refinement_and_reading() {
+        let (coarse, want) = (affine(7, 5, 2.0), affine(13, 9, 1.0));
+        let fine = finer(&coarse, (26, 18));
+        assert_eq!((fine.width, fine.height), (13, 9));
+        for k in 0..MOTION {
+            for y in 0..9 {
+                for x in 0..13 {
+                    assert!((fine.at(k, x, y) - want.at(k, x, y)).abs() < 1e-12);
+                }
+            }
+        }
+        let m = motion_at(&want, 2.0, 26.5, 3.25);
+        assert!((m[0] - (1.5 + 0.02 * 26.5 + 0.03 * 3.25)).abs() < 1e-12 && (m[3] + 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_single_site_speaks_for_everything() {
+        let one = affine(1, 1, 1.0);
+        assert!((motion_at(&one, 2.0, 1.0, 1.0)[0] - 1.55).abs() < 1e-12);
+        assert_eq!(finer(&one, (2, 1)).width, 1);
+    }
+}

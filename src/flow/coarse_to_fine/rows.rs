@@ -1,0 +1,131 @@
+//! Whole rows of pixels from planes on every second pixel.
+
+use super::data::MOTION;
+use super::grid::Planes;
+use crate::simd::SimdReal;
+
+/// Reads planes on the sites (every second pixel) at the pixels of a row; keeps its memory from row to row.
+#[derive(Debug)]
+pub(super) struct RowReader<T> {
+    /// The planes at the sites' columns of the row.
+    sites: Vec<T>,
+    /// The planes at every pixel of the row, one after the other.
+    pixels: Vec<T>,
+    width: usize,
+}
+
+impl<T: SimdReal> RowReader<T> {
+    /// For frames `width` px wide.
+    pub fn new(width: usize) -> Self {
+        Self { sites: Vec::new(), pixels: Vec::new(), width }
+    }
+
+    /// Plane `k` along the row read last.
+    pub fn plane(&self, k: usize) -> &[T] {
+        &self.pixels[k * self.width..(k + 1) * self.width]
+    }
+
+    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites their models, carried to the pixel, are averaged.
+    pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
+        self.read(motion, y);
+        let (half, one) = (T::from_f64(0.5), T::from_f64(1.0));
+        let n = motion.width;
+        if y % 2 == 1 {
+            // What the slopes along y add: half their difference between the rows, all of it beyond the last.
+            let (above, below) = (y / 2, y / 2 + 1);
+            for c in 0..2 {
+                let (first, flow) = (motion.line(4 + c, above), &mut self.sites[c * n..(c + 1) * n]);
+                if below < motion.height {
+                    for ((out, &a), &b) in flow.iter_mut().zip(first).zip(motion.line(4 + c, below)) {
+                        *out += half * (a - b);
+                    }
+                } else {
+                    flow.iter_mut().zip(first).for_each(|(out, &a)| *out += one * a);
+                }
+            }
+        }
+        for k in 0..MOTION {
+            let slopes = if k < 2 { Some(&self.sites[(2 + k) * n..(3 + k) * n]) } else { None };
+            widen(&self.sites[k * n..(k + 1) * n], slopes, &mut self.pixels[k * self.width..(k + 1) * self.width]);
+        }
+    }
+
+    /// Reads row `y` of planes that vary linearly between the sites.
+    pub fn read_values(&mut self, planes: &Planes<T>, y: usize) {
+        self.read(planes, y);
+        let n = planes.width;
+        for k in 0..planes.count {
+            widen(&self.sites[k * n..(k + 1) * n], None, &mut self.pixels[k * self.width..(k + 1) * self.width]);
+        }
+    }
+
+    /// The means of the rows of sites around `y`.
+    fn read(&mut self, planes: &Planes<T>, y: usize) {
+        let zero = T::from_f64(0.0);
+        self.sites.clear();
+        self.pixels.resize(planes.count * self.width, zero);
+        let (above, below) = (y / 2, (y / 2 + y % 2).min(planes.height - 1));
+        let half = T::from_f64(0.5);
+        for k in 0..planes.count {
+            let (a, b) = (planes.line(k, above), planes.line(k, below));
+            self.sites.extend(a.iter().zip(b).map(|(&a, &b)| half * (a + b)));
+        }
+    }
+}
+
+/// Pixels of a row from its sites; with the slopes of the sites' models, between two sites both are carried to the middle.
+fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
+    let half = T::from_f64(0.5);
+    let last = sites.len() - 1;
+    for (x, pair) in pixels.chunks_mut(2).enumerate() {
+        pair[0] = sites[x];
+        if let Some(odd) = pair.get_mut(1) {
+            let next = (x + 1).min(last);
+            *odd = half * (sites[x] + sites[next]);
+            if let Some(slopes) = slopes {
+                *odd += if x < last { half * (slopes[x] - slopes[next]) } else { slopes[x] };
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::resample::motion_at;
+    use super::*;
+
+    #[test]
+    fn rows_are_what_single_places_are() {
+        let (width, height) = (10, 8);
+        let mut motion = Planes::<f64>::new(5, 4, 6);
+        for k in 0..6 {
+            for y in 0..4 {
+                for x in 0..5 {
+                    motion.line_mut(k, y)[x] = ((7 * k + 3 * y + 5 * x) as f64).sin();
+                }
+            }
+        }
+        let mut reader = RowReader::new(width);
+        for y in 0..height {
+            reader.read_motion(&motion, y);
+            for x in 0..width {
+                let want = motion_at(&motion, 2.0, x as f64, y as f64);
+                for (k, want) in want.into_iter().enumerate() {
+                    assert!((reader.plane(k)[x] - want).abs() < 1e-12, "plane {k} at ({x}, {y})");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn values_are_linear_between_sites_and_constant_beyond() {
+        let mut planes = Planes::<f32>::new(2, 2, 1);
+        planes.line_mut(0, 0).copy_from_slice(&[1.0, 3.0]);
+        planes.line_mut(0, 1).copy_from_slice(&[5.0, 7.0]);
+        let mut reader = RowReader::new(4);
+        reader.read_values(&planes, 1);
+        assert_eq!(reader.plane(0), [3.0, 4.0, 5.0, 5.0]);
+        reader.read_values(&planes, 3);
+        assert_eq!(reader.plane(0), [5.0, 6.0, 7.0, 7.0]);
+    }
+}

@@ -1,0 +1,151 @@
+//! From frames to a filled field: the pyramid, the iterations, the results.
+
+use super::couple::{CoupleScratch, couple};
+use super::data::{DataOptions, DataTerm, MOTION, View};
+use super::grid::Planes;
+use super::levels::{PyramidLevel, pyramid};
+use super::options::{CoarseToFineOptions, Effort};
+use super::output;
+use super::refine::{Options as Refinement, refine};
+use super::resample::{finer, rederive};
+use crate::error::Result;
+use crate::flow::options::Common;
+use crate::simd::{Level, SimdReal};
+use crate::types::{FlowField, Frame};
+
+/// Noise is taken for at least this share of the brightness' standard deviation.
+const LEAST_NOISE: f64 = 1e-3;
+/// The scale of the robust weights is at least this share of the brightness' standard deviation.
+const LEAST_SCALE: f64 = 4e-3;
+
+/// The estimator behind the options.
+#[derive(Debug)]
+pub(in crate::flow) struct CoarseToFine {
+    options: CoarseToFineOptions,
+}
+
+impl CoarseToFine {
+    /// Checks the options.
+    pub fn new(options: &CoarseToFineOptions) -> Result<Self> {
+        options.check()?;
+        Ok(Self { options: options.clone() })
+    }
+
+    /// Frames of one estimate, 2 or 3.
+    pub fn frames_needed(&self) -> usize {
+        self.options.frames
+    }
+
+    /// Which of the frames the estimate belongs to.
+    pub fn frame(&self) -> usize {
+        self.options.frames - 2
+    }
+
+    /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
+    pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
+        common.threads.install(|| {
+            let unit = contrast(frames);
+            let levels = pyramid(common.level(), frames, common.mask.as_ref(), self.options.levels);
+            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), unit).run(&levels);
+            estimate.motion = refine(common.level(), &Refinement::default(), &estimate.motion, &estimate.data);
+            output::fill(&estimate, frames, common, field);
+        });
+    }
+}
+
+/// The motion on the sites of the finest level, and what it rests on.
+#[derive(Debug)]
+pub(super) struct Estimate<T> {
+    /// `u, v, u_x, v_x, u_y, v_y` on every second pixel, midway in time.
+    pub motion: Planes<T>,
+    /// The last data term.
+    pub data: Planes<T>,
+    /// Typical residual energy, grey^2.
+    pub energy: T,
+    /// Standard deviation of the brightness, grey levels.
+    pub unit: f64,
+}
+
+/// Standard deviation of the first frame's finite brightness.
+fn contrast<T: SimdReal>(frames: &[&Frame<T>]) -> f64 {
+    let finite = || frames[0].data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite());
+    let count = finite().count().max(1) as f64;
+    let mean = finite().sum::<f64>() / count;
+    (finite().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+/// The way from the coarsest level to the finest.
+struct Descent<T> {
+    simd: Level,
+    effort: Effort,
+    unit: f64,
+    term: DataTerm<T>,
+    data: Planes<T>,
+    scratch: CoupleScratch<T>,
+    /// Standard deviation of what brightness changes by along the motion, from the iteration before.
+    scale: Option<T>,
+    energy: T,
+}
+
+impl<T: SimdReal> Descent<T> {
+    fn new(simd: Level, effort: Effort, unit: f64) -> Self {
+        Self {
+            simd,
+            effort,
+            unit,
+            term: DataTerm::new(simd, DataOptions::default()),
+            data: Planes::new(0, 0, 0),
+            scratch: CoupleScratch::default(),
+            scale: None,
+            energy: T::from_f64(0.0),
+        }
+    }
+
+    fn run(mut self, levels: &[PyramidLevel<T>]) -> Estimate<T> {
+        let mut motion: Option<Planes<T>> = None;
+        for (k, level) in levels.iter().enumerate().rev() {
+            let start = match &motion {
+                Some(coarse) => finer(coarse, level.size),
+                None => Planes::new(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION),
+            };
+            let iterations = if k == 0 { self.effort.finest } else { self.effort.coarse };
+            motion = Some((0..iterations).fold(start, |mut motion, _| {
+                rederive(&mut motion);
+                self.iterate(level, motion)
+            }));
+        }
+        let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
+        Estimate { motion, data: self.data, energy: self.energy, unit: self.unit }
+    }
+
+    /// One linearisation about `motion`, and the motion that follows from it.
+    fn iterate(&mut self, level: &PyramidLevel<T>, mut motion: Planes<T>) -> Planes<T> {
+        let usable = |k: usize| level.usable[k].as_ref();
+        let residuals = match level.splines.as_slice() {
+            [a, b] => {
+                let views = View::pair([a, b], [usable(0), usable(1)]);
+                self.term.linearise(level.size, &views, &motion, self.scale, &mut self.data)
+            }
+            [a, b, c, ..] => {
+                let views = View::triple([a, b, c], [usable(0), usable(1), usable(2)]);
+                self.term.linearise(level.size, &views, &motion, self.scale, &mut self.data)
+            }
+            _ => Vec::new(),
+        };
+        self.scale = self.spread(residuals);
+        let floor = T::from_f64((LEAST_NOISE * self.unit).powi(2).max(f64::from(f32::MIN_POSITIVE)));
+        self.energy = couple(self.simd, &self.data, &mut motion, &self.effort.coupling, floor, &mut self.scratch);
+        motion
+    }
+
+    /// Robust standard deviation of residuals whose magnitudes these are.
+    fn spread(&self, mut residuals: Vec<T>) -> Option<T> {
+        if residuals.is_empty() {
+            return None;
+        }
+        let middle = residuals.len() / 2;
+        residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
+        let least = (LEAST_SCALE * self.unit).max(f64::from(f32::MIN_POSITIVE));
+        Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
+    }
+}
