@@ -1,6 +1,7 @@
 //! The frames on every level of the pyramid, ready to be warped.
 
 use super::options::LEAST_SIDE;
+use super::run::Range;
 use crate::image::{Spline, fill_holes, halve, halve_mask, usable_pixels};
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
@@ -28,10 +29,11 @@ impl<T: SimdReal> PyramidLevel<T> {
     }
 }
 
-/// The pyramid of `frames`, the finest level first: at most `most` levels, none below [`LEAST_SIDE`] px.
+/// The pyramid of `frames`, brought to a common `range`, the finest level first: at most `most` levels, none below [`LEAST_SIDE`] px.
 pub(super) fn pyramid<T: SimdReal>(
     simd: Level,
     frames: &[&Frame<T>],
+    range: Range,
     mask: Option<&Mask>,
     most: Option<usize>,
 ) -> Vec<PyramidLevel<T>> {
@@ -39,9 +41,13 @@ pub(super) fn pyramid<T: SimdReal>(
     let mut frames: Vec<Frame<T>> = frames
         .iter()
         .zip(&masks)
-        .map(|(frame, usable)| match usable {
-            Some(usable) => fill_holes(frame, Some(usable)).into_owned(),
-            None => (*frame).clone(),
+        .map(|(frame, usable)| {
+            let (mean, gain) = (T::from_f64(range.mean), T::from_f64(range.gain));
+            let scaled = frame.map(|&value| (value - mean) * gain);
+            match usable {
+                Some(usable) => fill_holes(&scaled, Some(usable)).into_owned(),
+                None => scaled,
+            }
         })
         .collect();
     let mut levels = vec![PyramidLevel::new(simd, &frames, &masks)];
@@ -78,26 +84,31 @@ fn shrunk(mask: &Mask, reach: usize) -> Mask {
 mod tests {
     use super::*;
 
+    const AS_IT_IS: Range = Range { mean: 0.0, gain: 1.0, contrast: 1.0 };
+
     #[test]
     fn levels_halve_down_to_the_least_side() {
         let frame = Frame::<f32>::from_fn(100, 50, |x, y| ((x * y) as f32).sin());
-        let sizes =
-            |most| pyramid(Level::SCALAR, &[&frame, &frame], None, most).iter().map(|l| l.size).collect::<Vec<_>>();
+        let sizes = |most| {
+            pyramid(Level::SCALAR, &[&frame, &frame], AS_IT_IS, None, most).iter().map(|l| l.size).collect::<Vec<_>>()
+        };
         assert_eq!(sizes(None), [(100, 50), (50, 25), (25, 13)]);
         assert_eq!(sizes(Some(2)), [(100, 50), (50, 25)]);
         let tiny = Frame::<f32>::filled(3, 3, 1.0);
-        assert_eq!(pyramid(Level::SCALAR, &[&tiny, &tiny], None, None).len(), 1);
+        assert_eq!(pyramid(Level::SCALAR, &[&tiny, &tiny], AS_IT_IS, None, None).len(), 1);
     }
 
     #[test]
     fn holes_reach_as_far_as_the_stencils() {
         let mut frame = Frame::<f32>::filled(20, 16, 1.0);
         frame.row_mut(8)[10] = f32::NAN;
-        let levels = pyramid(Level::SCALAR, &[&frame], None, Some(1));
+        let levels = pyramid(Level::SCALAR, &[&frame], AS_IT_IS, None, Some(1));
         let usable = levels[0].usable[0].as_ref().unwrap();
         let lost = usable.data().iter().filter(|&&u| !u).count();
         assert_eq!(lost, (2 * REACH + 1) * (2 * REACH + 1));
         assert!(!usable.get(10 - REACH, 8) && usable.get(10 - REACH - 1, 8));
-        assert!(pyramid(Level::SCALAR, &[&Frame::<f32>::filled(9, 9, 1.0)], None, None)[0].usable[0].is_none());
+        assert!(
+            pyramid(Level::SCALAR, &[&Frame::<f32>::filled(9, 9, 1.0)], AS_IT_IS, None, None)[0].usable[0].is_none()
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! The everyday estimator: affine flow from coarse to fine.
 
 mod couple;
+mod covariance;
 mod data;
 mod grid;
 mod levels;

@@ -1,5 +1,6 @@
 //! From the sites' motion to the field that was asked for.
 
+use super::covariance::{ENTRIES, covariance};
 use super::data::MOTION;
 use super::grid::Planes;
 use super::reference::at_first_frame;
@@ -28,6 +29,7 @@ pub(super) fn fill<T: SimdReal>(
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
+        covariance: field.covariance.is_some().then(|| covariance(common.level(), estimate)),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
@@ -38,7 +40,7 @@ pub(super) fn fill<T: SimdReal>(
 
 /// Whether anything at all was seen: a constant image says nothing about motion.
 fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
-    let (data, least) = (&estimate.data, 1e-9 * estimate.unit * estimate.unit);
+    let (data, least) = (&estimate.data, 1e-9 * estimate.contrast * estimate.contrast);
     (0..data.height).any(|y| data.line(0, y).iter().chain(data.line(12, y)).any(|v| v.to_f64() > least))
 }
 
@@ -48,33 +50,65 @@ struct Writer<'a, T: Clone> {
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
     observable: bool,
+    covariance: Option<Planes<T>>,
 }
 
 impl<T: SimdReal> Writer<'_, T> {
     fn points(&self, points: &[(usize, usize)], band: &mut FieldBand<'_, T>) {
         for (at, &(x, y)) in points[band.sites.clone()].iter().enumerate() {
             let motion = motion_at(self.motion, STEP, x as f64, y as f64);
-            self.put(band, at, (x, y), |k| T::from_f64(motion[k]));
+            self.put(
+                band,
+                at,
+                (x, y),
+                |k| T::from_f64(motion[k]),
+                |planes, k| {
+                    let site = |at: usize, count: usize| ((at as f64 / STEP) as usize).min(count - 1);
+                    planes.at(k, site(x, planes.width), site(y, planes.height))
+                },
+            );
         }
     }
 
     fn rows(&self, sites: &Sites, width: usize, band: &mut FieldBand<'_, T>) {
         let mut reader = RowReader::new(self.reference.width());
+        let mut spread = RowReader::new(self.reference.width());
         for first in band.sites.clone().step_by(width) {
             let row = first / width;
             reader.read_motion(self.motion, sites.pixel(0, row).1);
+            if let Some(planes) = &self.covariance {
+                spread.read_values(planes, sites.pixel(0, row).1);
+            }
             for column in 0..width {
                 let (x, y) = sites.pixel(column, row);
-                self.put(band, first + column - band.sites.start, (x, y), |k| reader.plane(k)[x]);
+                self.put(
+                    band,
+                    first + column - band.sites.start,
+                    (x, y),
+                    |k| reader.plane(k)[x],
+                    |_, k| spread.plane(k)[x],
+                );
             }
         }
     }
 
-    fn put(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize), value: impl Fn(usize) -> T) {
+    fn put(
+        &self,
+        band: &mut FieldBand<'_, T>,
+        at: usize,
+        pixel: (usize, usize),
+        value: impl Fn(usize) -> T,
+        covariance: impl Fn(&Planes<T>, usize) -> T,
+    ) {
         let status = self.status(pixel);
         band.status[at] = status;
         for k in 0..MOTION {
             band.motion[k][at] = if status == Status::Ok { value(k) } else { T::nan() };
+        }
+        if let Some(planes) = &self.covariance {
+            for k in 0..ENTRIES {
+                band.covariance[k][at] = if status == Status::Ok { covariance(planes, k) } else { T::nan() };
+            }
         }
     }
 

@@ -44,9 +44,9 @@ impl CoarseToFine {
     /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
     pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         common.threads.install(|| {
-            let unit = contrast(frames);
-            let levels = pyramid(common.level(), frames, common.mask.as_ref(), self.options.levels);
-            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), unit).run(&levels);
+            let range = Range::of(frames[0]);
+            let levels = pyramid(common.level(), frames, range, common.mask.as_ref(), self.options.levels);
+            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range.contrast).run(&levels);
             estimate.motion = refine(common.level(), &Refinement::default(), &estimate.motion, &estimate.data);
             output::fill(&estimate, frames, common, field);
         });
@@ -62,23 +62,41 @@ pub(super) struct Estimate<T> {
     pub data: Planes<T>,
     /// Typical residual energy, grey^2.
     pub energy: T,
-    /// Standard deviation of the brightness, grey levels.
-    pub unit: f64,
+    /// Standard deviation of the brightness, as scaled.
+    pub contrast: f64,
 }
 
-/// Standard deviation of the first frame's finite brightness.
-fn contrast<T: SimdReal>(frames: &[&Frame<T>]) -> f64 {
-    let finite = || frames[0].data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite());
-    let count = finite().count().max(1) as f64;
-    let mean = finite().sum::<f64>() / count;
-    (finite().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+/// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is then the same for frames of every range.
+const CONTRAST: f64 = 40.0;
+
+/// How brightness is brought to a common range: `(brightness - mean) gain`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Range {
+    pub mean: f64,
+    /// A power of two, so that it rounds nothing; 1 for frames without contrast.
+    pub gain: f64,
+    /// Standard deviation of the brightness afterwards.
+    pub contrast: f64,
+}
+
+impl Range {
+    /// That of the first frame's finite samples.
+    fn of<T: SimdReal>(frame: &Frame<T>) -> Self {
+        let finite = || frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite());
+        let count = finite().count().max(1) as f64;
+        let mean = finite().sum::<f64>() / count;
+        let deviation = (finite().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let gain = (CONTRAST / deviation).log2().round().exp2();
+        let gain = if gain.is_finite() && gain > 0.0 { gain } else { 1.0 };
+        Self { mean, gain, contrast: gain * deviation }
+    }
 }
 
 /// The way from the coarsest level to the finest.
 struct Descent<T> {
     simd: Level,
     effort: Effort,
-    unit: f64,
+    contrast: f64,
     term: DataTerm<T>,
     data: Planes<T>,
     scratch: CoupleScratch<T>,
@@ -88,11 +106,11 @@ struct Descent<T> {
 }
 
 impl<T: SimdReal> Descent<T> {
-    fn new(simd: Level, effort: Effort, unit: f64) -> Self {
+    fn new(simd: Level, effort: Effort, contrast: f64) -> Self {
         Self {
             simd,
             effort,
-            unit,
+            contrast,
             term: DataTerm::new(simd, DataOptions::default()),
             data: Planes::new(0, 0, 0),
             scratch: CoupleScratch::default(),
@@ -115,7 +133,7 @@ impl<T: SimdReal> Descent<T> {
             }));
         }
         let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
-        Estimate { motion, data: self.data, energy: self.energy, unit: self.unit }
+        Estimate { motion, data: self.data, energy: self.energy, contrast: self.contrast }
     }
 
     /// One linearisation about `motion`, and the motion that follows from it.
@@ -133,7 +151,7 @@ impl<T: SimdReal> Descent<T> {
             _ => Vec::new(),
         };
         self.scale = self.spread(residuals);
-        let floor = T::from_f64((LEAST_NOISE * self.unit).powi(2).max(f64::from(f32::MIN_POSITIVE)));
+        let floor = T::from_f64((LEAST_NOISE * self.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
         self.energy = couple(self.simd, &self.data, &mut motion, &self.effort.coupling, floor, &mut self.scratch);
         motion
     }
@@ -145,7 +163,7 @@ impl<T: SimdReal> Descent<T> {
         }
         let middle = residuals.len() / 2;
         residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
-        let least = (LEAST_SCALE * self.unit).max(f64::from(f32::MIN_POSITIVE));
+        let least = (LEAST_SCALE * self.contrast).max(f64::from(f32::MIN_POSITIVE));
         Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
     }
 }
