@@ -5,17 +5,27 @@
 //!
 //! `C(u, v) = D integral H^2 / (2 pi)^2 = 11/6 D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2 H^2 / (2 pi)^2 = 89/36 D / (8 pi s^4)`.
 //!
-//! What the windows changed of the motion that they were given is added: it holds what they smoothed away.
+//! Coupling and edge windows make the noise of the flow less white than that; [`FLOW_NOISE`] and [`SLOPE_NOISE`] account for it.
+//!
+//! What is no noise but a wrong place (aliasing of sharp particles, flow that bends within a pixel's reach) does not average out. It shows as
+//! residual energy that grows with the texture: where the image is displaced by a misfit of variance `b` from where it should be, `e = e_0 + b tr P`. The
+//! slope `b` of that line over all sites is the variance of the misfit, px^2, whatever the noise `e_0`; [`MISFIT_SHARE`] of it stays in each component of the flow.
 
-use super::data::ERROR;
+use super::data::{ERROR, VALID};
 use super::grid::Planes;
-use super::refine::{DENSITY, SIGMA};
+use super::refine::SIGMA;
 use super::run::Estimate;
 use crate::image::GaussianSmoother;
 use crate::simd::{Level, SimdReal};
 use crate::types::Frame;
 use std::f64::consts::PI;
 
+/// Variance of the flow over that of averaged white noise.
+const FLOW_NOISE: f64 = 4.4;
+/// Variance of its slopes over that of averaged white noise.
+const SLOPE_NOISE: f64 = 6.0;
+/// Share of the misfit's variance that stays in each component of the flow.
+const MISFIT_SHARE: f64 = 0.45;
 /// Region of the information and of the energy, sites.
 const REGION: f64 = 4.0;
 /// Entries of the upper triangle of a 6x6 matrix.
@@ -27,6 +37,7 @@ pub(super) fn covariance<T: SimdReal>(simd: Level, estimate: &Estimate<T>) -> Pl
     let mean = |plane: usize, power: f64| regional(simd, data, plane, power);
     let (uu, uv, vv) = (mean(0, 1.0), mean(6, 1.0), mean(12, 1.0));
     let energy = mean(ERROR, 0.25);
+    let systematic = MISFIT_SHARE * misfit(data);
     let mut out = Planes::new(data.width, data.height, ENTRIES);
     for y in 0..data.height {
         for x in 0..data.width {
@@ -37,18 +48,45 @@ pub(super) fn covariance<T: SimdReal>(simd: Level, estimate: &Estimate<T>) -> Pl
             let e = at(&energy) / (a * c - b * b);
             let density = [c * e, -b * e, a * e];
             let sigma = estimate.motion.at(SIGMA, x, y).to_f64();
-            let flow = 11.0 / 6.0 / (4.0 * PI * sigma.powi(2));
-            let slope = 89.0 / 36.0 / (8.0 * PI * sigma.powi(4));
+            let flow = FLOW_NOISE * 11.0 / 6.0 / (4.0 * PI * sigma.powi(2));
+            let slope = SLOPE_NOISE * 89.0 / 36.0 / (8.0 * PI * sigma.powi(4));
             for block in 0..3 {
-                let share = if block == 0 { flow } else { slope };
+                let (share, wrong) =
+                    if block == 0 { (flow, systematic) } else { (slope, systematic / misfit_length_squared(sigma)) };
                 for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-                    out.line_mut(upper(2 * block + i, 2 * block + j), y)[x] = T::from_f64(share * density[k]);
+                    let value = share * density[k] + if i == j { wrong } else { 0.0 };
+                    out.line_mut(upper(2 * block + i, 2 * block + j), y)[x] = T::from_f64(value);
                 }
             }
         }
     }
-    let _ = DENSITY;
     out
+}
+
+/// Variance of the displacement between the image and where it should be, px^2: the slope of the residual energy over the information, never negative.
+fn misfit<T: SimdReal>(data: &Planes<T>) -> f64 {
+    let sites = || {
+        (0..data.height).flat_map(|y| {
+            let [valid, uu, vv, energy] = [VALID, 0, 12, ERROR].map(|k| data.line(k, y));
+            (0..data.width)
+                .filter(|&x| valid[x].to_f64() > 0.5)
+                .map(|x| (uu[x].to_f64() + vv[x].to_f64(), energy[x].to_f64()))
+        })
+    };
+    let (count, sum) = sites().fold((0.0, [0.0; 2]), |(n, s), (p, e)| (n + 1.0, [s[0] + p, s[1] + e]));
+    if count == 0.0 {
+        return 0.0;
+    }
+    let mean = sum.map(|s| s / count);
+    let (square, product) = sites().fold((0.0, 0.0), |(square, product), (p, e)| {
+        (square + (p - mean[0]).powi(2), product + (p - mean[0]) * (e - mean[1]))
+    });
+    if square > 0.0 { (product / square).max(0.0) } else { 0.0 }
+}
+
+/// Over which length what stays of the misfit changes, px^2: windows smooth it too, but it has a scale of its own.
+fn misfit_length_squared(sigma: f64) -> f64 {
+    30.0 + 0.35 * sigma * sigma
 }
 
 /// Index of entry (i, j), i <= j, of the upper triangle of a 6x6 matrix.
