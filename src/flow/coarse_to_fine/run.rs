@@ -6,7 +6,7 @@ use super::grid::Planes;
 use super::levels::{PyramidLevel, pyramid};
 use super::options::{CoarseToFineOptions, Effort};
 use super::output;
-use super::refine::{Options as Refinement, refine};
+use super::refine::{Options as Refinement, Space, refine};
 use super::resample::{finer, rederive};
 use crate::error::Result;
 use crate::flow::options::Common;
@@ -47,7 +47,8 @@ impl CoarseToFine {
             let range = Range::of(frames[0]);
             let levels = pyramid(common.level(), frames, range, common.mask.as_ref(), self.options.levels);
             let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range.contrast).run(&levels);
-            estimate.motion = refine(common.level(), &Refinement::default(), &estimate.motion, &estimate.data);
+            estimate.motion =
+                refine(common.level(), &mut Space::default(), &Refinement::default(), &estimate.motion, &estimate.data);
             output::fill(&estimate, frames, common, field);
         });
     }
