@@ -60,7 +60,8 @@ _Path: TypeAlias = str | os.PathLike[str]
 _Frame: TypeAlias = NDArray[Any]
 _Frames: TypeAlias = NDArray[Any] | Iterable[NDArray[Any]]
 _Rectangle: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
-_Method: TypeAlias = Literal["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]
+_Method: TypeAlias = Literal["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_schunck"]
+_Preset: TypeAlias = Literal["fast", "balanced", "accurate"]
 _Model: TypeAlias = Literal["affine", "translational", "accelerating"]
 _Scheme: TypeAlias = Literal["central", "backward", "pair"]
 _Rows: TypeAlias = Literal["brightness", "gradient", "jet", "all"]
@@ -255,6 +256,8 @@ def estimate(
     frames: _Frames,
     *,
     method: _Method = "windowed",
+    preset: _Preset | None = None,
+    levels: int | None = None,
     model: _Model = "affine",
     time_scheme: _Scheme | None = None,
     neighbourhood: tuple[int, int] | ArrayLike | None = None,
@@ -292,9 +295,14 @@ def estimate(
     ----------
     frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         Oldest first, one size, at least 3 x 3 px.
-    method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
-        "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
+    method : "windowed", "coarse_to_fine", "instantaneous", "lucas_kanade" or "horn_schunck"
+        "windowed": least squares of the transported equations in a Gaussian window, for motions of a pixel or two. "coarse_to_fine": the same equations with
+        a pyramid, warping and robust coupling of neighbours, for motions of many pixels, edges and untextured areas. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
         nearly noise-free images. The others are baselines.
+    preset : "fast", "balanced" or "accurate"
+        Cost against error of "coarse_to_fine"; default "balanced".
+    levels : int
+        Pyramid levels of "coarse_to_fine"; default as many as the frame allows.
     model : "affine", "translational" or "accelerating"
         Motion model of "instantaneous".
     time_scheme : "central", "backward" or "pair"
@@ -366,6 +374,8 @@ class FlowEstimator:
         cls,
         *,
         method: _Method = "windowed",
+        preset: _Preset | None = None,
+        levels: int | None = None,
         model: _Model = "affine",
         time_scheme: _Scheme | None = None,
         neighbourhood: tuple[int, int] | ArrayLike | None = None,

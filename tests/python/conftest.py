@@ -5,7 +5,7 @@ import pytest
 
 from jacoflow import scenes
 
-METHODS = ["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]
+METHODS = ["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_schunck"]
 
 
 def moving_texture(count=3, motion=(0.3, -0.2, 0.01, 0.02, -0.02, 0.01), width=48, height=40, seed=3):

@@ -10,7 +10,7 @@ from jacoflow import scenes
 
 seeds = st.integers(0, 2**32 - 1)
 motions = st.tuples(*[st.floats(-0.4, 0.4)] * 2, *[st.floats(-0.02, 0.02)] * 4)
-METHODS = st.sampled_from(["windowed", "lucas_kanade", "horn_schunck"])
+METHODS = st.sampled_from(["windowed", "coarse_to_fine", "lucas_kanade", "horn_schunck"])
 
 
 def pictures(seed, motion=(0.3, -0.2, 0.01, 0.02, -0.02, 0.01)):
@@ -78,7 +78,7 @@ def test_mirroring_the_picture_mirrors_the_flow(seed, method, motion):
     st.integers(5, 24),
     st.integers(3, 6),
     st.sampled_from(["uint8", "uint16", "float32", "float64"]),
-    st.sampled_from(["windowed", "instantaneous", "lucas_kanade", "horn_schunck"]),
+    st.sampled_from(["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_schunck"]),
     seeds,
 )
 def test_any_size_and_any_noise_give_arrays_of_the_right_shape(height, width, count, dtype, method, seed):

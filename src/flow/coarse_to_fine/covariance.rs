@@ -32,11 +32,13 @@ const REGION: f64 = 4.0;
 pub(super) const ENTRIES: usize = 21;
 
 /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at every site: the upper triangle, row by row.
-pub(super) fn covariance<T: SimdReal>(simd: Level, estimate: &Estimate<T>) -> Planes<T> {
+///
+/// `energy`: the residual energy that the noise is known to leave; without it, it is read from the residuals.
+pub(super) fn covariance<T: SimdReal>(simd: Level, estimate: &Estimate<T>, energy: Option<f64>) -> Planes<T> {
     let data = &estimate.data;
     let mean = |plane: usize, power: f64| regional(simd, data, plane, power);
     let (uu, uv, vv) = (mean(0, 1.0), mean(6, 1.0), mean(12, 1.0));
-    let energy = mean(ERROR, 0.25);
+    let found = mean(ERROR, 0.25);
     let systematic = MISFIT_SHARE * misfit(data);
     let mut out = Planes::new(data.width, data.height, ENTRIES);
     for y in 0..data.height {
@@ -45,7 +47,7 @@ pub(super) fn covariance<T: SimdReal>(simd: Level, estimate: &Estimate<T>) -> Pl
             let (a, b, c) = (at(&uu), at(&uv), at(&vv));
             let least = 1e-6 + 1e-4 * (a + c);
             let (a, c) = (a + least, c + least);
-            let e = at(&energy) / (a * c - b * b);
+            let e = energy.unwrap_or_else(|| at(&found)) / (a * c - b * b);
             let density = [c * e, -b * e, a * e];
             let sigma = estimate.motion.at(SIGMA, x, y).to_f64();
             let flow = FLOW_NOISE * 11.0 / 6.0 / (4.0 * PI * sigma.powi(2));

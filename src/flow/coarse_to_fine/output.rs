@@ -1,7 +1,7 @@
 //! From the sites' motion to the field that was asked for.
 
 use super::covariance::{ENTRIES, covariance};
-use super::data::MOTION;
+use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
 use super::reference::at_first_frame;
 use super::resample::motion_at;
@@ -24,12 +24,18 @@ pub(super) fn fill<T: SimdReal>(
     field: &mut FlowField<T>,
 ) {
     let moved = (frames.len() == 2).then(|| at_first_frame(&estimate.motion, STEP));
+    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
+    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
+    let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
+    let noise = common.noise.map(|sigma| share * rows * (sigma * estimate.range.gain).powi(2));
     let writer = Writer {
+        data: &estimate.data,
+        per_row: 1.0 / (rows.sqrt() * estimate.range.gain),
         motion: moved.as_ref().unwrap_or(&estimate.motion),
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
-        covariance: field.covariance.is_some().then(|| covariance(common.level(), estimate)),
+        covariance: field.covariance.is_some().then(|| covariance(common.level(), estimate, noise)),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
@@ -40,12 +46,15 @@ pub(super) fn fill<T: SimdReal>(
 
 /// Whether anything at all was seen: a constant image says nothing about motion.
 fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
-    let (data, least) = (&estimate.data, 1e-9 * estimate.contrast * estimate.contrast);
+    let (data, least) = (&estimate.data, 1e-9 * estimate.range.contrast.powi(2));
     (0..data.height).any(|y| data.line(0, y).iter().chain(data.line(12, y)).any(|v| v.to_f64() > least))
 }
 
 /// What the sites of the field are filled from.
 struct Writer<'a, T: Clone> {
+    data: &'a Planes<T>,
+    /// From the root of the residual energy to grey levels.
+    per_row: f64,
     motion: &'a Planes<T>,
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
@@ -105,10 +114,29 @@ impl<T: SimdReal> Writer<'_, T> {
         for k in 0..MOTION {
             band.motion[k][at] = if status == Status::Ok { value(k) } else { T::nan() };
         }
+        self.diagnose(band, at, pixel, status == Status::Ok);
         if let Some(planes) = &self.covariance {
             for k in 0..ENTRIES {
                 band.covariance[k][at] = if status == Status::Ok { covariance(planes, k) } else { T::nan() };
             }
+        }
+    }
+
+    /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
+    fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
+        let (x, y) = (x / 2, y / 2);
+        if let Some(residual) = &mut band.residual {
+            let energy = self.data.at(ERROR, x, y).to_f64().max(0.0);
+            residual[at] = T::from_f64(if known { self.per_row * energy.sqrt() } else { f64::NAN });
+        }
+        if let Some(rank) = &mut band.rank {
+            rank[at] = if known { MOTION as u8 } else { 0 };
+        }
+        if let Some(condition) = &mut band.condition {
+            let [uu, uv, vv] = [0, 6, 12].map(|k| self.data.at(k, x, y).to_f64());
+            let (middle, radius) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
+            condition[at] =
+                T::from_f64(if known { ((middle + radius) / (middle - radius).max(0.0)).sqrt() } else { f64::NAN });
         }
     }
 

@@ -71,6 +71,7 @@ impl Default for Options {
 /// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px.
 pub(super) const SIGMA: usize = 6;
 /// The noise density a of the flow that came in, px^4: its variance times the area over which the noise is independent.
+#[cfg(test)]
 pub(super) const DENSITY: usize = 7;
 
 /// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the last data term: planes 0, 6, 12 the

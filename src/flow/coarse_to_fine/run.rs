@@ -46,7 +46,7 @@ impl CoarseToFine {
         common.threads.install(|| {
             let range = Range::of(frames[0]);
             let levels = pyramid(common.level(), frames, range, common.mask.as_ref(), self.options.levels);
-            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range.contrast).run(&levels);
+            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range).run(&levels);
             estimate.motion =
                 refine(common.level(), &mut Space::default(), &Refinement::default(), &estimate.motion, &estimate.data);
             output::fill(&estimate, frames, common, field);
@@ -61,10 +61,8 @@ pub(super) struct Estimate<T> {
     pub motion: Planes<T>,
     /// The last data term.
     pub data: Planes<T>,
-    /// Typical residual energy, grey^2.
-    pub energy: T,
-    /// Standard deviation of the brightness, as scaled.
-    pub contrast: f64,
+    /// How brightness was scaled.
+    pub range: Range,
 }
 
 /// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is then the same for frames of every range.
@@ -97,26 +95,24 @@ impl Range {
 struct Descent<T> {
     simd: Level,
     effort: Effort,
-    contrast: f64,
+    range: Range,
     term: DataTerm<T>,
     data: Planes<T>,
     scratch: CoupleScratch<T>,
     /// Standard deviation of what brightness changes by along the motion, from the iteration before.
     scale: Option<T>,
-    energy: T,
 }
 
 impl<T: SimdReal> Descent<T> {
-    fn new(simd: Level, effort: Effort, contrast: f64) -> Self {
+    fn new(simd: Level, effort: Effort, range: Range) -> Self {
         Self {
             simd,
             effort,
-            contrast,
+            range,
             term: DataTerm::new(simd, DataOptions::default()),
             data: Planes::new(0, 0, 0),
             scratch: CoupleScratch::default(),
             scale: None,
-            energy: T::from_f64(0.0),
         }
     }
 
@@ -134,7 +130,7 @@ impl<T: SimdReal> Descent<T> {
             }));
         }
         let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
-        Estimate { motion, data: self.data, energy: self.energy, contrast: self.contrast }
+        Estimate { motion, data: self.data, range: self.range }
     }
 
     /// One linearisation about `motion`, and the motion that follows from it.
@@ -152,8 +148,8 @@ impl<T: SimdReal> Descent<T> {
             _ => Vec::new(),
         };
         self.scale = self.spread(residuals);
-        let floor = T::from_f64((LEAST_NOISE * self.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
-        self.energy = couple(self.simd, &self.data, &mut motion, &self.effort.coupling, floor, &mut self.scratch);
+        let floor = T::from_f64((LEAST_NOISE * self.range.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
+        couple(self.simd, &self.data, &mut motion, &self.effort.coupling, floor, &mut self.scratch);
         motion
     }
 
@@ -164,7 +160,7 @@ impl<T: SimdReal> Descent<T> {
         }
         let middle = residuals.len() / 2;
         residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
-        let least = (LEAST_SCALE * self.contrast).max(f64::from(f32::MIN_POSITIVE));
+        let least = (LEAST_SCALE * self.range.contrast).max(f64::from(f32::MIN_POSITIVE));
         Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
     }
 }

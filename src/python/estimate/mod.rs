@@ -91,9 +91,14 @@ macro_rules! define_estimate {
         /// ----------
         /// frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         ///     Oldest first, one size, at least 3 x 3 px.
-        /// method : "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
-        ///     "windowed": least squares of the transported equations in a Gaussian window. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
+        /// method : "windowed", "coarse_to_fine", "instantaneous", "lucas_kanade" or "horn_schunck"
+        ///     "windowed": least squares of the transported equations in a Gaussian window, for motions of a pixel or two. "coarse_to_fine": the same equations with
+        ///     a pyramid, warping and robust coupling of neighbours, for motions of many pixels, edges and untextured areas. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
         ///     nearly noise-free images. The others are baselines.
+        /// preset : "fast", "balanced" or "accurate"
+        ///     Cost against error of "coarse_to_fine"; default "balanced".
+        /// levels : int
+        ///     Pyramid levels of "coarse_to_fine"; default as many as the frame allows.
         /// model : "affine", "translational" or "accelerating"
         ///     Motion model of "instantaneous".
         /// time_scheme : "central", "backward" or "pair"

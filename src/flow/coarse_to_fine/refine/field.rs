@@ -114,6 +114,7 @@ impl<T: SimdReal> Field<T> {
     }
 
     /// The value of plane `k` at a site.
+    #[cfg(test)]
     pub fn at(&self, k: usize, x: usize, y: usize) -> T {
         self.line(k, y as isize)[LEFT + x]
     }

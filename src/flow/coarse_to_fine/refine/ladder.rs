@@ -35,6 +35,7 @@ impl<T: SimdReal> Taps<T> {
         Self { taps, variance: second * pitch * pitch }
     }
 
+    #[cfg(test)]
     pub fn radius(&self) -> usize {
         self.taps.len() - 1
     }
