@@ -2,7 +2,7 @@
 
 use super::options::LEAST_SIDE;
 use super::run::Range;
-use crate::image::{Spline, fill_holes, halve, halve_mask, usable_pixels};
+use crate::image::{Spline, fill_holes, halve, halve_mask};
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
 
@@ -37,7 +37,7 @@ pub(super) fn pyramid<T: SimdReal>(
     mask: Option<&Mask>,
     most: Option<usize>,
 ) -> Vec<PyramidLevel<T>> {
-    let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, mask)).collect();
+    let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, range, mask)).collect();
     let mut frames: Vec<Frame<T>> = frames
         .iter()
         .zip(&masks)
@@ -64,9 +64,14 @@ pub(super) fn pyramid<T: SimdReal>(
 }
 
 /// The usable pixels, if some are not.
-fn holes<T: SimdReal>(frame: &Frame<T>, mask: Option<&Mask>) -> Option<Mask> {
-    let finite = frame.data().iter().all(|value| value.finite());
-    (mask.is_some() || !finite).then(|| usable_pixels(frame, mask)).filter(|usable| usable.data().contains(&false))
+fn holes<T: SimdReal>(frame: &Frame<T>, range: Range, mask: Option<&Mask>) -> Option<Mask> {
+    if mask.is_none() && frame.data().iter().all(|value| range.holds(value.to_f64())) {
+        return None;
+    }
+    let usable = Frame::from_fn(frame.width(), frame.height(), |x, y| {
+        range.holds(frame.get(x, y).to_f64()) && mask.is_none_or(|mask| mask.get(x, y))
+    });
+    usable.data().contains(&false).then_some(usable)
 }
 
 /// The pixels of a mask that are `reach` px (in rows and columns) away from every unusable one.
