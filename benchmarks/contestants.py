@@ -43,10 +43,17 @@ def windowed(smooth: float, window: float, **more: Any) -> Setting:
     return Setting(f"windowed, one level, smoothed {smooth:g} px, window {window:g} px", options, window=window)
 
 
-RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0)]
+def coarse_to_fine(preset: str, frames: int = 3) -> Setting:
+    """The estimator for everyday frames."""
+    options = {"method": "coarse_to_fine", "preset": preset, "covariance": False}
+    return Setting(f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""), options, frames=frames, moment=0.0)
+
+
+PRESETS = ("fast", "balanced", "accurate")
+RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0), *(coarse_to_fine(preset) for preset in PRESETS)]
 """The same for every recording."""
 
-CONTROLLED = [windowed(1.5, 4.0, rows="brightness")]
+CONTROLLED = [windowed(1.5, 4.0, rows="brightness"), coarse_to_fine("balanced", frames=2), coarse_to_fine("balanced")]
 """The same for every scene with exact truth."""
 
 SPEED = [
@@ -54,5 +61,6 @@ SPEED = [
     Setting("instantaneous with covariance", {"method": "instantaneous", "covariance": True}),
     Setting("windowed", {"method": "windowed", "covariance": False}),
     Setting("windowed, pair", {"method": "windowed", "covariance": False}, frames=2),
+    *(coarse_to_fine(preset, frames=2) for preset in PRESETS),
 ]
 """Timed with one thread and with two."""

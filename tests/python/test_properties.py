@@ -47,13 +47,20 @@ def test_powers_of_two_change_no_bit_of_the_instantaneous_flow(seed, power):
     assert_allclose(other.flow, one.flow, rtol=1e-12)
 
 
+def symmetry_tolerance(method):
+    """Iterations go row by row; sites are every second pixel from the upper left corner, and the coupling of neighbours is stopped before it has converged."""
+    if method == "coarse_to_fine":
+        return {"rtol": 0.0, "atol": 0.05}
+    return {"rtol": 1e-4, "atol": 1e-5} if method == "horn_schunck" else {"rtol": 1e-6, "atol": 1e-9}
+
+
 @settings(max_examples=15, deadline=None)
 @given(seeds, METHODS, motions)
 def test_transposing_the_picture_swaps_the_axes(seed, method, motion):
     frames = pictures(seed, motion)
     one = jacoflow.estimate(list(frames), method=method)
     other = jacoflow.estimate([frame.T for frame in frames], method=method)
-    tolerance = {"rtol": 1e-4, "atol": 1e-5} if method == "horn_schunck" else {"rtol": 1e-6, "atol": 1e-9}
+    tolerance = symmetry_tolerance(method)
     assert_allclose(other.u.T, one.v, **tolerance)
     assert_allclose(other.v.T, one.u, **tolerance)
     if method == "windowed":
@@ -67,7 +74,7 @@ def test_mirroring_the_picture_mirrors_the_flow(seed, method, motion):
     frames = pictures(seed, motion)
     one = jacoflow.estimate(list(frames), method=method)
     other = jacoflow.estimate([frame[:, ::-1] for frame in frames], method=method)
-    tolerance = {"rtol": 1e-4, "atol": 1e-5} if method == "horn_schunck" else {"rtol": 1e-6, "atol": 1e-9}
+    tolerance = symmetry_tolerance(method)
     assert_allclose(other.u[:, ::-1], -one.u, **tolerance)
     assert_allclose(other.v[:, ::-1], one.v, **tolerance)
 

@@ -41,24 +41,40 @@ impl Preset {
 
     /// What it means.
     pub(super) fn effort(self) -> Effort {
-        let coupling = Coupling::default();
+        let sweeps = |sweeps| Coupling { sweeps, ..Coupling::default() };
         match self {
-            Self::Fast => Effort { coarse: 3, finest: 1, coupling: Coupling { sweeps: 3, ..coupling } },
-            Self::Balanced => Effort { coarse: 5, finest: 2, coupling },
-            Self::Accurate => Effort { coarse: 6, finest: 4, coupling: Coupling { sweeps: 10, ..coupling } },
+            Self::Fast => Effort { finest: 1, second: 2, coarse: 6, coupling: sweeps(3) },
+            Self::Balanced => Effort { finest: 2, second: 5, coarse: 8, coupling: sweeps(6) },
+            Self::Accurate => Effort { finest: 4, second: 6, coarse: 10, coupling: sweeps(10) },
         }
     }
 }
 
-/// Numbers of iterations.
+/// Numbers of iterations: linearisations, each followed by coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effort {
-    /// Linearisations on every level but the finest.
-    pub coarse: usize,
-    /// Linearisations on the finest level.
+    /// On the finest level.
     pub finest: usize,
-    /// Coupling after each.
+    /// On the next.
+    pub second: usize,
+    /// On every other level: they cost little, and what they miss is lost.
+    pub coarse: usize,
+    /// On the two finest levels.
     pub coupling: Coupling,
+}
+
+/// Sweeps of coupling on coarse levels.
+const COARSE_SWEEPS: usize = 10;
+
+impl Effort {
+    /// Iterations on level `k`, 0 being the finest, and how strongly and often sites are coupled there.
+    pub fn on_level(&self, k: usize) -> (usize, Coupling) {
+        match k {
+            0 => (self.finest, self.coupling),
+            1 => (self.second, self.coupling),
+            _ => (self.coarse, Coupling { sweeps: COARSE_SWEEPS, ..self.coupling }),
+        }
+    }
 }
 
 /// Options of the coarse-to-fine estimate.

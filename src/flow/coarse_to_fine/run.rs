@@ -1,6 +1,6 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
-use super::couple::{CoupleScratch, couple};
+use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{DataOptions, DataTerm, MOTION, View};
 use super::grid::Planes;
 use super::levels::{PyramidLevel, pyramid};
@@ -144,10 +144,10 @@ impl<T: SimdReal> Descent<T> {
                 Some(coarse) => finer(coarse, level.size),
                 None => Planes::new(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION),
             };
-            let iterations = if k == 0 { self.effort.finest } else { self.effort.coarse };
+            let (iterations, coupling) = self.effort.on_level(k);
             motion = Some((0..iterations).fold(start, |mut motion, _| {
                 rederive(&mut motion);
-                self.iterate(level, motion)
+                self.iterate(level, &coupling, motion)
             }));
         }
         let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
@@ -155,7 +155,7 @@ impl<T: SimdReal> Descent<T> {
     }
 
     /// One linearisation about `motion`, and the motion that follows from it.
-    fn iterate(&mut self, level: &PyramidLevel<T>, mut motion: Planes<T>) -> Planes<T> {
+    fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, mut motion: Planes<T>) -> Planes<T> {
         let usable = |k: usize| level.usable[k].as_ref();
         let residuals = match level.splines.as_slice() {
             [a, b] => {
@@ -170,7 +170,7 @@ impl<T: SimdReal> Descent<T> {
         };
         self.scale = self.spread(residuals);
         let floor = T::from_f64((LEAST_NOISE * self.range.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
-        couple(self.simd, &self.data, &mut motion, &self.effort.coupling, floor, &mut self.scratch);
+        couple(self.simd, &self.data, &mut motion, coupling, floor, &mut self.scratch);
         motion
     }
 

@@ -1,0 +1,170 @@
+//! The coarse-to-fine estimate on scenes with exact truth: large motions, pairs and triples, an edge between motions, holes, and its conventions.
+
+// Printed on purpose: the figures reached are part of the answer.
+#![allow(clippy::print_stdout)]
+
+use jacoflow::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
+use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::parallel::Threads;
+use jacoflow::synth::{AffineTexture, Scene, Sensor, mean_truth};
+use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
+
+const SIZE: usize = 160;
+/// Left out along each side, px: what enters the frame has no counterpart.
+const MARGIN: usize = 24;
+/// Many pixels, with rotation, expansion and shear.
+const FAST: [f64; 6] = [4.4, -3.7, 0.02, 0.03, -0.02, 0.01];
+
+fn scene(motion: [f64; 6]) -> AffineTexture {
+    AffineTexture::moving((SIZE, SIZE), motion, 5).unwrap()
+}
+
+/// What an 8-bit camera sees of the scene.
+fn frames(scene: &dyn Scene, noise: f64, times: &[f64]) -> Vec<Frame<f32>> {
+    let camera = Sensor::eight_bit(noise, 3);
+    times.iter().map(|&t| camera.apply(&scene.frame(t), (t + 9.0) as u64).map(|&value| value as f32)).collect()
+}
+
+fn estimate(options: CoarseToFineOptions, common: Common, frames: &[Frame<f32>]) -> FlowField<f32> {
+    let estimator = Estimator::new(Method::CoarseToFine(options), common).unwrap();
+    estimator.estimate(&frames.iter().collect::<Vec<_>>(), 0).unwrap()
+}
+
+/// Root mean square errors of flow (px) and Jacobian (1/frame) inside the margin.
+fn errors(field: &FlowField<f32>, truth: &FlowField<f64>) -> (f64, f64) {
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    for y in MARGIN..SIZE - MARGIN {
+        for x in MARGIN..SIZE - MARGIN {
+            let (got, want) = (field.affine(y * SIZE + x).to_array(), truth.affine(y * SIZE + x).to_array());
+            for k in 0..6 {
+                sums[usize::from(k > 1)] += (f64::from(got[k]) - want[k]).powi(2);
+            }
+            count += 1.0;
+        }
+    }
+    ((sums[0] / count).sqrt(), (sums[1] / (4.0 * count)).sqrt())
+}
+
+#[test]
+fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
+    let scene = scene(FAST);
+    for preset in Preset::EVERY {
+        for (number, times, between) in [(2, &[0.0, 1.0][..], (0.0, 1.0)), (3, &[-1.0, 0.0, 1.0], (-1.0, 1.0))] {
+            let truth = mean_truth(&scene, 0.0, between).unwrap();
+            let options = CoarseToFineOptions { preset, frames: number, ..CoarseToFineOptions::default() };
+            let field = estimate(options, Common::default(), &frames(&scene, 1.0, times));
+            let (flow, jacobian) = errors(&field, &truth);
+            println!("{} from {number} frames: flow {flow:.4} px, Jacobian {jacobian:.5}", preset.name());
+            assert!(flow < 0.03 && jacobian < 0.003, "{} from {number}: {flow} {jacobian}", preset.name());
+            assert!(field.status.iter().all(|s| *s == Status::Ok));
+        }
+    }
+}
+
+#[test]
+fn errors_are_about_as_large_as_the_covariance_says() {
+    let scene = scene([3.3, -2.2, 0.01, 0.02, -0.02, 0.01]);
+    let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();
+    for noise in [1.0, 4.0] {
+        let common = Common { covariance: true, ..Common::default() };
+        let field = estimate(CoarseToFineOptions::pair(), common, &frames(&scene, noise, &[0.0, 1.0]));
+        let spread: Vec<Vec<f32>> =
+            ["u", "v", "u_x", "v_x", "u_y", "v_y"].iter().map(|name| field.standard_deviation(name).unwrap()).collect();
+        for (k, spread) in spread.iter().enumerate() {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for y in MARGIN..SIZE - MARGIN {
+                for x in MARGIN..SIZE - MARGIN {
+                    let at = y * SIZE + x;
+                    let error = f64::from(field.affine(at).to_array()[k]) - truth.affine(at).to_array()[k];
+                    sum += (error / f64::from(spread[at])).powi(2);
+                    count += 1.0;
+                }
+            }
+            let ratio = (sum / count).sqrt();
+            println!("noise {noise}, parameter {k}: error over standard deviation {ratio:.2}");
+            assert!((0.3..2.0).contains(&ratio), "noise {noise}, parameter {k}: {ratio}");
+        }
+    }
+}
+
+/// Two textures, each with its own translation, on either side of `x = 80` in the second frame's coordinates of the left one.
+fn parted() -> Vec<Frame<f32>> {
+    let (left, right) = (scene([1.5, 0.5, 0.0, 0.0, 0.0, 0.0]), scene([-1.0, -1.5, 0.0, 0.0, 0.0, 0.0]));
+    [0.0, 1.0]
+        .map(|t| {
+            let (a, b) = (left.frame(t), right.frame(t));
+            Frame::from_fn(SIZE, SIZE, |x, y| {
+                (if (x as f64) < 80.0 + 1.5 * t { a.get(x, y) } else { b.get(x, y) }).round() as f32
+            })
+        })
+        .into()
+}
+
+#[test]
+fn two_motions_stay_apart_at_the_edge_between_them() {
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &parted());
+    let worst = |columns: std::ops::Range<usize>, want: [f32; 2]| {
+        let sites = columns.flat_map(|x| (MARGIN..SIZE - MARGIN).map(move |y| y * SIZE + x));
+        let mut all: Vec<f32> =
+            sites.map(|at| (field.affine(at).u - want[0]).hypot(field.affine(at).v - want[1])).collect();
+        all.sort_unstable_by(f32::total_cmp);
+        all[all.len() * 9 / 10]
+    };
+    assert!(worst(60..74, [1.5, 0.5]) < 0.1, "{}", worst(60..74, [1.5, 0.5]));
+    assert!(worst(88..102, [-1.0, -1.5]) < 0.1, "{}", worst(88..102, [-1.0, -1.5]));
+}
+
+#[test]
+fn results_do_not_depend_on_threads_and_sites_are_those_of_the_whole_field() {
+    let pair = frames(&scene(FAST), 1.0, &[0.0, 1.0]);
+    let with = |threads: usize, sites: Sites| {
+        let threads = Threads::new(Some(threads)).unwrap();
+        let common = Common { threads, sites, covariance: true, diagnostics: true, ..Common::default() };
+        estimate(CoarseToFineOptions::pair(), common, &pair)
+    };
+    let (one, two) = (with(1, Sites::default()), with(2, Sites::default()));
+    assert_eq!((&one.motion, &one.covariance, &one.residual), (&two.motion, &two.covariance, &two.residual));
+    let region = Some(Rect { x: 11, y: 20, width: 51, height: 40 });
+    let part = with(2, Sites::Grid { region, stride: 3 });
+    assert_eq!(part.affine(part.width + 2).to_array(), one.affine(23 * SIZE + 17).to_array());
+    let points = with(1, Sites::Points(vec![(17, 23), (150, 3)]));
+    for (k, want) in one.affine(23 * SIZE + 17).to_array().into_iter().enumerate() {
+        assert!((points.affine(0).to_array()[k] - want).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn holes_get_their_status_and_their_surroundings_an_estimate() {
+    let mut pair = frames(&scene([1.2, 0.8, 0.0, 0.0, 0.0, 0.0]), 1.0, &[0.0, 1.0]);
+    for y in 70..80 {
+        pair[0].row_mut(y)[60..75].fill(f32::NAN);
+    }
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &pair);
+    assert_eq!(field.status[75 * SIZE + 66], Status::NonFinite);
+    assert!(field.affine(75 * SIZE + 66).u.is_nan());
+    let beside = field.affine(75 * SIZE + 50);
+    assert!((beside.u - 1.2).abs() < 0.1 && (beside.v - 0.8).abs() < 0.1, "{beside:?}");
+    let lost = field.status.iter().filter(|s| **s != Status::Ok).count();
+    assert_eq!(lost, 150);
+}
+
+#[test]
+fn constant_frames_are_unobservable_and_small_ones_no_error() {
+    let flat = vec![Frame::filled(20, 16, 7.0_f32), Frame::filled(20, 16, 7.0)];
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &flat);
+    assert!(field.status.iter().all(|s| *s == Status::Unobservable) && field.motion.iter().all(|v| v.is_nan()));
+    let tiny: Vec<Frame<f32>> = (0..2).map(|t| Frame::from_fn(3, 4, |x, y| ((x * y + t) as f32).sin())).collect();
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &tiny);
+    for (at, status) in field.status.iter().enumerate() {
+        assert_eq!(field.affine(at).u.is_finite(), *status == Status::Ok);
+        assert!(matches!(status, Status::Ok | Status::Unobservable));
+    }
+}
+
+#[test]
+fn options_that_mean_nothing_are_refused_by_name() {
+    let refused = |options| Estimator::new(Method::CoarseToFine(options), Common::default()).unwrap_err().to_string();
+    assert!(refused(CoarseToFineOptions { frames: 4, ..Default::default() }).contains("frames"));
+    assert!(refused(CoarseToFineOptions { levels: Some(0), ..Default::default() }).contains("levels"));
+    assert!(Preset::parse("quick").unwrap_err().to_string().contains("preset"));
+}
