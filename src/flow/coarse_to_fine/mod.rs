@@ -1,4 +1,11 @@
-//! The everyday estimator: affine flow from coarse to fine.
+//! The everyday estimator: affine flow from coarse to fine, for motions of many pixels, edges between motions and untextured areas.
+//!
+//! A pyramid of the frames is walked from its coarsest level. On each level the motion at every second pixel is improved a few times: the frames are warped by it towards the middle of their
+//! times (`data`: rows 1 to 3 of WO2010/098160, (21), transported, over a small window), and neighbouring sites are bound together, robustly (`couple`). On the finest level
+//! the windows that the motion may be averaged over are chosen site by site (`refine`), and its covariance follows from them (`covariance`). `docs/theory.md` tells why.
+//!
+//! Flow of a pair belongs to the pixels of the first frame. Every pixel with data gets an estimate; what is untextured or leaves the frame is filled from its surroundings.
+//! Fine random texture that moves by more than its own grain on every level of the pyramid (some 10 px for grains of 2 px in small frames) is not found.
 
 mod couple;
 mod covariance;

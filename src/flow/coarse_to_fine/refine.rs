@@ -68,16 +68,13 @@ impl Default for Options {
     }
 }
 
-/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px.
+/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the last plane is the noise density `a`, px^4.
 pub(super) const SIGMA: usize = 6;
-/// The noise density a of the flow that came in, px^4: its variance times the area over which the noise is independent.
-#[cfg(test)]
-pub(super) const DENSITY: usize = 7;
 
 /// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the last data term: planes 0, 6, 12 the
 /// windows' means of Puu, Puv, Pvv (grey^2/px^2) and 24 that of the residual energy (grey^2).
 ///
-/// Eight planes: the motion, [`SIGMA`], [`DENSITY`]. Both inputs must have the same size and be finite; without sites there is nothing to do.
+/// Eight planes: the motion, [`SIGMA`], the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
 /// Bit-identical for any number of threads.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,

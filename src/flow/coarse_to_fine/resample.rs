@@ -54,7 +54,9 @@ pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Pl
                 let target = &mut row[k * stride + LEFT..][..width];
                 target.copy_from_slice(reader.plane(k));
                 if k < 2 {
-                    target.iter_mut().for_each(|value| *value *= two);
+                    for value in target {
+                        *value *= two;
+                    }
                 }
             }
         }
