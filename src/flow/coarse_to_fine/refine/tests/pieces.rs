@@ -48,7 +48,7 @@ fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize
 }
 
 fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
-    let ladder = Ladder::new(Options::default().ladder, PITCH);
+    let ladder = Ladder::new(seven().ladder, PITCH);
     let grids = grids(Level::detect(), &Space::default(), &ladder, motion, &[0.0; 6]);
     (ladder, grids)
 }
@@ -114,7 +114,7 @@ fn grids_grow_back_without_bending_cubics() {
 
 #[test]
 fn choices_follow_the_formulas() {
-    let options = Options::default();
+    let options = seven();
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
     let layout = Layout { windows: 7 };
     let mut means = Planes::<f64>::new(9, 1, layout.count());
@@ -167,7 +167,7 @@ fn choices_follow_the_formulas() {
 
 #[test]
 fn regional_levels_are_power_means() {
-    let (options, level) = (Options::default(), Level::detect());
+    let (options, level) = (seven(), Level::detect());
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let data = {
         let mut data = evidence::<f64>(WIDTH, HEIGHT, 1.0);
@@ -220,7 +220,7 @@ fn regional_levels_are_power_means() {
 fn edge_fits_are_the_mixture_of_nine_windows() {
     let motion = field::<f64>(WIDTH, HEIGHT, |k, x, y| if x > 30.0 { 2.0 } else { rough(k, x, y) });
     let data = evidence::<f64>(WIDTH, HEIGHT, 1e6);
-    let options = Options { ladder: &[2.5], gate: 1e-9, ..Options::default() };
+    let options = Options { ladder: &[2.5], gate: 1e-9, ..seven() };
     let got = refine(Level::detect(), &mut Space::default(), &options, &motion, &data);
     let base = mean_motion(&motion);
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
