@@ -64,33 +64,43 @@ pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Pl
     fine
 }
 
-/// Makes the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites' affine models.
+/// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites'
+/// affine models. Sites of the rim keep theirs across it.
 ///
 /// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the Jacobian catch up.
-pub(super) fn rederive<T: SimdReal>(motion: &mut Planes<T>) {
-    let (width, height) = (motion.width, motion.height);
-    let old = motion.clone();
-    let quarter = T::from_f64(0.25);
-    // From the values and slopes at the sites before, here and after: the blend a pixel after minus that a pixel before, over 2 px.
-    let slope = |value: [T; 3], slope: [T; 3]| {
-        quarter * ((value[2] - value[0]) + (slope[1] - slope[0]) + (slope[1] - slope[2]))
-    };
-    for y in 0..height {
-        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
-        for k in 0..2 {
-            let (flow, along_x) = (old.line(k, y), old.line(2 + k, y));
-            for (x, out) in motion.line_mut(2 + k, y).iter_mut().enumerate() {
-                if x > 0 && x + 1 < width {
-                    *out = slope([flow[x - 1], flow[x], flow[x + 1]], [along_x[x - 1], along_x[x], along_x[x + 1]]);
-                }
-            }
-            if above + 2 == below {
-                let lines = [above, y, below].map(|y| (old.line(k, y), old.line(4 + k, y)));
-                for (x, out) in motion.line_mut(4 + k, y).iter_mut().enumerate() {
-                    *out = slope(lines.map(|l| l.0[x]), lines.map(|l| l.1[x]));
+pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
+    *out = Planes::reuse(old.width, old.height, old.count, std::mem::take(out).into_data());
+    let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
+    out.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
+        for (y, row) in (task * ROWS..).zip(rows.chunks_mut(len)) {
+            row.copy_from_slice(old.row(y));
+            for k in 0..2 {
+                let along_x = &mut row[(2 + k) * stride + LEFT..][..width];
+                slopes_along(old.line(k, y), old.line(2 + k, y), along_x);
+                if y > 0 && y + 1 < old.height {
+                    let lines = [y - 1, y, y + 1].map(|y| (old.line(k, y), old.line(4 + k, y)));
+                    slopes_across(lines, &mut row[(4 + k) * stride + LEFT..][..width]);
                 }
             }
         }
+    });
+}
+
+/// Slopes between the sites of a row, of which the first and the last keep what they have.
+fn slopes_along<T: SimdReal>(flow: &[T], slope: &[T], out: &mut [T]) {
+    let inner = out.len().saturating_sub(2);
+    let (before, here, after) = (&slope[..inner], &slope[1.min(slope.len())..], &slope[2.min(slope.len())..]);
+    let quarter = T::from_f64(0.25);
+    for (x, out) in out.iter_mut().skip(1).take(inner).enumerate() {
+        *out = quarter * ((flow[x + 2] - flow[x]) + (here[x] - before[x]) + (here[x] - after[x]));
+    }
+}
+
+/// Slopes at the sites of a row from the flow and the slopes of the rows above, here and below.
+fn slopes_across<T: SimdReal>([above, here, below]: [(&[T], &[T]); 3], out: &mut [T]) {
+    let quarter = T::from_f64(0.25);
+    for (x, out) in out.iter_mut().enumerate() {
+        *out = quarter * ((below.0[x] - above.0[x]) + (here.1[x] - above.1[x]) + (here.1[x] - below.1[x]));
     }
 }
 
@@ -135,6 +145,33 @@ mod tests {
         }
         let m = motion_at(&want, 2.0, 26.5, 3.25);
         assert!((m[0] - (1.5 + 0.02 * 26.5 + 0.03 * 3.25)).abs() < 1e-12 && (m[3] + 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_flow_between_sites() {
+        let mut motion = affine(9, 7, 1.0);
+        let want = motion.clone();
+        for y in 0..7 {
+            for x in 0..9 {
+                // A Jacobian that lags behind by the same amount everywhere leaves no trace.
+                for k in 2..MOTION {
+                    motion.line_mut(k, y)[x] += 0.5;
+                }
+            }
+        }
+        let mut out = Planes::default();
+        rederive(&motion, &mut out);
+        for k in 0..MOTION {
+            for y in 1..6 {
+                for x in 1..8 {
+                    assert!((out.at(k, x, y) - want.at(k, x, y)).abs() < 1e-12, "plane {k} at ({x}, {y})");
+                }
+            }
+        }
+        assert_eq!(out.at(2, 0, 3), motion.at(2, 0, 3));
+        let one = affine(1, 1, 1.0);
+        rederive(&one, &mut out);
+        assert_eq!(out.at(3, 0, 0), one.at(3, 0, 0));
     }
 
     #[test]

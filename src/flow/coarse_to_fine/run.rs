@@ -119,6 +119,8 @@ struct Descent<T> {
     range: Range,
     term: DataTerm<T>,
     data: Planes<T>,
+    /// Memory of the motion before the present one.
+    spare: Planes<T>,
     scratch: CoupleScratch<T>,
     /// Standard deviation of what brightness changes by along the motion, from the iteration before.
     scale: Option<T>,
@@ -131,7 +133,8 @@ impl<T: SimdReal> Descent<T> {
             effort,
             range,
             term: DataTerm::new(simd, DataOptions::default()),
-            data: Planes::new(0, 0, 0),
+            data: Planes::default(),
+            spare: Planes::default(),
             scratch: CoupleScratch::default(),
             scale: None,
         }
@@ -145,8 +148,10 @@ impl<T: SimdReal> Descent<T> {
                 None => Planes::new(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION),
             };
             let (iterations, coupling) = self.effort.on_level(k);
-            motion = Some((0..iterations).fold(start, |mut motion, _| {
-                rederive(&mut motion);
+            motion = Some((0..iterations).fold(start, |old, _| {
+                let mut motion = std::mem::take(&mut self.spare);
+                rederive(&old, &mut motion);
+                self.spare = old;
                 self.iterate(level, &coupling, motion)
             }));
         }
