@@ -12,7 +12,7 @@ use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
 const SIZE: usize = 160;
 /// Left out along each side, px: what enters the frame has no counterpart.
 const MARGIN: usize = 24;
-/// Many pixels, with rotation, expansion and shear.
+/// Some 6 px with rotation, expansion and shear.
 const FAST: [f64; 6] = [4.4, -3.7, 0.02, 0.03, -0.02, 0.01];
 
 fn scene(motion: [f64; 6]) -> AffineTexture {
@@ -55,7 +55,7 @@ fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
             let field = estimate(options, Common::default(), &frames(&scene, 1.0, times));
             let (flow, jacobian) = errors(&field, &truth);
             println!("{} from {number} frames: flow {flow:.4} px, Jacobian {jacobian:.5}", preset.name());
-            assert!(flow < 0.03 && jacobian < 0.003, "{} from {number}: {flow} {jacobian}", preset.name());
+            assert!(flow < 0.012 && jacobian < 0.0005, "{} from {number}: {flow} {jacobian}", preset.name());
             assert!(field.status.iter().all(|s| *s == Status::Ok));
         }
     }
@@ -82,7 +82,7 @@ fn errors_are_about_as_large_as_the_covariance_says() {
             }
             let ratio = (sum / count).sqrt();
             println!("noise {noise}, parameter {k}: error over standard deviation {ratio:.2}");
-            assert!((0.3..2.0).contains(&ratio), "noise {noise}, parameter {k}: {ratio}");
+            assert!((0.5..1.3).contains(&ratio), "noise {noise}, parameter {k}: {ratio}");
         }
     }
 }

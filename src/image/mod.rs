@@ -22,11 +22,8 @@ pub use quantise::Quantiser;
 pub use sample::Interpolation;
 pub use smooth::GaussianSmoother;
 
-#[allow(unused_imports)] // offered to the estimators that warp
-pub(crate) use fill::{fill_holes, usable_pixels};
-#[allow(unused_imports)] // as above
-pub(crate) use pyramid::{halve, halve_into, halve_mask, halved_size};
+pub(crate) use fill::fill_holes;
+pub(crate) use pyramid::{halve, halve_mask};
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};
-#[allow(unused_imports)] // as above
 pub(crate) use spline::Spline;

@@ -7,6 +7,9 @@
 //!
 //! Coupling and edge windows make the noise of the flow less white than that; [`FLOW_NOISE`] and [`SLOPE_NOISE`] account for it.
 //!
+//! These factors and the share below were fitted to a few made scenes and are provisional: the covariance is not calibrated. That of a pair is told as it is midway, not
+//! carried to the first frame as its motion is.
+//!
 //! What is no noise but a wrong place (aliasing of sharp particles, flow that bends within a pixel's reach) does not average out. It shows as
 //! residual energy that grows with the texture: where the image is displaced by a misfit of variance `b` from where it should be, `e = e_0 + b tr P`. The
 //! slope `b` of that line over all sites is the variance of the misfit, px^2, whatever the noise `e_0`; [`MISFIT_SHARE`] of it stays in each component of the flow.
@@ -15,6 +18,7 @@ use super::data::{ERROR, VALID};
 use super::grid::Planes;
 use super::refine::SIGMA;
 use super::run::Estimate;
+use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::image::GaussianSmoother;
 use crate::simd::{Level, SimdReal};
 use crate::types::Frame;
@@ -28,8 +32,6 @@ const SLOPE_NOISE: f64 = 6.0;
 const MISFIT_SHARE: f64 = 0.45;
 /// Region of the information and of the energy, sites.
 const REGION: f64 = 4.0;
-/// Entries of the upper triangle of a 6x6 matrix.
-pub(super) const ENTRIES: usize = 21;
 
 /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at every site: the upper triangle, row by row.
 ///
@@ -89,11 +91,6 @@ fn misfit<T: SimdReal>(data: &Planes<T>) -> f64 {
 /// Over which length what stays of the misfit changes, px^2: windows smooth it too, but it has a scale of its own.
 fn misfit_length_squared(sigma: f64) -> f64 {
     30.0 + 0.35 * sigma * sigma
-}
-
-/// Index of entry (i, j), i <= j, of the upper triangle of a 6x6 matrix.
-const fn upper(i: usize, j: usize) -> usize {
-    i * (11 - i) / 2 + j
 }
 
 /// Gaussian power mean of a plane.

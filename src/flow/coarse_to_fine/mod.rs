@@ -5,7 +5,7 @@
 //! the windows that the motion may be averaged over are chosen site by site (`refine`), and its covariance follows from them (`covariance`). `docs/theory.md` tells why.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every pixel with data gets an estimate; what is untextured or leaves the frame is filled from its surroundings.
-//! Fine random texture that moves by more than its own grain on every level of the pyramid (some 10 px for grains of 2 px in small frames) is not found.
+//! Fine random texture that moves by more than its own grain on every level of the pyramid may not be found. The covariance is not calibrated yet.
 
 mod couple;
 mod covariance;

@@ -1,6 +1,6 @@
 //! From the sites' motion to the field that was asked for.
 
-use super::covariance::{ENTRIES, covariance};
+use super::covariance::covariance;
 use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
 use super::reference::at_first_frame;
@@ -9,6 +9,7 @@ use super::rows::RowReader;
 use super::run::Estimate;
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
+use crate::flow::windowed::solve::ENTRIES;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Mask, Sites, Status};
 use rayon::prelude::*;

@@ -53,7 +53,7 @@ mod results;
 mod rows;
 mod run;
 mod sandwich;
-mod solve;
+pub(in crate::flow) mod solve;
 mod sound;
 mod support;
 mod tile;

@@ -7,12 +7,12 @@ use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 /// Index of entry (i, j), i <= j, in the list of the upper triangle, row by row.
 #[inline(always)]
-pub(super) const fn upper(i: usize, j: usize) -> usize {
+pub(in crate::flow) const fn upper(i: usize, j: usize) -> usize {
     i * (11 - i) / 2 + j
 }
 
 /// Entries of the upper triangle of a symmetric 6x6 matrix.
-pub(super) const ENTRIES: usize = 21;
+pub(in crate::flow) const ENTRIES: usize = 21;
 
 /// Moments of one row of pixels: moment `k` of column `c` is `data[first + k * stride + c]`.
 #[derive(Clone, Copy)]

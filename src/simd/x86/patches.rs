@@ -19,6 +19,9 @@ fn start(len: usize, stride: usize, column: i32, row: i32) -> usize {
 }
 
 /// One patch of singles, summed down.
+///
+/// # Safety
+/// The processor must have FMA, and `start` must come from [`start`] for this plane and stride.
 #[inline(always)]
 unsafe fn single(plane: &[f32], stride: usize, start: usize, weights: [f32; 4]) -> __m128 {
     // SAFETY: the caller got `start` from the function of that name for this plane.
@@ -32,6 +35,9 @@ unsafe fn single(plane: &[f32], stride: usize, start: usize, weights: [f32; 4]) 
 }
 
 /// One patch of doubles, summed down.
+///
+/// # Safety
+/// The processor must have AVX and FMA, and `start` must come from [`start`] for this plane and stride.
 #[inline(always)]
 unsafe fn double(plane: &[f64], stride: usize, start: usize, weights: [f64; 4]) -> __m256d {
     // SAFETY: the caller got `start` from the function of that name for this plane.
@@ -52,6 +58,10 @@ macro_rules! patch {
     }};
 }
 
+/// The four column sums of the patch of each of eight singles; panics where a patch leaves the plane.
+///
+/// # Safety
+/// The processor must have AVX2 and FMA.
 #[inline(always)]
 pub(super) unsafe fn f32x8(
     plane: &[f32],
@@ -85,6 +95,10 @@ pub(super) unsafe fn f32x8(
     }
 }
 
+/// The four column sums of the patch of each of sixteen singles; panics where a patch leaves the plane.
+///
+/// # Safety
+/// The processor must have AVX-512 F and DQ, and FMA.
 #[inline(always)]
 pub(super) unsafe fn f32x16(
     plane: &[f32],
@@ -120,6 +134,9 @@ pub(super) unsafe fn f32x16(
 }
 
 /// Rows to columns.
+///
+/// # Safety
+/// The processor must have AVX.
 #[inline(always)]
 unsafe fn transpose(sums: [__m256d; 4]) -> [__m256d; 4] {
     // SAFETY: see the module's note.
@@ -135,6 +152,10 @@ unsafe fn transpose(sums: [__m256d; 4]) -> [__m256d; 4] {
     }
 }
 
+/// The four column sums of the patch of each of four doubles; panics where a patch leaves the plane.
+///
+/// # Safety
+/// The processor must have AVX2 and FMA.
 #[inline(always)]
 pub(super) unsafe fn f64x4(
     plane: &[f64],
@@ -159,6 +180,10 @@ pub(super) unsafe fn f64x4(
     }
 }
 
+/// The four column sums of the patch of each of eight doubles; panics where a patch leaves the plane.
+///
+/// # Safety
+/// The processor must have AVX-512 F, AVX2 and FMA.
 #[inline(always)]
 pub(super) unsafe fn f64x8(
     plane: &[f64],
