@@ -48,9 +48,12 @@ def test_powers_of_two_change_no_bit_of_the_instantaneous_flow(seed, power):
 
 
 def symmetry_tolerance(method):
-    """Iterations go row by row; sites are every second pixel from the upper left corner, and the coupling of neighbours is stopped before it has converged."""
+    """Iterations go row by row; sites are every second pixel from the upper left corner, and the coupling of neighbours is stopped before it has converged.
+
+    The last of an even number of columns has no site of its own: there the field is extrapolated, at the other rim it is not.
+    """
     if method == "coarse_to_fine":
-        return {"rtol": 0.0, "atol": 0.02}
+        return {"rtol": 0.0, "atol": 0.05}
     return {"rtol": 1e-4, "atol": 1e-5} if method == "horn_schunck" else {"rtol": 1e-6, "atol": 1e-9}
 
 
