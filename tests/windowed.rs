@@ -17,6 +17,8 @@ use nalgebra::{Matrix6, Vector6};
 
 #[path = "windowed/calibration.rs"]
 mod calibration;
+#[path = "windowed/efficiency.rs"]
+mod efficiency;
 
 /// Rows of `[J(i); J(i')]` and of `[i'; i'']` of one pixel, as the specification of the method writes them.
 fn equations(rows: usize, jet: [f64; 6], first: [f64; 6], second: [f64; 6]) -> (Vec<[f64; 6]>, Vec<f64>) {

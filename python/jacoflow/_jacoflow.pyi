@@ -66,6 +66,7 @@ _Model: TypeAlias = Literal["affine", "translational", "accelerating"]
 _Scheme: TypeAlias = Literal["central", "backward", "pair"]
 _Rows: TypeAlias = Literal["brightness", "gradient", "jet", "all"]
 _Rank: TypeAlias = Literal["nan", "min_norm"]
+_Temporal: TypeAlias = Literal["none", "recursive"]
 _Colour: TypeAlias = Literal["error", "luminance"]
 _Precision: TypeAlias = Literal["float32", "float64"]
 _Simd: TypeAlias = Literal["scalar", "avx2", "avx512"]
@@ -280,6 +281,8 @@ def estimate(
     covariance: bool | None = None,
     diagnostics: bool = False,
     noise: float | None = None,
+    temporal: _Temporal | None = None,
+    forgetting: float | None = None,
     precision: _Precision | None = None,
     threads: int | None = None,
     simd: _Simd | None = None,
@@ -347,6 +350,13 @@ def estimate(
         Whether to report residual, rank and condition number.
     noise : float, grey levels
         Standard deviation of the pixel noise for the covariance; default from the frames.
+    temporal : "none" or "recursive"
+        "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture ("windowed", "coarse_to_fine", "instantaneous"): an information filter on
+        (u, v, u_x, v_x, u_y, v_y) at each fixed pixel, `P_k^-1 = f P_{k-1}^-1 + C_k^-1`, `x_k = x_{k-1} + P_k C_k^-1 (m_k - x_{k-1})` with the estimate m_k of each time, its covariance C_k and f = `forgetting`.
+        It starts with the first estimate; noise falls with the number of frames, systematic error does not, and the covariance says both. Where the motion changes a pixel starts anew (normalised
+        innovation squared above 27.86) or shortens its memory. Times without an estimate get the prediction and status PREDICTED. Needs the covariance; default "none".
+    forgetting : float, no unit
+        Factor f of "recursive", above 0 and at most 1: the memory is 1 / (1 - f) frames; default 0.95.
     precision : "float32" or "float64"
         Default: that of the frames.
     threads : int
@@ -369,7 +379,7 @@ class FlowEstimator:
     """Flow from a stream: frames are pushed one by one, memory stays bounded.
 
     The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-    (two with time_scheme="pair"). Pickles in mid-stream.
+    (two with time_scheme="pair"). With temporal="recursive" each field holds what all frames so far tell. Pickles in mid-stream.
     """
     def __new__(
         cls,
@@ -399,6 +409,8 @@ class FlowEstimator:
         covariance: bool | None = None,
         diagnostics: bool = False,
         noise: float | None = None,
+        temporal: _Temporal | None = None,
+        forgetting: float | None = None,
         precision: _Precision | None = None,
         threads: int | None = None,
         simd: _Simd | None = None,

@@ -8,7 +8,7 @@ __all__ = ["Status"]
 class Status(IntEnum):
     """Status code of one estimate; `FlowField.status` is an array (..., H, W) of these. Codes carry no unit.
 
-    Anything but OK, MIN_NORM and REPAIRED comes with NaN values.
+    BORDER, NON_FINITE, MASKED and UNOBSERVABLE come with NaN values.
 
     >>> Status(3).name
     'MASKED'
@@ -28,3 +28,5 @@ class Status(IntEnum):
     """Unobservable, and the minimum-norm solution was asked for: values are finite but not unique."""
     REPAIRED = 6
     """A filter lost its positive-definite covariance and was restarted here."""
+    PREDICTED = 7
+    """No estimate at this time: what the estimates before say, with a covariance that grows until the next one."""

@@ -72,6 +72,7 @@ pub fn prepare(
         pixel_pitch: method.pixel_pitch.unwrap_or((1.0, 1.0)),
         frame_period: opened.numbering.period(),
         covariance: !method.no_covariance && !matches!(chosen, Method::HornSchunck(_)),
+        systematic: method.recursive()?.is_some(),
         diagnostics: false,
         noise: method.noise,
         threads,
@@ -145,7 +146,8 @@ impl FlowCommand {
             details.insert("method".into(), prepared.description["method"].clone());
         }
         let steps = preprocess_for(&prepared.estimator, &self.input)?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(EstimatorStage::new(prepared.estimator)))
+        let stage = EstimatorStage::recursive(prepared.estimator, self.method.recursive()?)?;
+        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
             .with_preprocess(steps)
             .with_threads(compute(&self.compute)?.0)
             .with_numbering(opened.numbering);

@@ -106,7 +106,8 @@ impl MeasureCommand {
             details.insert("method".into(), estimator.method().name().into());
         }
         let steps = preprocess_for(&estimator, &self.input)?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(EstimatorStage::new(estimator)))
+        let stage = EstimatorStage::recursive(estimator, self.method.recursive()?)?;
+        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
             .with_preprocess(steps)
             .with_threads(compute(&self.compute)?.0)
             .with_numbering(opened.numbering)

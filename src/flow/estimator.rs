@@ -200,6 +200,13 @@ impl Estimator {
         } else {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
+        let tells = self.common.covariance && self.common.systematic && matches!(self.engine, Engine::Windowed(_));
+        let entries = field.covariance.as_ref().map_or(0, Vec::len);
+        field.systematic = tells.then(|| {
+            let mut planes = field.systematic.take().unwrap_or_default();
+            planes.resize(entries, T::nan());
+            planes
+        });
         match (&self.engine, frames) {
             (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field),
             (Engine::Instantaneous(_), _) => {}
@@ -232,7 +239,7 @@ fn to_pitch<T: SimdReal>(field: &mut FlowField<T>, parameters: &[Parameter], pit
     for (plane, &factor) in field.motion.chunks_mut(n).zip(&scale) {
         by(plane, factor);
     }
-    if let Some(covariance) = &mut field.covariance {
+    for covariance in [&mut field.covariance, &mut field.systematic].into_iter().flatten() {
         let pairs = (0..scale.len()).flat_map(|i| (i..scale.len()).map(move |j| (i, j)));
         for (plane, (i, j)) in covariance.chunks_mut(n).zip(pairs) {
             by(plane, scale[i] * scale[j]);

@@ -54,6 +54,8 @@ pub struct Common {
     pub frame_period: Option<f64>,
     /// Whether to compute the covariance of the parameters. Default: no.
     pub covariance: bool,
+    /// Whether to tell the systematic part of the covariance apart, where the method can ([`FlowField::systematic`](crate::types::FlowField)). Default: no.
+    pub systematic: bool,
     /// Whether to report residual, rank and condition number of each site. Default: no.
     pub diagnostics: bool,
     /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the frames.
@@ -72,6 +74,7 @@ impl Default for Common {
             pixel_pitch: (1.0, 1.0),
             frame_period: None,
             covariance: false,
+            systematic: false,
             diagnostics: false,
             noise: None,
             threads: Threads::default(),

@@ -16,6 +16,8 @@ pub(super) struct FieldBand<'a, T> {
     pub motion: Vec<&'a mut [T]>,
     /// One slice a pair of parameters, or none.
     pub covariance: Vec<&'a mut [T]>,
+    /// One slice a pair of parameters, or none.
+    pub systematic: Vec<&'a mut [T]>,
     /// Status.
     pub status: &'a mut [Status],
     /// Root mean square residual.
@@ -39,6 +41,8 @@ pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
     let mut motion: Vec<_> = field.motion.chunks_mut(n).map(|p| p.chunks_mut(size)).collect();
     let mut covariance: Vec<_> =
         field.covariance.iter_mut().flat_map(|c| c.chunks_mut(n)).map(|p| p.chunks_mut(size)).collect();
+    let mut systematic: Vec<_> =
+        field.systematic.iter_mut().flat_map(|c| c.chunks_mut(n)).map(|p| p.chunks_mut(size)).collect();
     let mut status = field.status.chunks_mut(size);
     let mut residual = field.residual.as_mut().map(|r| r.chunks_mut(size));
     let mut rank = field.rank.as_mut().map(|r| r.chunks_mut(size));
@@ -48,6 +52,7 @@ pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
             sites: b * size..((b + 1) * size).min(n),
             motion: motion.iter_mut().map(|c| c.next().unwrap_or_default()).collect(),
             covariance: covariance.iter_mut().map(|c| c.next().unwrap_or_default()).collect(),
+            systematic: systematic.iter_mut().map(|c| c.next().unwrap_or_default()).collect(),
             status: status.next().unwrap_or_default(),
             residual: residual.as_mut().and_then(Iterator::next),
             rank: rank.as_mut().and_then(Iterator::next),

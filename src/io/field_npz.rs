@@ -255,6 +255,7 @@ pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<
         } else {
             None
         },
+        systematic: None,
         residual: if npz.contains("residual") { Some(shape.planes(npz, "residual", None)?) } else { None },
         condition: if npz.contains("condition") { Some(shape.planes(npz, "condition", None)?) } else { None },
         rank: if npz.contains("rank") { Some(shape.ranks(npz)?) } else { None },

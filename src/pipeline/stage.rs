@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::flow::Estimator;
 use crate::io::Element;
 use crate::simd::SimdReal;
-use crate::temporal::{FlowFilter, FlowFilterOptions};
+use crate::temporal::{FlowFilter, FlowFilterOptions, RecursiveFusion, RecursiveOptions};
 use crate::types::{FlowField, Frame};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -38,19 +38,29 @@ pub trait Stage<T>: Send {
     }
 }
 
-/// An [`Estimator`] with a memory of the few frames that it needs.
+/// An [`Estimator`] with a memory of the few frames that it needs, and of the estimates before where they are fused over time.
 pub struct EstimatorStage<T> {
     estimator: Estimator,
     needed: usize,
     ring: VecDeque<Arc<Frame<T>>>,
     pushed: usize,
+    fusion: Option<RecursiveFusion<T>>,
 }
 
 impl<T: SimdReal> EstimatorStage<T> {
     /// A stage without frames yet.
     pub fn new(estimator: Estimator) -> Self {
         let needed = estimator.frames_needed();
-        Self { estimator, needed, ring: VecDeque::with_capacity(needed + 1), pushed: 0 }
+        Self { estimator, needed, ring: VecDeque::with_capacity(needed + 1), pushed: 0, fusion: None }
+    }
+
+    /// As [`EstimatorStage::new`]; with options its estimates are fused over time.
+    ///
+    /// # Errors
+    /// Those of [`RecursiveFusion::new`].
+    pub fn recursive(estimator: Estimator, options: Option<RecursiveOptions>) -> Result<Self> {
+        let fusion = options.map(|options| RecursiveFusion::new(&estimator, options)).transpose()?;
+        Ok(Self { fusion, ..Self::new(estimator) })
     }
 }
 
@@ -71,7 +81,10 @@ impl<T: SimdReal> Stage<T> for EstimatorStage<T> {
         }
         let first = self.pushed - needed;
         let frames: Vec<&Frame<T>> = self.ring.iter().map(AsRef::as_ref).collect();
-        let field = self.estimator.estimate(&frames, first)?;
+        let mut field = self.estimator.estimate(&frames, first)?;
+        if let Some(fusion) = &mut self.fusion {
+            fusion.fuse(&mut field)?;
+        }
         let place = field.layout.frame_index.saturating_sub(first).min(needed - 1);
         let frame = Arc::clone(&self.ring[place]);
         Ok(Some((field, frame)))

@@ -42,6 +42,9 @@ pub struct FlowField<T> {
     pub motion: Vec<T>,
     /// `P (P + 1) / 2` planes: the upper triangle of the covariance, row by row (0,0), (0,1), ... (1,1) ...
     pub covariance: Option<Vec<T>>,
+    /// The part of `covariance` that repeats itself from one time to the next (biases, misfit) and does not average out; planes in the same order. Only where
+    /// the method tells it apart and `Common::systematic` asks for it.
+    pub systematic: Option<Vec<T>>,
     /// Status of each site.
     pub status: Vec<Status>,
     /// Root mean square of the equations' residual, in grey levels.
@@ -65,6 +68,7 @@ impl<T: Real> FlowField<T> {
             height,
             motion: vec![T::nan(); p * n],
             covariance: covariance.then(|| vec![T::nan(); p * (p + 1) / 2 * n]),
+            systematic: None,
             status: vec![Status::Border; n],
             residual: None,
             rank: None,

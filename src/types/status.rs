@@ -1,6 +1,6 @@
 //! Why a pixel has, or lacks, an estimate.
 
-/// The state of one estimate. Anything but `Ok` and `MinNorm` comes with NaN values.
+/// The state of one estimate. `Border`, `NonFinite`, `Masked` and `Unobservable` come with NaN values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[repr(u8)]
 pub enum Status {
@@ -19,12 +19,22 @@ pub enum Status {
     MinNorm = 5,
     /// A filter lost its positive-definite covariance and was restarted here.
     Repaired = 6,
+    /// No estimate at this time: what the estimates before say, with a covariance that grows until the next one.
+    Predicted = 7,
 }
 
 impl Status {
     /// Every status, by code.
-    pub const ALL: [Self; 7] =
-        [Self::Ok, Self::Border, Self::NonFinite, Self::Masked, Self::Unobservable, Self::MinNorm, Self::Repaired];
+    pub const ALL: [Self; 8] = [
+        Self::Ok,
+        Self::Border,
+        Self::NonFinite,
+        Self::Masked,
+        Self::Unobservable,
+        Self::MinNorm,
+        Self::Repaired,
+        Self::Predicted,
+    ];
 
     /// The word used in files and in Python.
     pub fn name(self) -> &'static str {
@@ -36,6 +46,7 @@ impl Status {
             Self::Unobservable => "unobservable",
             Self::MinNorm => "min_norm",
             Self::Repaired => "repaired",
+            Self::Predicted => "predicted",
         }
     }
 
@@ -46,7 +57,7 @@ impl Status {
 
     /// A unique, complete estimate.
     pub fn is_valid(self) -> bool {
-        matches!(self, Self::Ok | Self::Repaired)
+        matches!(self, Self::Ok | Self::Repaired | Self::Predicted)
     }
 }
 

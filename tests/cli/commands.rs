@@ -243,3 +243,22 @@ fn a_pair_is_enough_for_a_field() {
         assert!((field.affine(20 * 48 + 24).u - 0.3).abs() < 0.1, "{method}");
     }
 }
+
+#[test]
+fn estimates_are_fused_over_time_on_request() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 9 --size 48x40 --noise 3");
+    place.good("flow s.npy -o plain --stride 4");
+    place.good("flow s.npy -o fused --stride 4 --temporal recursive");
+    let read = |name: &str| read_npz::<f64>(place.path(name)).unwrap().field;
+    assert_eq!(read("plain/000001.npz").motion[65], read("fused/000001.npz").motion[65]);
+    let (plain, fused) = (read("plain/000007.npz"), read("fused/000007.npz"));
+    let middle = 5 * 12 + 6;
+    let deviation = |field: &jacoflow::types::FlowField<f64>| field.standard_deviation("u").unwrap()[middle];
+    assert!(deviation(&fused) < 0.8 * deviation(&plain), "{} {}", deviation(&fused), deviation(&plain));
+    let rows = |more: &str| {
+        let ended = place.good(&format!("measure s.npy --quantity curl --region 12,12,16,16 {more}"));
+        ended.out.lines().last().unwrap().split(',').nth(6).unwrap().parse::<f64>().unwrap()
+    };
+    assert!(rows("--temporal recursive --forgetting 1") < rows(""));
+}

@@ -33,6 +33,7 @@ def test_estimate() -> None:
 
 
 def test_streams(tmp_path: Path) -> None:
+    assert_type(FlowEstimator(temporal="recursive", forgetting=0.9).frames_needed, int)
     estimator = FlowEstimator(method="lucas_kanade", window_sigma=3.0)
     results = [estimator.push(frame) for frame in frames()]
     assert_type(results, list[FlowField | None])

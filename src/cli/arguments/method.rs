@@ -9,6 +9,7 @@ use crate::flow::model::ModelKind;
 use crate::flow::windowed::{RowSet, WindowedOptions};
 use crate::flow::{Method, RankPolicy};
 use crate::jet::{Neighbourhood, TimeScheme};
+use crate::temporal::RecursiveOptions;
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -50,6 +51,12 @@ pub struct MethodArguments {
     /// windowed, instantaneous: what becomes of pixels whose equations do not determine every unknown, nan (default) or min-norm
     #[arg(long, value_name = "POLICY")]
     pub rank_deficient: Option<String>,
+    /// recursive: fuse the estimates of all frames so far, for motion that is steady in the picture (windowed, coarse-to-fine, instantaneous); none (default): each frame by itself
+    #[arg(long, value_name = "WHAT")]
+    pub temporal: Option<String>,
+    /// recursive: by what the information of the past is multiplied each frame, above 0 and at most 1; the memory is 1/(1 - F) frames [default: 0.95]
+    #[arg(long, value_name = "F")]
+    pub forgetting: Option<f64>,
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
@@ -128,6 +135,14 @@ impl MethodArguments {
         self.scheme.as_deref().map_or(Ok(default), TimeScheme::parse)
     }
 
+    /// Whether and how estimates are fused over time.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `temporal` or `forgetting`.
+    pub fn recursive(&self) -> Result<Option<RecursiveOptions>> {
+        RecursiveOptions::parse(self.temporal.as_deref(), self.forgetting)
+    }
+
     /// An option that would silently do nothing is a mistake.
     fn refuse_foreign(&self, method: &Method) -> Result<()> {
         let (windowed, instantaneous) =
@@ -154,7 +169,11 @@ impl MethodArguments {
 
     /// How fields are made, for the metadata of files.
     pub fn describe(&self, method: &Method) -> Value {
-        json!({"method": method.name(), "options": format!("{method:?}"), "noise": self.noise})
+        let recursive = self.recursive().ok().flatten();
+        json!({
+            "method": method.name(), "options": format!("{method:?}"), "noise": self.noise,
+            "forgetting": recursive.map(|options| options.forgetting),
+        })
     }
 }
 

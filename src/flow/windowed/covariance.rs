@@ -36,7 +36,7 @@ const TASK_ROWS: usize = 64;
 
 impl<T: SimdReal> NoiseSetting<T> {
     /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with the margin around them
-    /// (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and frames.
+    /// (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and frames; with `parts` 21 more, what is left of it without the noise.
     pub fn covariance(
         &self,
         (source, detail): (&Source<'_, T>, Option<&Detail<T>>),
@@ -45,7 +45,7 @@ impl<T: SimdReal> NoiseSetting<T> {
         columns: &Range<usize>,
     ) -> Vec<T> {
         let (width, n) = (columns.len(), columns.len() * rows.len());
-        let mut planes = vec![T::nan(); ENTRIES * n];
+        let mut planes = vec![T::nan(); if self.parts { 2 * ENTRIES } else { ENTRIES } * n];
         if n == 0 {
             return planes;
         }
@@ -109,7 +109,9 @@ impl<T: SimdReal> Scratch<T> {
 }
 
 /// Rows of `Scratch::pixel`.
-const PIXEL: usize = PIXEL_SHARE + 2;
+const PIXEL: usize = PIXEL_NOISE + ENTRIES;
+/// Where the noise's own part of the result begins, for those who want to tell it apart.
+pub(super) const PIXEL_NOISE: usize = PIXEL_SHARE + 2;
 /// Where the noise's share of the equations stands, and the variance of the noise.
 pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
 /// Where the result begins among them.
@@ -278,8 +280,13 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         sound::mend_row(setting.scale, pixel, count);
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
-            let source = (PIXEL_RESULT + k) * TILE_COLUMNS;
-            plane[from..from + count].copy_from_slice(&self.scratch.pixel[source..source + count]);
+            let pixel = &self.scratch.pixel;
+            let row = |first: usize| &pixel[(first + k % ENTRIES) * TILE_COLUMNS..][..count];
+            let target = &mut plane[from..from + count];
+            target.copy_from_slice(row(PIXEL_RESULT));
+            if k >= ENTRIES {
+                target.iter_mut().zip(row(PIXEL_NOISE)).for_each(|(whole, noise)| *whole -= *noise);
+            }
         }
     }
 

@@ -53,7 +53,7 @@ mod results;
 mod rows;
 mod run;
 mod sandwich;
-pub(in crate::flow) mod solve;
+pub(crate) mod solve;
 mod sound;
 mod support;
 mod tile;

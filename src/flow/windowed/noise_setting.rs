@@ -37,6 +37,8 @@ pub(super) struct NoiseSetting<T> {
     pub truncation: Truncation,
     /// Energy of the detail per variance of the noise.
     pub detail_gain: f64,
+    /// Whether the noise's own part of the covariance is told apart.
+    pub parts: bool,
     /// Instruction set.
     pub level: Level,
 }
@@ -72,6 +74,7 @@ impl<T: SimdReal> NoiseSetting<T> {
             detail_gain: detail::gain(combination, options.already_smoothed),
             variance: common.noise.map(|n| n * n),
             least_variance: if rounded { 1.0 / 12.0 } else { 0.0 },
+            parts: common.systematic,
             level: common.level(),
         }
     }

@@ -14,7 +14,7 @@ pub(super) struct Results<T> {
     pub covariance: Option<Covariance<T>>,
 }
 
-/// 21 planes at these rows and columns.
+/// 21 planes at these rows and columns, or 42 with the systematic part.
 pub(super) struct Covariance<T> {
     pub planes: Vec<T>,
     pub rows: Vec<usize>,
@@ -66,7 +66,7 @@ impl<T: SimdReal> Results<T> {
         if let Some(covariance) = &self.covariance {
             let from = place(&covariance.rows, &covariance.columns, (x, y));
             let n = covariance.rows.len() * covariance.columns.len();
-            for (k, plane) in band.covariance.iter_mut().enumerate() {
+            for (k, plane) in band.covariance.iter_mut().chain(&mut band.systematic).enumerate() {
                 run.copy(&covariance.planes, k * n + from, &mut plane[places.clone()]);
             }
             withdraw_what_overflowed(band, places.clone());

@@ -1,6 +1,6 @@
 //! The covariance of one row of pixels, from what the passes have summed for them.
 
-use super::covariance::{PIXEL_MISFIT, PIXEL_RESULT, PIXEL_SHARE};
+use super::covariance::{PIXEL_MISFIT, PIXEL_NOISE, PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
 use super::noise_setting::NoiseSetting;
 use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
@@ -70,6 +70,10 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
                     let unit = (if i < 2 { 1.0 } else { setting.scale }) * if k < 2 { 1.0 } else { setting.scale };
                     let target = (PIXEL_RESULT + upper(i, k)) * TILE_COLUMNS + c;
                     (whole * V::constant(unit)).store(&mut pixel[target..]);
+                    if setting.parts {
+                        let target = (PIXEL_NOISE + upper(i, k)) * TILE_COLUMNS + c;
+                        (scatter(i, k) * of_noise * V::constant(unit)).store(&mut pixel[target..]);
+                    }
                 }
             }
             c += V::LANES;

@@ -7,12 +7,12 @@ use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 /// Index of entry (i, j), i <= j, in the list of the upper triangle, row by row.
 #[inline(always)]
-pub(in crate::flow) const fn upper(i: usize, j: usize) -> usize {
+pub(crate) const fn upper(i: usize, j: usize) -> usize {
     i * (11 - i) / 2 + j
 }
 
 /// Entries of the upper triangle of a symmetric 6x6 matrix.
-pub(in crate::flow) const ENTRIES: usize = 21;
+pub(crate) const ENTRIES: usize = 21;
 
 /// Moments of one row of pixels: moment `k` of column `c` is `data[first + k * stride + c]`.
 #[derive(Clone, Copy)]
@@ -84,7 +84,7 @@ pub(super) fn right_side<V: Lanes<Scalar = T>, T: SimdReal>(
 }
 
 /// `L L^T = D N D` with D such that the diagonal is 1.
-pub(super) struct Factor<V> {
+pub(crate) struct Factor<V> {
     lower: [V; ENTRIES],
     inverse_pivot: [V; 6],
     scale: [V; 6],
@@ -97,7 +97,7 @@ pub(super) struct Factor<V> {
 
 /// Factors the normal matrix. Where it is singular the quality says so and the rest is meaningless (but harmless).
 #[inline(always)]
-pub(super) fn factor<V: Lanes>(n: &[V; ENTRIES]) -> Factor<V> {
+pub(crate) fn factor<V: Lanes>(n: &[V; ENTRIES]) -> Factor<V> {
     let one = V::constant(1.0);
     let mut largest = n[0];
     let mut least = n[0];

@@ -13,6 +13,7 @@ use crate::python::arrays::{self, ColourRule};
 use crate::python::image::renamed;
 use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Integer, Object, Precision, Region};
+use crate::temporal::{RecursiveFusion, RecursiveOptions};
 use pyo3::prelude::*;
 
 /// Hands the options of an estimator to `$then!`.
@@ -35,6 +36,8 @@ macro_rules! estimator_options {
             covariance: Option<bool> as Option<bool> = None,
             diagnostics: bool as bool = false,
             noise: Option<f64> as Option<f64> = None,
+            temporal: Option<String> as Option<String> = None,
+            forgetting: Option<f64> as Option<f64> = None,
         }
     };
 }
@@ -51,6 +54,8 @@ pub struct Plan {
     pub preprocess: Preprocess,
     pub colour: ColourRule,
     pub precision: Precision,
+    /// How estimates are fused over time, if they are.
+    pub recursive: Option<RecursiveOptions>,
 }
 
 impl Arguments {
@@ -71,10 +76,16 @@ impl Arguments {
             // It smooths on its own, and reads the noise from the frames before that.
             preprocess.smooth = None;
         }
+        let recursive = RecursiveOptions::parse(self.temporal.as_deref(), self.forgetting)?;
         let estimator = Estimator::new(method, common)
             .map_err(|e| renamed(renamed(e, "sigma", "window_sigma"), "window", "window_sigma"))
             .map_err(|e| renamed(e, "presmooth", "smooth"))?;
+        if let Some(options) = recursive {
+            // What it cannot be used with is told now, and not with the first field.
+            RecursiveFusion::<f32>::new(&estimator, options)?;
+        }
         Ok(Plan {
+            recursive,
             estimator,
             preprocess,
             colour: ColourRule::parse(self.colour.as_deref())?,
@@ -95,6 +106,7 @@ impl Arguments {
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
             frame_period: options::frame_period(self.fps, self.frame_period)?,
             covariance: self.covariance.unwrap_or(has_covariance),
+            systematic: self.temporal.as_deref() == Some("recursive"),
             diagnostics: self.diagnostics,
             noise: self.noise,
             threads: options::threads(self.threads)?,

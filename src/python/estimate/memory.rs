@@ -3,11 +3,11 @@
 use super::arguments::Plan;
 use crate::error::Result;
 use crate::flow::{Estimator, Method};
-use crate::image::Preprocess;
 use crate::math::Real;
 use crate::python::field::Stored;
 use crate::python::{options, spare};
 use crate::simd::{SimdReal, same_mut};
+use crate::temporal::RecursiveFusion;
 use crate::types::{AnyFrame, FlowField, Frame, Sample, Status};
 use pyo3::prelude::*;
 use std::collections::VecDeque;
@@ -20,20 +20,18 @@ pub struct Ring<T: Real> {
     pub pushed: usize,
     /// Sample type of the first.
     pub dtype: &'static str,
+    /// What the estimates before tell, where they are fused.
+    pub fusion: Option<RecursiveFusion<T>>,
 }
 
 impl<T: SimdReal> Ring<T> {
     fn new(dtype: &'static str) -> Self {
-        Self { frames: VecDeque::new(), pushed: 0, dtype }
+        Self { frames: VecDeque::new(), pushed: 0, dtype, fusion: None }
     }
 
     /// Takes the next frame; a field once there are enough. A frame that cannot be used is not kept.
-    fn push(
-        &mut self,
-        estimator: &Estimator,
-        preprocess: &Preprocess,
-        frame: AnyFrame,
-    ) -> Result<Option<FlowField<T>>> {
+    fn push(&mut self, plan: &Plan, frame: AnyFrame) -> Result<Option<FlowField<T>>> {
+        let Plan { estimator, preprocess, .. } = plan;
         if let Some(first) = self.frames.front().filter(|first| first.size() != frame.size()) {
             let text = |(width, height): (usize, usize)| format!("{width} x {height}");
             let expected = format!("frames of one size (the first is {})", text(first.size()));
@@ -52,13 +50,31 @@ impl<T: SimdReal> Ring<T> {
             return Ok(None);
         }
         let frames: Vec<_> = self.frames.iter().collect();
-        let field = estimate(estimator, &frames, self.pushed - needed);
+        let first = self.pushed - needed;
+        let field = estimate(estimator, &frames, first).and_then(|field| fused(&mut self.fusion, plan, field));
         if field.is_err() {
             self.frames.pop_back();
             self.pushed -= 1;
         }
         field.map(Some)
     }
+}
+
+/// The field with what the fields before it tell, where that is wanted.
+fn fused<T: SimdReal>(
+    fusion: &mut Option<RecursiveFusion<T>>,
+    plan: &Plan,
+    mut field: FlowField<T>,
+) -> Result<FlowField<T>> {
+    if let Some(options) = plan.recursive {
+        let fusion = match fusion {
+            Some(fusion) => fusion,
+            empty => empty.insert(RecursiveFusion::new(&plan.estimator, options)?),
+        };
+        fusion.fuse(&mut field)?;
+        field.systematic = None;
+    }
+    Ok(field)
 }
 
 impl<T: Real> Drop for Ring<T> {
@@ -110,6 +126,7 @@ fn estimate<T: SimdReal>(estimator: &Estimator, frames: &[&Frame<T>], first_inde
         height,
         motion,
         covariance: common.covariance.then(covariance),
+        systematic: None,
         status: status.unwrap_or_else(|| vec![Status::Border; n]),
         residual: None,
         rank: None,
@@ -164,5 +181,5 @@ fn advance<T: SimdReal + Stored>(
     frame: AnyFrame,
 ) -> PyResult<Option<FlowField<T>>> {
     options::check_dtype(argument, ring.dtype, &frame)?;
-    Ok(py.detach(|| ring.push(&plan.estimator, &plan.preprocess, frame))?)
+    Ok(py.detach(|| ring.push(plan, frame))?)
 }

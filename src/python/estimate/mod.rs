@@ -143,6 +143,13 @@ macro_rules! define_estimate {
         ///     Whether to report residual, rank and condition number.
         /// noise : float, grey levels
         ///     Standard deviation of the pixel noise for the covariance; default from the frames.
+        /// temporal : "none" or "recursive"
+        ///     "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture ("windowed", "coarse_to_fine", "instantaneous"): an information filter on
+        ///     (u, v, u_x, v_x, u_y, v_y) at each fixed pixel, `P_k^-1 = f P_{k-1}^-1 + C_k^-1`, `x_k = x_{k-1} + P_k C_k^-1 (m_k - x_{k-1})` with the estimate m_k of each time, its covariance C_k and f = `forgetting`.
+        ///     It starts with the first estimate; noise falls with the number of frames, systematic error does not, and the covariance says both. Where the motion changes a pixel starts anew (normalised
+        ///     innovation squared above 27.86) or shortens its memory. Times without an estimate get the prediction and status PREDICTED. Needs the covariance; default "none".
+        /// forgetting : float, no unit
+        ///     Factor f of "recursive", above 0 and at most 1: the memory is 1 / (1 - f) frames; default 0.95.
         /// precision : "float32" or "float64"
         ///     Default: that of the frames.
         /// threads : int

@@ -3,12 +3,14 @@
 use super::arguments::{Arguments, Plan, estimator_options};
 use super::memory::{AnyField, Memory, Ring};
 use crate::error::Error;
-use crate::math::Real;
 use crate::python::arrays;
 use crate::python::field::FlowField;
 use crate::python::keywords::{constructor, with_common};
 use crate::python::options::{self, Integer, Object, Region};
+use crate::simd::SimdReal;
+use crate::temporal::RecursiveFusion;
 use crate::types::{AnyFrame, Frame};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::VecDeque;
@@ -16,7 +18,7 @@ use std::collections::VecDeque;
 /// Flow from a stream: frames are pushed one by one, memory stays bounded.
 ///
 /// The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-/// (two with time_scheme="pair"). Pickles in mid-stream.
+/// (two with time_scheme="pair"). With temporal="recursive" each field holds what all frames so far tell. Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowEstimator {
     arguments: Arguments,
@@ -90,10 +92,13 @@ impl FlowEstimator {
     }
 }
 
-fn save<T: numpy::Element + Real>(memory: &Bound<'_, PyDict>, ring: &Ring<T>) -> PyResult<()> {
+fn save<T: numpy::Element + SimdReal>(memory: &Bound<'_, PyDict>, ring: &Ring<T>) -> PyResult<()> {
     let py = memory.py();
     let frames = ring.frames.iter().map(|frame| arrays::from_frame(py, frame.clone()));
     memory.set_item("frames", PyList::new(py, frames.collect::<PyResult<Vec<_>>>()?)?)?;
+    if let Some((sites, state)) = ring.fusion.as_ref().map(RecursiveFusion::state) {
+        memory.set_item("fused", (sites, arrays::owned(py, &[state.len()], state.to_vec())?))?;
+    }
     memory.set_item("pushed", ring.pushed)?;
     memory.set_item("dtype", ring.dtype)
 }
@@ -115,10 +120,25 @@ pub fn restore_estimator(py: Python<'_>, options: Arguments, memory: &Bound<'_, 
             other => single.push_back(other.to_real()),
         }
     }
+    let fused = memory.get_item("fused")?;
     estimator.memory = if double.is_empty() {
-        Memory::Single(Ring { frames: single, pushed, dtype })
+        let fusion = restore_fusion(&estimator.plan, fused)?;
+        Memory::Single(Ring { frames: single, pushed, dtype, fusion })
     } else {
-        Memory::Double(Ring { frames: double, pushed, dtype })
+        let fusion = restore_fusion(&estimator.plan, fused)?;
+        Memory::Double(Ring { frames: double, pushed, dtype, fusion })
     };
     Ok(estimator)
+}
+
+/// What the estimates before told, where they are fused.
+fn restore_fusion<T: numpy::Element + SimdReal>(
+    plan: &Plan,
+    saved: Option<Bound<'_, PyAny>>,
+) -> PyResult<Option<RecursiveFusion<T>>> {
+    let (Some(options), Some(saved)) = (plan.recursive, saved) else { return Ok(None) };
+    let (sites, state): (usize, PyReadonlyArray1<'_, T>) = saved.extract()?;
+    let mut fusion = RecursiveFusion::new(&plan.estimator, options)?;
+    fusion.restore(sites, state.as_slice()?.to_vec())?;
+    Ok(Some(fusion))
 }

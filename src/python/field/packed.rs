@@ -88,6 +88,7 @@ impl<T: Real> Packed<T> {
             height: self.height,
             motion: part(&self.motion),
             covariance: self.covariance.as_deref().map(part),
+            systematic: None,
             status: self.status[sites.clone()]
                 .iter()
                 .map(|&code| Status::from_code(code).unwrap_or_default())
