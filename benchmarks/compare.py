@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow filter accuracy controlled` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow filter accuracy controlled coverage` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "filter", "controlled", "accuracy")
+SECTIONS = ("flow", "filter", "controlled", "coverage", "accuracy")
 
 
 def main() -> None:
@@ -70,6 +70,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import controlled
 
         return {"Accuracy on scenes with exact truth": controlled.default_table(quick)}
+    if name == "coverage":
+        import coverage
+
+        return coverage.sections(quick, data)
     if data is None:
         return {}
     import accuracy

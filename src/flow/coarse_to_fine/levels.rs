@@ -1,5 +1,6 @@
 //! The frames on every level of the pyramid, ready to be warped.
 
+use super::data::View;
 use super::options::LEAST_SIDE;
 use super::run::Range;
 use crate::image::{Spline, fill_holes, halve, halve_mask};
@@ -25,6 +26,16 @@ impl<T: SimdReal> PyramidLevel<T> {
             size: frames[0].size(),
             splines: frames.iter().map(|frame| Spline::new(simd, frame)).collect(),
             usable: masks.iter().map(|mask| mask.as_ref().map(|m| shrunk(m, REACH))).collect(),
+        }
+    }
+
+    /// The two or three frames as the data term sees them.
+    pub fn views(&self) -> Vec<View<'_, T>> {
+        let usable = |k: usize| self.usable[k].as_ref();
+        match self.splines.as_slice() {
+            [a, b] => View::pair([a, b], [usable(0), usable(1)]).to_vec(),
+            [a, b, c, ..] => View::triple([a, b, c], [usable(0), usable(1), usable(2)]).to_vec(),
+            _ => Vec::new(),
         }
     }
 }

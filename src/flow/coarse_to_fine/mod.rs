@@ -12,6 +12,7 @@ mod covariance;
 mod data;
 mod grid;
 mod levels;
+mod locking;
 mod options;
 mod output;
 mod reference;

@@ -1,6 +1,6 @@
 //! From the sites' motion to the field that was asked for.
 
-use super::covariance::covariance;
+use super::covariance::{Spread, covariance};
 use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
 use super::reference::at_first_frame;
@@ -36,7 +36,7 @@ pub(super) fn fill<T: SimdReal>(
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
-        covariance: field.covariance.is_some().then(|| covariance(common.level(), estimate, noise)),
+        covariance: field.covariance.is_some().then(|| covariance(estimate, noise, frames.len() == 2)),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
@@ -60,34 +60,28 @@ struct Writer<'a, T: Clone> {
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
     observable: bool,
-    covariance: Option<Planes<T>>,
+    covariance: Option<Spread<T>>,
 }
 
 impl<T: SimdReal> Writer<'_, T> {
     fn points(&self, points: &[(usize, usize)], band: &mut FieldBand<'_, T>) {
         for (at, &(x, y)) in points[band.sites.clone()].iter().enumerate() {
             let motion = motion_at(self.motion, STEP, x as f64, y as f64);
-            self.put(
-                band,
-                at,
-                (x, y),
-                |k| T::from_f64(motion[k]),
-                |planes, k| {
-                    let site = |at: usize, count: usize| ((at as f64 / STEP) as usize).min(count - 1);
-                    planes.at(k, site(x, planes.width), site(y, planes.height))
-                },
-            );
+            self.put(band, at, (x, y), |k| T::from_f64(motion[k]), |spread, k| spread.at(k, (x, y)));
         }
     }
 
     fn rows(&self, sites: &Sites, width: usize, band: &mut FieldBand<'_, T>) {
         let mut reader = RowReader::new(self.reference.width());
-        let mut spread = RowReader::new(self.reference.width());
+        let frame_width = self.reference.width();
+        let (mut places, mut entries) = (Vec::new(), vec![T::from_f64(0.0); ENTRIES * frame_width]);
         for first in band.sites.clone().step_by(width) {
             let row = first / width;
             reader.read_motion(self.motion, sites.pixel(0, row).1);
-            if let Some(planes) = &self.covariance {
-                spread.read_values(planes, sites.pixel(0, row).1);
+            if let Some(spread) = &self.covariance {
+                for (k, line) in entries.chunks_exact_mut(frame_width).enumerate() {
+                    spread.row(k, sites.pixel(0, row).1, &mut places, line);
+                }
             }
             for column in 0..width {
                 let (x, y) = sites.pixel(column, row);
@@ -96,7 +90,7 @@ impl<T: SimdReal> Writer<'_, T> {
                     first + column - band.sites.start,
                     (x, y),
                     |k| reader.plane(k)[x],
-                    |_, k| spread.plane(k)[x],
+                    |_, k| entries[k * frame_width + x],
                 );
             }
         }
@@ -108,7 +102,7 @@ impl<T: SimdReal> Writer<'_, T> {
         at: usize,
         pixel: (usize, usize),
         value: impl Fn(usize) -> T,
-        covariance: impl Fn(&Planes<T>, usize) -> T,
+        covariance: impl Fn(&Spread<T>, usize) -> T,
     ) {
         let status = self.status(pixel);
         band.status[at] = status;

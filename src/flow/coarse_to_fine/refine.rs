@@ -13,6 +13,7 @@
 //! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before taking sites is part of the window, since variances of Gaussians add.
 
 mod choose;
+mod evidence;
 mod field;
 mod fit;
 mod grow;
@@ -23,6 +24,7 @@ mod region;
 use super::grid::{LEFT, Planes};
 use crate::simd::{Level, SimdReal};
 use choose::Choice;
+pub(super) use evidence::{Evidence, SPACING};
 use field::Field;
 pub(super) use field::Space;
 use fit::{FIT, FLOW};
@@ -69,22 +71,23 @@ impl Default for Options {
 }
 
 /// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the last plane is the noise density `a`, px^4.
+#[cfg(test)]
 pub(super) const SIGMA: usize = 6;
 
 /// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the last data term: planes 0, 6, 12 the
 /// windows' means of Puu, Puv, Pvv (grey^2/px^2) and 24 that of the residual energy (grey^2).
 ///
 /// Eight planes: the motion, [`SIGMA`], the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
-/// Bit-identical for any number of threads.
+/// Bit-identical for any number of threads. With them comes what the choice of windows rested on, if there was one.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
     space: &mut Space<T>,
     options: &Options,
     motion: &Planes<T>,
     data: &Planes<T>,
-) -> Planes<T> {
+) -> (Planes<T>, Option<Evidence<T>>) {
     if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
-        return Planes::new(motion.width, motion.height, mix::RESULT);
+        return (Planes::new(motion.width, motion.height, mix::RESULT), None);
     }
     let space = &*space;
     let ladder = Ladder::new(options.ladder, PITCH);
@@ -124,9 +127,7 @@ pub(super) fn refine<T: SimdReal>(
     let out = mix::finish(simd, space, &mix::Final { plain, edges, options, base, pitch: PITCH });
     space.keep(coarser);
     space.keep(grown.into_iter().flatten().chain(fitted.fits).chain(fitted.samples).chain(grids));
-    space.reclaim(choice.planes);
-    space.reclaim(means);
-    out
+    (out, Some(Evidence::new(means, choice, options.ladder)))
 }
 
 /// The windows of the grid `octave`, to complete what coarser grids have.

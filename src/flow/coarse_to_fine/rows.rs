@@ -50,15 +50,6 @@ impl<T: SimdReal> RowReader<T> {
         }
     }
 
-    /// Reads row `y` of planes that vary linearly between the sites.
-    pub fn read_values(&mut self, planes: &Planes<T>, y: usize) {
-        self.read(planes, y);
-        let n = planes.width;
-        for k in 0..planes.count {
-            widen(&self.sites[k * n..(k + 1) * n], None, &mut self.pixels[k * self.width..(k + 1) * self.width]);
-        }
-    }
-
     /// The means of the rows of sites around `y`.
     fn read(&mut self, planes: &Planes<T>, y: usize) {
         let zero = T::from_f64(0.0);
@@ -115,17 +106,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn values_are_linear_between_sites_and_constant_beyond() {
-        let mut planes = Planes::<f32>::new(2, 2, 1);
-        planes.line_mut(0, 0).copy_from_slice(&[1.0, 3.0]);
-        planes.line_mut(0, 1).copy_from_slice(&[5.0, 7.0]);
-        let mut reader = RowReader::new(4);
-        reader.read_values(&planes, 1);
-        assert_eq!(reader.plane(0), [3.0, 4.0, 5.0, 5.0]);
-        reader.read_values(&planes, 3);
-        assert_eq!(reader.plane(0), [5.0, 6.0, 7.0, 7.0]);
     }
 }

@@ -1,12 +1,13 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
 use super::couple::{CoupleScratch, Coupling, couple};
-use super::data::{DataOptions, DataTerm, MOTION, View};
+use super::data::{DataOptions, DataTerm, MOTION};
 use super::grid::Planes;
 use super::levels::{PyramidLevel, pyramid};
+use super::locking::Locking;
 use super::options::{CoarseToFineOptions, Effort};
 use super::output;
-use super::refine::{Options as Refinement, Space, refine};
+use super::refine::{Evidence, Options as Refinement, Space, refine};
 use super::resample::{finer, rederive};
 use crate::error::Result;
 use crate::flow::options::Common;
@@ -47,8 +48,11 @@ impl CoarseToFine {
             let range = Range::of(frames[0]);
             let levels = pyramid(common.level(), frames, range, common.mask.as_ref(), self.options.levels);
             let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range).run(&levels);
-            estimate.motion =
+            let (motion, evidence) =
                 refine(common.level(), &mut Space::default(), &Refinement::default(), &estimate.motion, &estimate.data);
+            (estimate.motion, estimate.evidence) = (motion, evidence);
+            estimate.locking = Locking::measure(common.level(), &levels[0], &estimate.motion, estimate.scale);
+            estimate.locking.correct(common.level(), &mut estimate.motion);
             output::fill(&estimate, frames, common, field);
         });
     }
@@ -63,6 +67,12 @@ pub(super) struct Estimate<T> {
     pub data: Planes<T>,
     /// How brightness was scaled.
     pub range: Range,
+    /// Standard deviation of the residual.
+    pub scale: Option<T>,
+    /// What the windows were chosen by; `None` before.
+    pub evidence: Option<Evidence<T>>,
+    /// How the motion was drawn before it was corrected.
+    pub locking: Locking,
 }
 
 /// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is then the same for frames of every range.
@@ -156,23 +166,19 @@ impl<T: SimdReal> Descent<T> {
             }));
         }
         let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
-        Estimate { motion, data: self.data, range: self.range }
+        Estimate {
+            motion,
+            data: self.data,
+            range: self.range,
+            scale: self.scale,
+            evidence: None,
+            locking: Locking::default(),
+        }
     }
 
     /// One linearisation about `motion`, and the motion that follows from it.
     fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, mut motion: Planes<T>) -> Planes<T> {
-        let usable = |k: usize| level.usable[k].as_ref();
-        let residuals = match level.splines.as_slice() {
-            [a, b] => {
-                let views = View::pair([a, b], [usable(0), usable(1)]);
-                self.term.linearise(level.size, &views, &motion, self.scale, &mut self.data)
-            }
-            [a, b, c, ..] => {
-                let views = View::triple([a, b, c], [usable(0), usable(1), usable(2)]);
-                self.term.linearise(level.size, &views, &motion, self.scale, &mut self.data)
-            }
-            _ => Vec::new(),
-        };
+        let residuals = self.term.linearise(level.size, &level.views(), &motion, self.scale, &mut self.data);
         self.scale = self.spread(residuals);
         let floor = T::from_f64((LEAST_NOISE * self.range.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
         couple(self.simd, &self.data, &mut motion, coupling, floor, &mut self.scratch);

@@ -45,6 +45,7 @@ impl<T: SimdReal> Space<T> {
     }
 
     /// Takes planes back.
+    #[cfg(test)]
     pub fn reclaim(&self, planes: Planes<T>) {
         self.free.borrow_mut().push(planes.into_data());
     }

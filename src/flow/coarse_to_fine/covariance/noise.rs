@@ -1,0 +1,118 @@
+//! What windows leave of the noise of the flow.
+//!
+//! White noise of density `D` (variance times area) leaves in twiced Gaussian means and slopes of standard deviation `s` (transfer function `H = 2 G - G^2`) the
+//! covariances
+//!
+//! `C(u, v) = D integral H^2 / (2 pi)^2 = 11/6 D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2 H^2 / (2 pi)^2 = 89/36 D / (8 pi s^4)`.
+//!
+//! Its shape is that of `e P^-1`, `P` being the information and `e` the residual energy around a place. Its size is not: errors of brightness go into two orders of
+//! derivatives, texture has its own spectrum, and coupling takes away the finest part. So the size is taken from the flow: between two windows that were both accepted the
+//! flow changes by noise, over that of white noise of unit density. The geometric mean of this excess over the frame is well determined, a single place's is not.
+//!
+//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to eight times the variance, slopes across it twelve times. These are
+//! the factors of white noise drawn and smoothed, as functions of the distance over the window.
+
+use super::super::data::VALID;
+use super::super::grid::Planes;
+use super::super::refine::{Evidence, PITCH, SPACING};
+use crate::simd::SimdReal;
+use std::f64::consts::PI;
+
+/// Bounds of the excess: beyond them the flow tells nothing about noise.
+const EXCESS: [f64; 2] = [0.5, 50.0];
+/// Least weight of wider windows at a place that counts.
+const COUNTS: f64 = 0.1;
+
+/// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
+pub(super) struct Left {
+    pub density: [f64; 3],
+    pub flow: f64,
+    pub slopes: [f64; 2],
+}
+
+/// Shares of one window, and of the frame's edges.
+struct Edges {
+    /// For each window and each place along an axis: the factor of means and of slopes along the edge, and that of slopes across it.
+    factors: Vec<Vec<[f64; 2]>>,
+}
+
+impl Edges {
+    /// For an axis of `places` and `sites`.
+    fn new(sigmas: &[f64], places: usize, sites: usize) -> Self {
+        let last = PITCH * (sites - 1) as f64;
+        let factor = |sigma: f64, n: usize| {
+            let at = (PITCH * (SPACING * n) as f64).min(last);
+            let t = at.min(last - at) / sigma;
+            [1.0 + 7.0 * (-2.2 * t - 1.2 * t * t).exp(), 1.0 + 11.4 * (-(t / 0.82).powi(2)).exp()]
+        };
+        Self { factors: sigmas.iter().map(|&s| (0..places).map(|n| factor(s, n)).collect()).collect() }
+    }
+}
+
+/// The noise of one estimate.
+pub(super) struct Noise<'a, T> {
+    evidence: &'a Evidence<T>,
+    energy: Option<f64>,
+    excess: f64,
+    columns: Edges,
+    rows: Edges,
+}
+
+impl<'a, T: SimdReal> Noise<'a, T> {
+    /// `energy`: known, or read from the residuals.
+    pub fn new(evidence: &'a Evidence<T>, data: &Planes<T>, energy: Option<f64>) -> Self {
+        let (width, height) = evidence.size();
+        Self {
+            evidence,
+            energy,
+            excess: excess(evidence, data),
+            columns: Edges::new(evidence.sigmas, width, data.width),
+            rows: Edges::new(evidence.sigmas, height, data.height),
+        }
+    }
+
+    /// What is left at a place.
+    pub fn at(&self, x: usize, y: usize) -> Left {
+        let [a, b, c] = informed(self.evidence.information(x, y));
+        let energy = self.energy.unwrap_or_else(|| self.evidence.energy(x, y));
+        let scale = self.excess * energy / (a * c - b * b);
+        let mut left = Left { density: [c * scale, -b * scale, a * scale], flow: 0.0, slopes: [0.0; 2] };
+        for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
+            let weight = self.evidence.weight(l, x, y);
+            let (flow, slope) = (11.0 / 6.0 / (4.0 * PI * sigma.powi(2)), 89.0 / 36.0 / (8.0 * PI * sigma.powi(4)));
+            let ([mean_x, across_x], [mean_y, across_y]) = (self.columns.factors[l][x], self.rows.factors[l][y]);
+            left.flow += weight * flow * mean_x * mean_y;
+            left.slopes[0] += weight * slope * across_x * mean_y;
+            left.slopes[1] += weight * slope * mean_x * across_y;
+        }
+        left
+    }
+}
+
+/// Information that is positive definite.
+fn informed([a, b, c]: [f64; 3]) -> [f64; 3] {
+    let least = 1e-6 + 1e-4 * (a + c);
+    [a + least, b, c + least]
+}
+
+/// Geometric mean over the places with data: the density that the accepted changes show over that of the residuals.
+fn excess<T: SimdReal>(evidence: &Evidence<T>, data: &Planes<T>) -> f64 {
+    let (width, height) = evidence.size();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let (mut weights, mut changes) = (0.0, 0.0);
+        for l in 1..evidence.sigmas.len() {
+            let weight = evidence.weight(l, x, y);
+            weights += weight;
+            changes += weight * evidence.change(l - 1, x, y);
+        }
+        let [a, b, c] = informed(evidence.information(x, y));
+        let density = evidence.energy(x, y) * (a + c) / (a * c - b * b);
+        let valid = data.at(VALID, (SPACING * x).min(data.width - 1), (SPACING * y).min(data.height - 1)).to_f64();
+        if valid > 0.5 && weights > COUNTS && density > 0.0 && changes > 0.0 {
+            sum += (changes / (weights * density)).ln();
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { (sum / count).exp().clamp(EXCESS[0], EXCESS[1]) } else { 1.0 }
+}
