@@ -173,7 +173,9 @@ fn shared_frames_correlate_errors_negatively() {
         for time in 0..COUNT {
             for site in 0..runs[0][0].len() {
                 let mean = runs.iter().map(|run| run[time][site]).sum::<Vector6<f64>>() / REALISATIONS as f64;
-                runs.iter_mut().for_each(|run| run[time][site] -= mean);
+                for run in &mut runs {
+                    run[time][site] -= mean;
+                }
             }
         }
         let correlation = |lag: usize| {

@@ -63,52 +63,70 @@ impl<T: SimdReal> Kernel<T> for Step<'_, T> {
 impl<T: SimdReal> Step<'_, T> {
     #[inline(always)]
     fn lanes<V: Lanes<Scalar = T>>(&mut self, c: usize) {
-        // Closures that are not inlined would lose the lanes' instructions: hence functions for what is called often.
+        // Loops and functions, not closures: those that are not inlined lose the lanes' instructions.
         let (state, input) = (&*self.state, self.input);
         let (zero, one, half) = (V::zero(), V::constant(1.0), V::constant(0.5));
-        let x: [V; 6] = std::array::from_fn(|k| load(state, k, c));
-        let m: [V; 6] = std::array::from_fn(|k| load(input, k, c));
-        let own: [V; ENTRIES] = std::array::from_fn(|k| load(input, 6 + k, c));
-        let own_bias: [V; ENTRIES] = std::array::from_fn(|k| load(input, 6 + ENTRIES + k, c));
-        let (left, ratio) = (load::<V>(state, SHARE_LEFT, c), load::<V>(state, RATIO, c));
-        let bias: [V; ENTRIES] = std::array::from_fn(|k| load(state, B + k, c));
+        let (x, m) = (rows::<V, 6>(state, 0, c), rows::<V, 6>(input, 0, c));
+        let own = rows::<V, ENTRIES>(input, 6, c);
+        let own_bias = rows::<V, ENTRIES>(input, 6 + ENTRIES, c);
+        let [left, ratio] = rows::<V, 2>(state, SHARE_LEFT, c);
+        let bias = rows::<V, ENTRIES>(state, B, c);
         // Prediction: the motion stays, its information is forgotten.
         let grown = V::constant(1.0 / self.forgetting);
-        let prior: [V; ENTRIES] = std::array::from_fn(|k| load::<V>(state, P + k, c) * grown);
-        let told: [V; ENTRIES] = std::array::from_fn(|k| prior[k].mul_add(ratio, bias[k] * (one - left)));
+        let mut prior = rows::<V, ENTRIES>(state, P, c);
+        let (mut told, mut both) = (prior, prior);
+        for k in 0..ENTRIES {
+            prior[k] = prior[k] * grown;
+            told[k] = prior[k].mul_add(ratio, bias[k] * (one - left));
+            both[k] = told[k] + own[k];
+        }
         // Innovation tests.
-        let innovation: [V; 6] = std::array::from_fn(|k| m[k] - x[k]);
-        let spread = factor(&std::array::from_fn::<V, ENTRIES, _>(|k| told[k] + own[k]));
-        let mean: [V; 6] = std::array::from_fn(|k| {
-            load::<V>(state, MEAN_INNOVATION + k, c).mul_add(V::constant(MEAN), innovation[k] * V::constant(1.0 - MEAN))
-        });
+        let mut innovation = m;
+        let mut mean = rows::<V, 6>(state, MEAN_INNOVATION, c);
+        for k in 0..6 {
+            innovation[k] = m[k] - x[k];
+            mean[k] = mean[k].mul_add(V::constant(MEAN), innovation[k] * V::constant(1.0 - MEAN));
+        }
+        let spread = factor(&both);
         let single = dot(&innovation, &spread.solve(&innovation));
         let lasting = dot(&mean, &spread.solve(&mean)) * V::constant((1.0 + MEAN) / (1.0 - MEAN));
         let fade = (V::constant(FADE) / lasting).min(one);
         let fade = (fade * fade).max(V::constant(LEAST_FADE));
         // Update, in the form that keeps covariances definite (Joseph's).
-        let prior_left: [V; ENTRIES] = std::array::from_fn(|k| prior[k] / fade);
-        let both = factor(&std::array::from_fn::<V, ENTRIES, _>(|k| prior_left[k] + own[k]));
-        let gain: [[V; 6]; 6] = std::array::from_fn(|i| both.solve(&std::array::from_fn(|j| entry(&prior_left, i, j))));
-        let keep: [[V; 6]; 6] =
-            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { one - gain[i][j] } else { -gain[i][j] }));
-        let trace = (0..6).fold(zero, |sum, i| sum + gain[i][i]);
+        let mut prior_left = prior;
+        for k in 0..ENTRIES {
+            prior_left[k] = prior[k] / fade;
+            both[k] = prior_left[k] + own[k];
+        }
+        let spread = factor(&both);
+        let mut gain = [[zero; 6]; 6];
+        let mut keep = gain;
+        let mut trace = zero;
+        for i in 0..6 {
+            let mut row = x;
+            for j in 0..6 {
+                row[j] = entry(&prior_left, i, j);
+            }
+            gain[i] = spread.solve(&row);
+            for j in 0..6 {
+                keep[i][j] = if i == j { one - gain[i][j] } else { -gain[i][j] };
+            }
+            trace = trace + gain[i][i];
+        }
         let g = (trace * V::constant(1.0 / 6.0)).max(V::constant(1e-6)).min(one);
         let rest = one - g;
         let (kept, added) = (congruence(&keep, &prior_left), congruence(&gain, &own));
         let new_left = (rest * rest).mul_add(left, g * g);
         let new_ratio = new_left / g;
-        let beyond_chance = (one - V::constant(LAG) / lasting).max(zero);
-        let lag: [V; 6] = std::array::from_fn(|k| mean[k] * rest * beyond_chance.sqrt());
+        let beyond_chance = (one - V::constant(LAG) / lasting).max(zero).sqrt() * rest;
         // Which of the three it is: no estimate, a start, an update.
-        let present = half.lt(load::<V>(input, PRESENT, c));
+        let present = half.lt(rows::<V, 1>(input, PRESENT, c)[0]);
         let goes_on = V::select(single.lt(V::constant(RESTART)), V::select(zero.lt(ratio), one, zero), zero);
         let goes_on = half.lt(goes_on);
         let which = Which { present, goes_on };
         let (state, output) = (&mut *self.state, &mut *self.output);
         for k in 0..6 {
-            let moved = (0..6).fold(x[k], |sum, j| gain[k][j].mul_add(innovation[j], sum));
-            let motion = which.choose(x[k], m[k], moved);
+            let motion = which.choose(x[k], m[k], x[k] + dot(&gain[k], &innovation));
             motion.store(&mut state[k * BLOCK + c..]);
             motion.store(&mut output[k * BLOCK + c..]);
             let last = V::load(&state[(MEAN_INNOVATION + k) * BLOCK + c..]);
@@ -121,7 +139,8 @@ impl<T: SimdReal> Step<'_, T> {
                 let k = upper(i, j);
                 let posterior = kept[k] + added[k];
                 let floor = rest.mul_add(bias[k], g * own_bias[k]);
-                let whole = posterior.mul_add(new_ratio, floor * (one - new_left)) + lag[i] * lag[j];
+                let whole = posterior.mul_add(new_ratio, floor * (one - new_left))
+                    + mean[i] * mean[j] * (beyond_chance * beyond_chance);
                 which.choose(prior[k], own[k], posterior).store(&mut state[(P + k) * BLOCK + c..]);
                 which.choose(bias[k], own_bias[k], floor).store(&mut state[(B + k) * BLOCK + c..]);
                 which.choose(told[k], own[k], whole).store(&mut output[(6 + k) * BLOCK + c..]);
@@ -132,13 +151,21 @@ impl<T: SimdReal> Step<'_, T> {
 
 #[inline(always)]
 fn dot<V: Lanes>(a: &[V; 6], b: &[V; 6]) -> V {
-    (0..6).fold(V::zero(), |sum, k| a[k].mul_add(b[k], sum))
+    let mut sum = a[0] * b[0];
+    for k in 1..6 {
+        sum = a[k].mul_add(b[k], sum);
+    }
+    sum
 }
 
-/// Row `row` of a block, from column `c` on.
+/// `N` rows of a block from row `first` on, at column `c`.
 #[inline(always)]
-fn load<V: Lanes>(block: &[V::Scalar], row: usize, c: usize) -> V {
-    V::load(&block[row * BLOCK + c..])
+fn rows<V: Lanes, const N: usize>(block: &[V::Scalar], first: usize, c: usize) -> [V; N] {
+    let mut rows = [V::zero(); N];
+    for (k, row) in rows.iter_mut().enumerate() {
+        *row = V::load(&block[(first + k) * BLOCK + c..]);
+    }
+    rows
 }
 
 /// Which of three a site goes through: no estimate, a start, an update.
@@ -163,9 +190,14 @@ fn entry<V: Lanes>(list: &[V; ENTRIES], i: usize, j: usize) -> V {
 /// The upper triangle of `A C A^T`.
 #[inline(always)]
 fn congruence<V: Lanes>(a: &[[V; 6]; 6], c: &[V; ENTRIES]) -> [V; ENTRIES] {
-    let half: [[V; 6]; 6] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..6).fold(V::zero(), |sum, k| a[i][k].mul_add(entry(c, k, j), sum)))
-    });
+    let mut half = [[V::zero(); 6]; 6];
+    for i in 0..6 {
+        for j in 0..6 {
+            for k in 0..6 {
+                half[i][j] = a[i][k].mul_add(entry(c, k, j), half[i][j]);
+            }
+        }
+    }
     let mut out = [V::zero(); ENTRIES];
     for i in 0..6 {
         for j in i..6 {
