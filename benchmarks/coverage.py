@@ -66,19 +66,19 @@ MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
 }
 CARRIERS: dict[str, tuple[str, dict[str, float]]] = {"noise": ("noise", {}), "speckle": ("speckle", {}), "particles": ("particles", {})}
 OTHER_MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
-    "slide": affine(0.43, -0.27),
-    "spin": affine(-1.6, 5.2, 0.004, -0.035, 0.035, 0.004),
-    "quick": affine(-9.4, 2.1, -0.015, 0.01, 0.02, -0.02),
-    "vortex": ("vortex", {"circulation": 700.0, "core": 20.0}),
-    "waves": ("waves", {"speed": 3.0, "wavelength": 160.0}),
-    "turbulence": ("turbulence", {"speed": 1.4, "longest": 150.0}),
+    "slide": affine(0.31, 0.62),
+    "spin": affine(2.7, -4.4, -0.004, 0.03, -0.03, -0.004),
+    "quick": affine(6.3, -5.6, 0.02, 0.01, -0.015, 0.015),
+    "vortex": ("vortex", {"circulation": 550.0, "core": 30.0}),
+    "waves": ("waves", {"speed": 2.2, "wavelength": 110.0}),
+    "turbulence": ("turbulence", {"speed": 1.6, "longest": 170.0}),
 }
 OTHER_CARRIERS: dict[str, tuple[str, dict[str, float]]] = {
-    "noise 1.6 px": ("noise", {"sigma": 1.6, "std": 30.0}),
-    "noise 3 px": ("noise", {"sigma": 3.0, "std": 45.0}),
-    "speckle 3.5 px": ("speckle", {"radius": 3.5}),
-    "particles 3.4 px": ("particles", {"diameter": 3.4, "density": 0.08}),
-    "particles 2.3 px": ("particles", {"diameter": 2.3, "density": 0.035}),
+    "noise 1.7 px": ("noise", {"sigma": 1.7, "std": 30.0}),
+    "noise 2.6 px": ("noise", {"sigma": 2.6, "std": 45.0}),
+    "speckle 3 px": ("speckle", {"radius": 3.0}),
+    "particles 3.2 px": ("particles", {"diameter": 3.2, "density": 0.06}),
+    "particles 2.5 px": ("particles", {"diameter": 2.5, "density": 0.04}),
 }
 
 

@@ -2,10 +2,11 @@
 //!
 //! A pyramid of the frames is walked from its coarsest level. On each level the motion at every second pixel is improved a few times: the frames are warped by it towards the middle of their
 //! times (`data`: rows 1 to 3 of WO2010/098160, (21), transported, over a small window), and neighbouring sites are bound together, robustly (`couple`). On the finest level
-//! the windows that the motion may be averaged over are chosen site by site (`refine`), and its covariance follows from them (`covariance`). `docs/theory.md` tells why.
+//! the windows that the motion may be averaged over are chosen site by site (`refine`), the pull of undersampled texture is taken out (`locking`), and the covariance follows from all this (`covariance`). `docs/theory.md` tells why.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every pixel with data gets an estimate; what is untextured or leaves the frame is filled from its surroundings.
-//! Fine random texture that moves by more than its own grain on every level of the pyramid may not be found. The covariance is not calibrated yet.
+//! Fine random texture that moves by more than its own grain on every level of the pyramid may not be found. The covariance
+//! does not know of motions that were not found, nor of what happens at motion boundaries.
 
 mod couple;
 mod covariance;

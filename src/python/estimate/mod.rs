@@ -94,7 +94,7 @@ macro_rules! define_estimate {
         /// method : "windowed", "coarse_to_fine", "instantaneous", "lucas_kanade" or "horn_schunck"
         ///     "windowed": least squares of the transported equations in a Gaussian window, for motions of a pixel or two. "coarse_to_fine": the same equations with
         ///     a pyramid, warping and robust coupling of neighbours, for motions of many pixels, edges and untextured areas;
-        ///     its covariance is not calibrated yet. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
+        ///     its covariance is calibrated away from motion boundaries (docs/theory.md). "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
         ///     nearly noise-free images. The others are baselines.
         /// preset : "fast", "balanced" or "accurate"
         ///     Cost against error of "coarse_to_fine"; default "balanced".

@@ -1,54 +1,73 @@
 //! What smoothing takes away from bent flow.
 //!
 //! Motion that is smoothed once more, twiced as the windows are, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
-//! turbulence the two correlate by .7 to .85, flow and derivatives alike. Its outer product, averaged around a place, is the covariance.
+//! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance.
+//!
+//! Twice. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so
+//! the motion loses, with the weights of the windows, to Gaussians one and a half times as wide.
 
 use super::super::grid::Planes;
-use super::super::refine::{PITCH, SPACING};
+use super::super::refine::{Evidence, PITCH, SPACING};
 use super::Entries;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
+use std::f64::consts::SQRT_2;
 
-/// Standard deviation of the Gaussian, px: about twice that of the windows that bent flow is given.
+/// Standard deviation of the first Gaussian, px: about twice that of the windows that bent flow is given.
 const SIGMA: f64 = 6.0;
+/// Standard deviations of the others, px.
+const WIDE: [f64; 3] = [8.0, 16.0, 32.0];
+/// The narrowest window that has one of its own, px.
+const NARROWEST: f64 = 3.5;
 /// Planes of the motion.
 const MOTION: usize = 6;
+/// The motion or what it loses, at one place.
+type Loss = [f64; MOTION];
 
-/// Sites and their weights that make one value of `2 G - G G`.
-type Taps = Vec<(usize, f64)>;
+/// Errors over what is lost, in the flow and in the slopes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shares {
+    /// To the first Gaussian.
+    pub fixed: [f64; 2],
+    /// To those of the windows.
+    pub chosen: [f64; 2],
+}
 
-/// The covariance at `size` places; `shares`: of the loss, in the flow and in the slopes.
-pub(super) fn bending<T: SimdReal>(motion: &Planes<T>, size: (usize, usize), shares: [f64; 2]) -> Vec<Entries> {
-    let lost = lost(motion, size);
-    let mut products: Vec<Entries> = lost
-        .iter()
-        .map(|loss| {
-            let scaled: [f64; MOTION] = std::array::from_fn(|k| loss[k] * shares[usize::from(k >= 2)]);
-            let mut out = [0.0; ENTRIES];
+/// The covariance at the places of the evidence.
+pub(super) fn bending<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>, shares: Shares) -> Vec<Entries> {
+    let size = evidence.size();
+    let mut products = vec![[0.0; ENTRIES]; size.0 * size.1];
+    for (losses, shares) in [(lost(motion, size), shares.fixed), (lost_to_windows(motion, evidence), shares.chosen)] {
+        for (out, loss) in products.iter_mut().zip(losses) {
+            let scaled: Loss = std::array::from_fn(|k| loss[k] * shares[usize::from(k >= 2)]);
             for i in 0..MOTION {
                 for j in i..MOTION {
-                    out[upper(i, j)] = scaled[i] * scaled[j];
+                    out[upper(i, j)] += scaled[i] * scaled[j];
                 }
             }
-            out
-        })
-        .collect();
+        }
+    }
     soften(&mut products, size);
     products
 }
 
-/// `(1 - G)^2` of the motion at the places.
-fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<[f64; MOTION]> {
-    let sigma = SIGMA / PITCH;
+/// The motion at a place.
+pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize)) -> Loss {
+    let (x, y) = ((SPACING * x).min(motion.width - 1), (SPACING * y).min(motion.height - 1));
+    std::array::from_fn(|k| motion.at(k, x, y).to_f64())
+}
+
+/// `(1 - G)^2` of the motion at the places, G being [`SIGMA`] px wide.
+fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
     // G and G G.
-    let kernels = [sigma, sigma * std::f64::consts::SQRT_2];
-    let along = kernels.map(|s| taps(s, width, motion.width));
-    let across = kernels.map(|s| taps(s, height, motion.height));
-    let rows: Vec<Vec<[f64; MOTION]>> = (0..height)
+    let kernels = [SIGMA / PITCH, SIGMA / PITCH * SQRT_2];
+    let along = kernels.map(|s| gaussians(s, (width, SPACING), motion.width));
+    let across = kernels.map(|s| gaussians(s, (height, SPACING), motion.height));
+    let rows: Vec<Vec<Loss>> = (0..height)
         .into_par_iter()
         .map(|y| {
-            let mut lost: Vec<[f64; MOTION]> = vec![[0.0; MOTION]; width];
+            let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
             let mut down = vec![T::from_f64(0.0); motion.width];
             for k in 0..MOTION {
                 for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
@@ -62,10 +81,6 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
                         lost[k] += factor * sum;
                     }
                 }
-                let row = motion.line(k, (SPACING * y).min(motion.height - 1));
-                for (x, lost) in lost.iter_mut().enumerate() {
-                    lost[k] += row[(SPACING * x).min(motion.width - 1)].to_f64();
-                }
             }
             lost
         })
@@ -73,15 +88,60 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     rows.concat()
 }
 
-/// A Gaussian of `sigma` sites about each place; beyond the edges values go on by reflection at the point on the edge, so that affine motion is not bent.
-fn taps(sigma: f64, places: usize, sites: usize) -> Vec<Taps> {
+/// The sum over the windows of weight times `(1 - G)^2` of the motion, G being the one of [`WIDE`] that suits the window. The motion there is smooth enough to be smoothed from place to place.
+fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>) -> Vec<Loss> {
+    let (width, height) = evidence.size();
+    let places: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
+    let whole: Vec<Loss> = places.iter().map(|&at| motion_at(motion, at)).collect();
+    let mut lost = vec![[0.0; MOTION]; whole.len()];
+    let suits = |sigma: f64| WIDE.iter().position(|wide| *wide >= 1.1 * sigma).unwrap_or(WIDE.len() - 1);
+    for (n, wide) in WIDE.iter().enumerate() {
+        let windows = evidence.sigmas.iter().enumerate();
+        let windows: Vec<usize> =
+            windows.filter(|(_, s)| **s >= NARROWEST && suits(**s) == n).map(|(l, _)| l).collect();
+        let weight = |&(x, y): &(usize, usize)| windows.iter().map(|l| evidence.weight(*l, x, y)).sum::<f64>();
+        let weights: Vec<f64> = places.iter().map(weight).collect();
+        if weights.iter().all(|w| *w < 0.01) {
+            continue;
+        }
+        let sigma = wide / (PITCH * SPACING as f64);
+        let [once, twice] = [sigma, sigma * SQRT_2].map(|s| smoothed(&whole, (width, height), s));
+        for (at, (lost, weight)) in lost.iter_mut().zip(weights).enumerate() {
+            for k in 0..MOTION {
+                lost[k] += weight * (whole[at][k] - 2.0 * once[at][k] + twice[at][k]);
+            }
+        }
+    }
+    lost
+}
+
+/// Gaussian means of `sigma` places.
+fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec<Loss> {
+    let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
+    let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {
+        let mut sum = [0.0; MOTION];
+        for &(n, weight) in taps {
+            let value = &from[first + step * n];
+            (0..MOTION).for_each(|k| sum[k] += weight * value[k]);
+        }
+        sum
+    };
+    let rows: Vec<Loss> = (0..values.len()).map(|n| mean(values, &along[n % width], n - n % width, 1)).collect();
+    (0..values.len()).map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
+}
+
+/// Sites and their weights.
+type Taps = Vec<(usize, f64)>;
+
+/// A Gaussian of `sigma` sites about each of some places, so many and so far apart; beyond the edges values go on by reflection at the point on the edge, so that affine motion is not bent.
+fn gaussians(sigma: f64, (places, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
     let radius = (3.0 * sigma).ceil() as isize;
     let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
     let total: f64 = raw.iter().sum();
     let last = sites as isize - 1;
     (0..places)
         .map(|n| {
-            let centre = ((SPACING * n) as isize).min(last);
+            let centre = ((spacing * n) as isize).min(last);
             let mut weights = vec![0.0; sites];
             for (k, w) in (-radius..=radius).zip(&raw) {
                 let (at, w) = (centre + k, w / total);
@@ -141,5 +201,14 @@ mod tests {
             let want = (1.0 - g).powi(2) * (k * PITCH * (SPACING * x) as f64).cos();
             assert!((lost[15 * size.0 + x][1] - want).abs() < 0.01);
         }
+    }
+
+    #[test]
+    fn means_from_place_to_place_leave_affine_values_alone() {
+        let size = (20, 14);
+        let value = |n: usize| [1.0 + 0.1 * (n % 20) as f64 - 0.2 * (n / 20) as f64; MOTION];
+        let values: Vec<Loss> = (0..280).map(value).collect();
+        let got = smoothed(&values, size, 2.0);
+        assert!(got.iter().zip(&values).all(|(a, b)| (a[3] - b[3]).abs() < 1e-12));
     }
 }

@@ -20,8 +20,7 @@ pub(super) fn to_first_frame<T: SimdReal>(
     (0..places.len())
         .map(|n| {
             let (x, y) = (n % size.0, n / size.0);
-            let site = ((SPACING * x).min(motion.width - 1), (SPACING * y).min(motion.height - 1));
-            let m: [f64; 6] = std::array::from_fn(|k| motion.at(k, site.0, site.1).to_f64());
+            let m = super::bending::motion_at(motion, (x, y));
             let half_way = 0.5 / (PITCH * SPACING as f64);
             let there = blend(places, size, x as f64 + half_way * m[0], y as f64 + half_way * m[1]);
             folded(&m).map_or(there, |inverse| transformed(&there, &inverse))

@@ -1,11 +1,12 @@
 //! How far the refined motion can be trusted: the covariance of `(u, v, u_x, v_x, u_y, v_y)`, at every eighth pixel and linear in between.
 //!
-//! Three errors add up, each seen in the frames themselves:
+//! Errors of several kinds add up, all seen in the frames themselves:
 //!
 //! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is read from how much the flow changes from window to window.
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
-//! * *Peak locking* ([`Locking`](super::locking::Locking)). A share of what was corrected may be left.
+//! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
+//! * *Acceleration*, a triple's only.
 //!
 //! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs and triples) and checked on others; `benchmarks/coverage.py` measures what they hold.
 
@@ -14,24 +15,24 @@ mod carry;
 mod noise;
 mod spread;
 
-use super::refine::Evidence;
+use super::locking::Locking;
 use super::run::Estimate;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.65;
+const FLOW_NOISE: f64 = 1.55;
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 1.02;
-/// Error of the flow over what smoothing once more takes away.
-const FLOW_BENDING: f64 = 0.4;
-/// The same for the slopes.
-const SLOPE_BENDING: f64 = 0.57;
+const SLOPE_NOISE: f64 = 0.55;
+/// Errors over what bent motion loses, in the flow and in the slopes.
+const BENDING: bending::Shares = bending::Shares { fixed: [0.41, 0.6], chosen: [0.25, 0.63] };
 /// Share of the corrected peak locking that is left.
-const LOCKING: f64 = 0.25;
-/// Share of its amplitude that is left whatever the motion is.
-const AMPLITUDE: f64 = 0.07;
+const LOCKING: f64 = 0.33;
+/// Share of its amplitude that is left in the flow whatever the motion is.
+const AMPLITUDE: f64 = 0.06;
+/// Share of the acceleration, px/frame^2, that a triple takes for motion.
+const ACCELERATION: f64 = 0.015;
 
 /// A covariance: its upper triangle, row by row.
 type Entries = [f64; ENTRIES];
@@ -44,12 +45,15 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Option<f64
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
     let noise = noise::Noise::new(evidence, &estimate.data, energy);
-    let mut places = bending::bending(&estimate.motion, (width, height), [FLOW_BENDING, SLOPE_BENDING]);
+    let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
-        let (x, y) = (n % width, n / width);
-        let left = noise.at(x, y);
-        add_noise(place, &left);
-        add_locking(place, estimate, evidence, (x, y));
+        let at = (n % width, n / width);
+        let motion = bending::motion_at(&estimate.motion, at);
+        add_noise(place, &noise.at(at.0, at.1));
+        add_locking(place, &motion, &estimate.locking);
+        if !carried {
+            add_acceleration(place, &motion);
+        }
     }
     if carried {
         places = carry::to_first_frame(&places, &estimate.motion, (width, height));
@@ -68,27 +72,22 @@ fn add_noise(place: &mut Entries, left: &noise::Left) {
 }
 
 /// Adds what may be left of peak locking.
-fn add_locking<T: SimdReal>(
-    place: &mut Entries,
-    estimate: &Estimate<T>,
-    evidence: &Evidence<T>,
-    (x, y): (usize, usize),
-) {
-    let (motion, locking) = (&estimate.motion, &estimate.locking);
-    let site = |n: usize, count: usize| (n * super::refine::SPACING).min(count - 1);
-    let at = |k: usize| motion.at(k, site(x, motion.width), site(y, motion.height)).to_f64();
-    // Waves of the amplitude that windows leave.
-    let lengths: f64 = evidence.sigmas.iter().enumerate().map(|(l, s)| evidence.weight(l, x, y) / (s * s)).sum();
+fn add_locking(place: &mut Entries, motion: &[f64; 6], locking: &Locking) {
     for c in 0..2 {
-        let (sine, slope) = locking.phase(at(c));
+        let (sine, slope) = locking.phase(motion[c]);
         let square = locking.amplitude[c].powi(2);
         let share = LOCKING.powi(2) * square + locking.variance[c];
-        let always = AMPLITUDE.powi(2) * square;
-        place[upper(c, c)] += share * sine * sine + always;
+        place[upper(c, c)] += share * sine * sine + AMPLITUDE.powi(2) * square;
         for k in [2 + c, 4 + c] {
-            place[upper(k, k)] += share * (slope * at(k)).powi(2) + always * lengths;
+            place[upper(k, k)] += share * (slope * motion[k]).powi(2);
         }
     }
+}
+
+/// Adds what paths that are curved, `M (u, v)` in a steady flow, do to a triple: its outer frames are warped as if the steps before and after were equal.
+fn add_acceleration(place: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) {
+    place[upper(0, 0)] += (ACCELERATION * (u_x * u + u_y * v)).powi(2);
+    place[upper(1, 1)] += (ACCELERATION * (v_x * u + v_y * v)).powi(2);
 }
 
 #[cfg(test)]
