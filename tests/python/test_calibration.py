@@ -75,7 +75,7 @@ def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames
     times = (0.0, 1.0) if frames == 2 else (-1.0, 0.0, 1.0)
     held = {name: [] for name in ("u", "v", "divergence", "curl")}
     for (motion, parameters), noise, seed in ((m, n, s) for m in MOTIONS.items() for n, s in ((1.0, 1), (3.0, 2))):
-        scene = scenes.Scene(motion, width=144, height=128, seed=seed, carrier=carrier, **parameters)
+        scene = scenes.Scene(motion, width=176, height=160, seed=seed, carrier=carrier, **parameters)
         camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(times[0], times[-1]))
