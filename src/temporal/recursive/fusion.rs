@@ -20,7 +20,6 @@ const TASK_BLOCKS: usize = 64;
 ///
 /// ```
 /// use jacoflow::flow::{Common, Estimator, Method};
-/// use jacoflow::synth::{AffineTexture, Scene};
 /// use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
 /// use jacoflow::types::Frame;
 /// # fn main() -> jacoflow::Result<()> {
