@@ -12,8 +12,8 @@ use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
 const SIZE: usize = 160;
 /// Left out along each side, px: what enters the frame has no counterpart.
 const MARGIN: usize = 24;
-/// Some 6 px with rotation, expansion and shear.
-const FAST: [f64; 6] = [4.4, -3.7, 0.02, 0.03, -0.02, 0.01];
+/// Some 7 px with rotation, expansion and shear.
+const FAST: [f64; 6] = [5.6, -4.7, 0.02, 0.03, -0.02, 0.01];
 
 fn scene(motion: [f64; 6]) -> AffineTexture {
     AffineTexture::moving((SIZE, SIZE), motion, 5).unwrap()
@@ -130,6 +130,20 @@ fn results_do_not_depend_on_threads_and_sites_are_those_of_the_whole_field() {
     let points = with(1, Sites::Points(vec![(17, 23), (150, 3)]));
     for (k, want) in one.affine(23 * SIZE + 17).to_array().into_iter().enumerate() {
         assert!((points.affine(0).to_array()[k] - want).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn memory_kept_from_other_frames_changes_no_bit() {
+    let (options, frames) = (CoarseToFineOptions::pair(), frames(&scene(FAST), 1.0, &[0.0, 1.0]));
+    let fresh = estimate(options.clone(), Common::default(), &frames);
+    let estimator = Estimator::new(Method::CoarseToFine(options), Common::default()).unwrap();
+    let other = |width, height| Frame::from_fn(width, height, |x, y| ((x * x + 3 * y) as f32 * 0.37).sin() * 1e5);
+    for (width, height) in [(SIZE, SIZE), (240, 90), (17, 301)] {
+        let (a, b) = (other(width, height), other(width, height).map(|v| -v));
+        estimator.estimate(&[&a, &b], 0).unwrap();
+        let field = estimator.estimate(&frames.iter().collect::<Vec<_>>(), 0).unwrap();
+        assert!(field == fresh, "after {width} x {height}");
     }
 }
 

@@ -25,10 +25,18 @@ pub(crate) struct Spline<T> {
     coefficients: Vec<T>,
 }
 
+impl<T> Default for Spline<T> {
+    /// That of an empty frame.
+    fn default() -> Self {
+        Self { width: 0, height: 0, stride: 0, coefficients: Vec::new() }
+    }
+}
+
 impl<T: SimdReal> Spline<T> {
     /// The spline through the samples of `frame`; identical for any number of threads.
+    #[cfg(test)]
     pub(crate) fn new(level: Level, frame: &Frame<T>) -> Self {
-        let mut spline = Self { width: 0, height: 0, stride: 0, coefficients: Vec::new() };
+        let mut spline = Self::default();
         spline.refill(level, frame);
         spline
     }

@@ -41,12 +41,14 @@ pub(super) struct Coupling {
     pub break_at: f64,
     /// How often each site is visited.
     pub sweeps: usize,
+    /// The bonds are weighed anew at every so many visits; positive.
+    pub reweigh: usize,
 }
 
 impl Default for Coupling {
-    /// 20 px^-2, 2000, 0.1 and 6 sweeps: chosen on recorded and made sequences together.
+    /// 20 px^-2, 2000, 0.1 and 6 sweeps, reweighed at every second: chosen on recorded and made sequences together.
     fn default() -> Self {
-        Self { flow: 20.0, jacobian: 2000.0, break_at: 0.1, sweeps: 6 }
+        Self { flow: 20.0, jacobian: 2000.0, break_at: 0.1, sweeps: 6, reweigh: 2 }
     }
 }
 
@@ -56,8 +58,8 @@ pub(super) struct CoupleScratch<T> {
     /// The flow at the start.
     start: Planes<T>,
     energies: Vec<T>,
-    /// 1 where a bond leads from a site to its right neighbour.
-    edges: Vec<T>,
+    /// The bonds' weights.
+    weights: Planes<T>,
     rings: Vec<wave::Ring<T>>,
 }
 
@@ -80,11 +82,8 @@ pub(super) fn couple<T: SimdReal>(
         return noise;
     }
     keep_start(motion, &mut scratch.start);
-    scratch.edges.clear();
-    scratch.edges.resize(motion.padded(), T::from_f64(0.0));
-    scratch.edges[..width - 1].fill(T::from_f64(1.0));
-    let bonds = visit::Bonds { data, noise, coupling, edges: &scratch.edges };
-    wave::sweep(level, &bonds, motion, &mut scratch.rings);
+    let bonds = visit::Bonds { data, noise, coupling };
+    wave::sweep(level, &bonds, motion, &mut scratch.weights, &mut scratch.rings);
     limit(level, motion, &scratch.start);
     noise
 }
@@ -108,9 +107,7 @@ fn typical_energy<T: SimdReal>(data: &Planes<T>, floor: T, energies: &mut Vec<T>
 /// Copies the flow to `start`, and clears what lies beside the motion's sites: lanes there compute too.
 fn keep_start<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     let (width, height) = (motion.width, motion.height);
-    if (start.width, start.height, start.count) != (width, height, 2) {
-        *start = Planes::new(width, height, 2);
-    }
+    start.reshape(width, height, 2);
     let (stride, rows, kept) = (motion.stride(), motion.row_len(), start.row_len());
     let pairs = motion.data_mut().par_chunks_mut(rows).zip(start.data_mut().par_chunks_mut(kept));
     pairs.with_min_len(16).for_each(|(row, kept)| {

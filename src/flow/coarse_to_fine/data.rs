@@ -93,18 +93,22 @@ impl Default for DataOptions {
     }
 }
 
-/// Makes data terms; keeps the working memory of its threads.
+/// The working memory of the threads that make data terms.
+#[derive(Debug, Default)]
+pub(super) struct Pool<T>(Mutex<Vec<Scratch<T>>>);
+
+/// Makes data terms.
 #[derive(Debug)]
-pub(super) struct DataTerm<T> {
+pub(super) struct DataTerm<'a, T> {
     level: Level,
     options: DataOptions,
     taps: Vec<[T; 3]>,
-    pool: Mutex<Vec<Scratch<T>>>,
+    pool: &'a Pool<T>,
 }
 
-impl<T: SimdReal> DataTerm<T> {
-    pub fn new(level: Level, options: DataOptions) -> Self {
-        Self { level, options, taps: taps(options.sigma), pool: Mutex::new(Vec::new()) }
+impl<'a, T: SimdReal> DataTerm<'a, T> {
+    pub fn new(level: Level, options: DataOptions, pool: &'a Pool<T>) -> Self {
+        Self { level, options, taps: taps(options.sigma), pool }
     }
 
     /// The [`COUNT`] planes of moments of a level of `size` pixels, in `out`; and `|R|` at every fourth usable pixel of every fourth row.
@@ -121,9 +125,7 @@ impl<T: SimdReal> DataTerm<T> {
         out: &mut Planes<T>,
     ) -> Vec<T> {
         let (width, height) = (size.0.div_ceil(2), size.1.div_ceil(2));
-        if (out.width, out.height, out.count) != (width, height, COUNT) {
-            *out = Planes::new(width, height, COUNT);
-        }
+        out.reshape(width, height, COUNT);
         if width == 0 || height == 0 {
             return Vec::new();
         }
@@ -159,6 +161,6 @@ impl<T: SimdReal> DataTerm<T> {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Scratch<T>>> {
-        self.pool.lock().unwrap_or_else(PoisonError::into_inner)
+        self.pool.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -27,16 +27,18 @@ impl<T: SimdReal> Planes<T> {
         planes
     }
 
-    /// As [`Planes::new`] in memory used before, whose content remains: for whoever writes all sites.
-    pub fn reuse(width: usize, height: usize, count: usize, data: Vec<T>) -> Self {
-        let mut planes = Self { width, height, count, data };
-        planes.data.resize(planes.row_len() * height, T::from_f64(0.0));
-        planes
+    /// Becomes planes of another size, in the same memory if that is large enough. Content: anything finite, for whoever writes all sites.
+    pub fn reshape(&mut self, width: usize, height: usize, count: usize) {
+        (self.width, self.height, self.count) = (width, height, count);
+        let len = self.row_len() * height;
+        if len > self.data.len() {
+            self.data.resize(len, T::from_f64(0.0));
+        }
     }
 
-    /// The memory, for [`Planes::reuse`].
-    pub fn into_data(self) -> Vec<T> {
-        self.data
+    /// Samples that there is memory for.
+    pub fn room(&self) -> usize {
+        self.data.len()
     }
 
     /// Sites that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
@@ -72,12 +74,13 @@ impl<T: SimdReal> Planes<T> {
 
     /// Everything, row after row.
     pub fn data(&self) -> &[T] {
-        &self.data
+        &self.data[..self.row_len() * self.height]
     }
 
     /// Everything, to be cut into rows of [`Planes::row_len`].
     pub fn data_mut(&mut self) -> &mut [T] {
-        &mut self.data
+        let len = self.row_len() * self.height;
+        &mut self.data[..len]
     }
 
     /// The sites of row `y` of plane `k`.

@@ -3,32 +3,30 @@
 use super::data::View;
 use super::options::LEAST_SIDE;
 use super::run::Range;
-use crate::image::{Spline, fill_holes, halve, halve_mask};
+use crate::image::{Spline, fill_holes, halve_into, halve_mask};
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
+use rayon::prelude::*;
+
+/// Samples of a task.
+const CHUNK: usize = 1 << 16;
 
 /// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of the stencils.
 const REACH: usize = 3;
 
 /// The frames of one level.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct PyramidLevel<T> {
     pub size: (usize, usize),
     /// One a frame.
     pub splines: Vec<Spline<T>>,
     /// Pixels whose neighbourhood is usable, one a frame; `None`: all.
     pub usable: Vec<Option<Mask>>,
+    /// The frames themselves, which the next level is made of.
+    frames: Vec<Frame<T>>,
 }
 
 impl<T: SimdReal> PyramidLevel<T> {
-    fn new(simd: Level, frames: &[Frame<T>], masks: &[Option<Mask>]) -> Self {
-        Self {
-            size: frames[0].size(),
-            splines: frames.iter().map(|frame| Spline::new(simd, frame)).collect(),
-            usable: masks.iter().map(|mask| mask.as_ref().map(|m| shrunk(m, REACH))).collect(),
-        }
-    }
-
     /// The two or three frames as the data term sees them.
     pub fn views(&self) -> Vec<View<'_, T>> {
         let usable = |k: usize| self.usable[k].as_ref();
@@ -40,38 +38,82 @@ impl<T: SimdReal> PyramidLevel<T> {
     }
 }
 
-/// The pyramid of `frames`, brought to a common `range`, the finest level first: at most `most` levels, none below [`LEAST_SIDE`] px.
-pub(super) fn pyramid<T: SimdReal>(
-    simd: Level,
-    frames: &[&Frame<T>],
-    range: Range,
-    mask: Option<&Mask>,
-    most: Option<usize>,
-) -> Vec<PyramidLevel<T>> {
-    let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, range, mask)).collect();
-    let mut frames: Vec<Frame<T>> = frames
-        .iter()
-        .zip(&masks)
-        .map(|(frame, usable)| {
-            let (mean, gain) = (T::from_f64(range.mean), T::from_f64(range.gain));
-            let scaled = frame.map(|&value| (value - mean) * gain);
-            match usable {
-                Some(usable) => fill_holes(&scaled, Some(usable)).into_owned(),
-                None => scaled,
-            }
-        })
-        .collect();
-    let mut levels = vec![PyramidLevel::new(simd, &frames, &masks)];
-    while most.is_none_or(|most| levels.len() < most) {
-        let (width, height) = frames[0].size();
-        if width.min(height).div_ceil(2) < LEAST_SIDE {
-            break;
-        }
-        frames = frames.iter().map(|frame| halve(simd, frame)).collect();
-        masks = masks.iter().map(|mask| mask.as_ref().map(halve_mask)).collect();
-        levels.push(PyramidLevel::new(simd, &frames, &masks));
+/// The levels of some frames, the finest first; keeps its memory from one filling to the next.
+#[derive(Debug, Default)]
+pub(super) struct Pyramid<T> {
+    levels: Vec<PyramidLevel<T>>,
+    /// Levels in use.
+    count: usize,
+}
+
+impl<T: SimdReal> Pyramid<T> {
+    /// The levels, the finest first.
+    pub fn levels(&self) -> &[PyramidLevel<T>] {
+        &self.levels[..self.count]
     }
-    levels
+
+    /// Samples that there is memory for, about.
+    pub fn samples(&self) -> usize {
+        self.levels.iter().map(|level| 2 * level.frames.iter().map(|f| f.data().len()).sum::<usize>()).sum()
+    }
+
+    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px.
+    pub fn fill(&mut self, simd: Level, frames: &[&Frame<T>], range: Range, mask: Option<&Mask>, most: Option<usize>) {
+        let size = frames.first().map_or((0, 0), |frame| frame.size());
+        self.count = count(size, most);
+        self.levels.resize_with(self.levels.len().max(self.count), PyramidLevel::default);
+        let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, range, mask)).collect();
+        for k in 0..self.count {
+            let (before, rest) = self.levels.split_at_mut(k);
+            let level = &mut rest[0];
+            level.frames.resize_with(frames.len(), Frame::default);
+            level.splines.resize_with(frames.len(), Spline::default);
+            match before.last() {
+                None => {
+                    for ((to, from), mask) in level.frames.iter_mut().zip(frames).zip(&masks) {
+                        scale(from, range, to);
+                        if mask.is_some() {
+                            *to = fill_holes(to, mask.as_ref()).into_owned();
+                        }
+                    }
+                }
+                Some(finer) => {
+                    for (to, from) in level.frames.iter_mut().zip(&finer.frames) {
+                        halve_into(simd, from, to);
+                    }
+                    masks = masks.iter().map(|mask| mask.as_ref().map(halve_mask)).collect();
+                }
+            }
+            level.size = level.frames[0].size();
+            level.usable = masks.iter().map(|mask| mask.as_ref().map(|m| shrunk(m, REACH))).collect();
+            for (spline, frame) in level.splines.iter_mut().zip(&level.frames) {
+                spline.refill(simd, frame);
+            }
+        }
+    }
+}
+
+/// Number of levels of frames of `size`.
+fn count(size: (usize, usize), most: Option<usize>) -> usize {
+    let (mut side, mut count) = (size.0.min(size.1), 1);
+    while most.is_none_or(|most| count < most) && side.div_ceil(2) >= LEAST_SIDE {
+        (side, count) = (side.div_ceil(2), count + 1);
+    }
+    count
+}
+
+/// Brightness brought to the common range.
+fn scale<T: SimdReal>(from: &Frame<T>, range: Range, to: &mut Frame<T>) {
+    if to.size() != from.size() {
+        *to = Frame::filled(from.width(), from.height(), T::from_f64(0.0));
+    }
+    let (mean, gain) = (T::from_f64(range.mean), T::from_f64(range.gain));
+    let bands = to.data_mut().par_chunks_mut(CHUNK).zip(from.data().par_chunks(CHUNK));
+    bands.for_each(|(to, from)| {
+        for (to, &value) in to.iter_mut().zip(from) {
+            *to = (value - mean) * gain;
+        }
+    });
 }
 
 /// The usable pixels, if some are not.
@@ -100,31 +142,32 @@ fn shrunk(mask: &Mask, reach: usize) -> Mask {
 mod tests {
     use super::*;
 
-    const AS_IT_IS: Range = Range { mean: 0.0, gain: 1.0, contrast: 1.0 };
+    fn pyramid(frames: &[&Frame<f32>], most: Option<usize>) -> Pyramid<f32> {
+        let mut pyramid = Pyramid::default();
+        pyramid.fill(Level::SCALAR, frames, Range { mean: 0.0, gain: 1.0, contrast: 1.0 }, None, most);
+        pyramid
+    }
 
     #[test]
     fn levels_halve_down_to_the_least_side() {
         let frame = Frame::<f32>::from_fn(100, 50, |x, y| ((x * y) as f32).sin());
-        let sizes = |most| {
-            pyramid(Level::SCALAR, &[&frame, &frame], AS_IT_IS, None, most).iter().map(|l| l.size).collect::<Vec<_>>()
-        };
+        let sizes = |most| pyramid(&[&frame, &frame], most).levels().iter().map(|l| l.size).collect::<Vec<_>>();
         assert_eq!(sizes(None), [(100, 50), (50, 25), (25, 13)]);
         assert_eq!(sizes(Some(2)), [(100, 50), (50, 25)]);
         let tiny = Frame::<f32>::filled(3, 3, 1.0);
-        assert_eq!(pyramid(Level::SCALAR, &[&tiny, &tiny], AS_IT_IS, None, None).len(), 1);
+        assert_eq!(pyramid(&[&tiny, &tiny], None).levels().len(), 1);
     }
 
     #[test]
     fn holes_reach_as_far_as_the_stencils() {
         let mut frame = Frame::<f32>::filled(20, 16, 1.0);
         frame.row_mut(8)[10] = f32::NAN;
-        let levels = pyramid(Level::SCALAR, &[&frame], AS_IT_IS, None, Some(1));
-        let usable = levels[0].usable[0].as_ref().unwrap();
+        let pyramid = |frame: &Frame<f32>| pyramid(&[frame], Some(1));
+        let filled = pyramid(&frame);
+        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
         let lost = usable.data().iter().filter(|&&u| !u).count();
         assert_eq!(lost, (2 * REACH + 1) * (2 * REACH + 1));
         assert!(!usable.get(10 - REACH, 8) && usable.get(10 - REACH - 1, 8));
-        assert!(
-            pyramid(Level::SCALAR, &[&Frame::<f32>::filled(9, 9, 1.0)], AS_IT_IS, None, None)[0].usable[0].is_none()
-        );
+        assert!(pyramid(&Frame::filled(9, 9, 1.0)).levels()[0].usable[0].is_none());
     }
 }

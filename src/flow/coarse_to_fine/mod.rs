@@ -14,6 +14,7 @@ mod data;
 mod grid;
 mod levels;
 mod locking;
+mod memory;
 mod options;
 mod output;
 mod reference;

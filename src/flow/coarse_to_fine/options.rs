@@ -41,11 +41,13 @@ impl Preset {
 
     /// What it means.
     pub(super) fn effort(self) -> Effort {
-        let sweeps = |sweeps| Coupling { sweeps, ..Coupling::default() };
+        let coupling = Coupling::default();
         match self {
-            Self::Fast => Effort { finest: 1, second: 2, coarse: 6, coupling: sweeps(3) },
-            Self::Balanced => Effort { finest: 2, second: 5, coarse: 8, coupling: sweeps(6) },
-            Self::Accurate => Effort { finest: 4, second: 6, coarse: 10, coupling: sweeps(10) },
+            Self::Fast => Effort { finest: 1, second: 3, third: 4, coupling: Coupling { sweeps: 4, ..coupling } },
+            Self::Balanced => Effort { finest: 2, second: 5, third: 4, coupling },
+            Self::Accurate => {
+                Effort { finest: 4, second: 6, third: 6, coupling: Coupling { break_at: 0.2, ..coupling } }
+            }
         }
     }
 }
@@ -57,14 +59,14 @@ pub(super) struct Effort {
     pub finest: usize,
     /// On the next.
     pub second: usize,
-    /// On every other level: they cost little, and what they miss is lost.
-    pub coarse: usize,
-    /// On the two finest levels.
+    /// On the third.
+    pub third: usize,
+    /// After each.
     pub coupling: Coupling,
 }
 
-/// Sweeps of coupling on coarse levels.
-const COARSE_SWEEPS: usize = 10;
+/// Iterations and sweeps on all coarser levels: they cost next to nothing, and what they miss is lost.
+const COARSE: (usize, usize) = (10, 10);
 
 impl Effort {
     /// Iterations on level `k`, 0 being the finest, and how strongly and often sites are coupled there.
@@ -72,7 +74,8 @@ impl Effort {
         match k {
             0 => (self.finest, self.coupling),
             1 => (self.second, self.coupling),
-            _ => (self.coarse, Coupling { sweeps: COARSE_SWEEPS, ..self.coupling }),
+            2 => (self.third, self.coupling),
+            _ => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
         }
     }
 }

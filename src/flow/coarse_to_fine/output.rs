@@ -3,6 +3,7 @@
 use super::covariance::{Spread, covariance};
 use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
+use super::memory::Space;
 use super::reference::at_first_frame;
 use super::resample::motion_at;
 use super::rows::RowReader;
@@ -10,7 +11,7 @@ use super::run::Estimate;
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
 use crate::flow::windowed::solve::ENTRIES;
-use crate::simd::SimdReal;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, Sites, Status};
 use rayon::prelude::*;
 
@@ -19,18 +20,20 @@ const STEP: f64 = 2.0;
 
 /// Writes the estimate at the field's sites. A pair's motion is carried from midway to the first frame.
 pub(super) fn fill<T: SimdReal>(
-    estimate: &Estimate<T>,
+    estimate: &Estimate<'_, T>,
+    space: &Space<T>,
     frames: &[&Frame<T>],
     common: &Common,
     field: &mut FlowField<T>,
 ) {
-    let moved = (frames.len() == 2).then(|| at_first_frame(&estimate.motion, STEP));
+    let moved = (frames.len() == 2).then(|| at_first_frame(common.level(), space, &estimate.motion));
     // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
     let noise = common.noise.map(|sigma| share * rows * (sigma * estimate.range.gain).powi(2));
     let writer = Writer {
-        data: &estimate.data,
+        simd: common.level(),
+        data: estimate.data,
         per_row: 1.0 / (rows.sqrt() * estimate.range.gain),
         motion: moved.as_ref().unwrap_or(&estimate.motion),
         reference: frames[frames.len() - 2],
@@ -41,18 +44,22 @@ pub(super) fn fill<T: SimdReal>(
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
         Sites::Points(points) => writer.points(points, &mut band),
-        Sites::Grid { .. } => writer.rows(&sites, width, &mut band),
+        Sites::Grid { .. } => dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band }),
     });
+    if let Some(moved) = moved {
+        space.keep(moved);
+    }
 }
 
 /// Whether anything at all was seen: a constant image says nothing about motion.
-fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
-    let (data, least) = (&estimate.data, 1e-9 * estimate.range.contrast.powi(2));
+fn is_observable<T: SimdReal>(estimate: &Estimate<'_, T>) -> bool {
+    let (data, least) = (estimate.data, 1e-9 * estimate.range.contrast.powi(2));
     (0..data.height).any(|y| data.line(0, y).iter().chain(data.line(12, y)).any(|v| v.to_f64() > least))
 }
 
 /// What the sites of the field are filled from.
 struct Writer<'a, T: Clone> {
+    simd: Level,
     data: &'a Planes<T>,
     /// From the root of the residual energy to grey levels.
     per_row: f64,
@@ -67,54 +74,34 @@ impl<T: SimdReal> Writer<'_, T> {
     fn points(&self, points: &[(usize, usize)], band: &mut FieldBand<'_, T>) {
         for (at, &(x, y)) in points[band.sites.clone()].iter().enumerate() {
             let motion = motion_at(self.motion, STEP, x as f64, y as f64);
-            self.put(band, at, (x, y), |k| T::from_f64(motion[k]), |spread, k| spread.at(k, (x, y)));
-        }
-    }
-
-    fn rows(&self, sites: &Sites, width: usize, band: &mut FieldBand<'_, T>) {
-        let mut reader = RowReader::new(self.reference.width());
-        let frame_width = self.reference.width();
-        let (mut places, mut entries) = (Vec::new(), vec![T::from_f64(0.0); ENTRIES * frame_width]);
-        for first in band.sites.clone().step_by(width) {
-            let row = first / width;
-            reader.read_motion(self.motion, sites.pixel(0, row).1);
+            for k in 0..MOTION {
+                band.motion[k][at] = T::from_f64(motion[k]);
+            }
             if let Some(spread) = &self.covariance {
-                for (k, line) in entries.chunks_exact_mut(frame_width).enumerate() {
-                    spread.row(k, sites.pixel(0, row).1, &mut places, line);
+                for k in 0..ENTRIES {
+                    band.covariance[k][at] = spread.at(k, (x, y));
                 }
             }
-            for column in 0..width {
-                let (x, y) = sites.pixel(column, row);
-                self.put(
-                    band,
-                    first + column - band.sites.start,
-                    (x, y),
-                    |k| reader.plane(k)[x],
-                    |_, k| entries[k * frame_width + x],
-                );
-            }
+            self.close(band, at, (x, y));
         }
     }
 
-    fn put(
-        &self,
-        band: &mut FieldBand<'_, T>,
-        at: usize,
-        pixel: (usize, usize),
-        value: impl Fn(usize) -> T,
-        covariance: impl Fn(&Spread<T>, usize) -> T,
-    ) {
+    /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken back.
+    fn close(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
         let status = self.status(pixel);
         band.status[at] = status;
-        for k in 0..MOTION {
-            band.motion[k][at] = if status == Status::Ok { value(k) } else { T::nan() };
+        if status != Status::Ok {
+            band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[at] = T::nan());
         }
         self.diagnose(band, at, pixel, status == Status::Ok);
-        if let Some(planes) = &self.covariance {
-            for k in 0..ENTRIES {
-                band.covariance[k][at] = if status == Status::Ok { covariance(planes, k) } else { T::nan() };
-            }
-        }
+    }
+
+    /// Whether every pixel of row `y` has an estimate and nothing but that is wanted.
+    fn is_plain(&self, y: usize, band: &FieldBand<'_, T>) -> bool {
+        let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none();
+        // Without a short circuit, so that the compiler may use lanes.
+        let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
+        bare && self.observable && self.mask.is_none() && finite()
     }
 
     /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
@@ -146,5 +133,55 @@ impl<T: SimdReal> Writer<'_, T> {
         } else {
             Status::Ok
         }
+    }
+}
+
+/// The sites of a band of whole rows.
+struct Rows<'a, 'b, T: Clone> {
+    writer: &'a Writer<'a, T>,
+    sites: &'a Sites,
+    width: usize,
+    band: &'a mut FieldBand<'b, T>,
+}
+
+impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { writer, sites, width, band } = self;
+        let mut reader = RowReader::new(writer.reference.width());
+        let (mut entries, mut line) = (Vec::new(), vec![T::from_f64(0.0); writer.reference.width()]);
+        let start = band.sites.start;
+        for first in band.sites.clone().step_by(width) {
+            let row = first / width;
+            let ((from, y), (next, _)) = (sites.pixel(0, row), sites.pixel(1, row));
+            let columns = (from, next - from);
+            let places = first - start..first - start + width;
+            reader.read_motion(writer.motion, y);
+            for (k, plane) in band.motion.iter_mut().enumerate() {
+                copy(reader.plane(k), columns, &mut plane[places.clone()]);
+            }
+            if let Some(spread) = &writer.covariance {
+                for (k, plane) in band.covariance.iter_mut().enumerate() {
+                    spread.row(k, y, &mut entries, &mut line);
+                    copy(&line, columns, &mut plane[places.clone()]);
+                }
+            }
+            if writer.is_plain(y, band) {
+                band.status[places].fill(Status::Ok);
+            } else {
+                places.enumerate().for_each(|(column, at)| writer.close(band, at, sites.pixel(column, row)));
+            }
+        }
+    }
+}
+
+/// Every `step`-th value from `first` on.
+#[inline(always)]
+fn copy<T: Copy>(from: &[T], (first, step): (usize, usize), to: &mut [T]) {
+    if step == 1 {
+        to.copy_from_slice(&from[first..first + to.len()]);
+    } else {
+        to.iter_mut().zip(from[first..].iter().step_by(step)).for_each(|(to, from)| *to = *from);
     }
 }

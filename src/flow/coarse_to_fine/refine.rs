@@ -22,11 +22,11 @@ mod mix;
 mod region;
 
 use super::grid::{LEFT, Planes};
+use super::memory::Space;
 use crate::simd::{Level, SimdReal};
 use choose::Choice;
 pub(super) use evidence::{Evidence, SPACING};
 use field::Field;
-pub(super) use field::Space;
 use fit::{FIT, FLOW};
 use ladder::Ladder;
 use region::Fitted;
@@ -81,7 +81,7 @@ pub(super) const SIGMA: usize = 6;
 /// Bit-identical for any number of threads. With them comes what the choice of windows rested on, if there was one.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
-    space: &mut Space<T>,
+    space: &Space<T>,
     options: &Options,
     motion: &Planes<T>,
     data: &Planes<T>,
@@ -89,7 +89,6 @@ pub(super) fn refine<T: SimdReal>(
     if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
         return (Planes::new(motion.width, motion.height, mix::RESULT), None);
     }
-    let space = &*space;
     let ladder = Ladder::new(options.ladder, PITCH);
     let base = mean_motion(motion);
     let grids = grids(simd, space, &ladder, motion, &base);
@@ -104,7 +103,7 @@ pub(super) fn refine<T: SimdReal>(
     for octave in (1..grids.len()).rev() {
         let plain = plain(&ladder, &fitted, &choice, &grids[octave], octave, coarser.as_ref());
         let complete = mix::collapse(simd, space, &plain);
-        space.keep(coarser.replace(complete));
+        Field::keep(space, coarser.replace(complete));
     }
 
     let wanted: Vec<usize> = (0..ladder.scales.len()).filter(|l| choice.wants_edges(*l)).collect();
@@ -113,7 +112,7 @@ pub(super) fn refine<T: SimdReal>(
         let mut finer: Option<Field<T>> = None;
         for octave in (0..ladder.scales[l].octave).rev() {
             let next = grow::grow(simd, space, finer.as_ref().unwrap_or(&fitted.fits[l]), FIT, &grids[octave]);
-            space.keep(finer.replace(next));
+            Field::keep(space, finer.replace(next));
         }
         grown.push(finer);
     }
@@ -125,8 +124,8 @@ pub(super) fn refine<T: SimdReal>(
     let edges = edges.collect();
     let plain = plain(&ladder, &fitted, &choice, &grids[0], 0, coarser.as_ref());
     let out = mix::finish(simd, space, &mix::Final { plain, edges, options, base, pitch: PITCH });
-    space.keep(coarser);
-    space.keep(grown.into_iter().flatten().chain(fitted.fits).chain(fitted.samples).chain(grids));
+    Field::keep(space, coarser);
+    Field::keep(space, grown.into_iter().flatten().chain(fitted.fits).chain(fitted.samples).chain(grids));
     (out, Some(Evidence::new(means, choice, options.ladder)))
 }
 
@@ -152,7 +151,7 @@ fn grids<T: SimdReal>(
     motion: &Planes<T>,
     base: &[f64; 6],
 ) -> Vec<Field<T>> {
-    let mut finest = space.field(motion.width, motion.height, FLOW);
+    let mut finest = Field::make(space, motion.width, motion.height, FLOW);
     for k in 0..2 {
         for y in 0..motion.height {
             let start = finest.start(k, y as isize) + LEFT;
@@ -163,6 +162,11 @@ fn grids<T: SimdReal>(
                 *t = *m - (first + slope * T::from_f64(x as f64));
             }
         }
+    }
+    // Nothing has been smoothed away yet.
+    for y in 0..motion.height {
+        let start = finest.start(2, y as isize) + LEFT;
+        finest.data_mut()[start..start + motion.width].fill(T::from_f64(0.0));
     }
     fit::finish(&mut finest);
     let mut grids = vec![finest];

@@ -3,7 +3,7 @@
 use super::data::MOTION;
 use super::grid::{LEFT, Planes};
 use super::rows::RowReader;
-use crate::simd::SimdReal;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 
 /// Rows of one task.
@@ -42,14 +42,33 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f
 /// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles, the Jacobian stays.
 ///
 /// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
-pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Planes<T> {
-    let mut fine = Planes::new(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
+pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
+    fine.reshape(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
     let (width, stride, len) = (fine.width, fine.stride(), fine.row_len().max(1));
-    let two = T::from_f64(2.0);
-    fine.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
+    fine.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, out)| {
+        dispatch(simd, Finer { coarse, first: task * ROWS, out, len, stride, width });
+    });
+}
+
+/// Some rows of [`finer`].
+struct Finer<'a, T> {
+    coarse: &'a Planes<T>,
+    first: usize,
+    out: &'a mut [T],
+    len: usize,
+    stride: usize,
+    width: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { coarse, first, out, len, stride, width } = self;
+        let two = T::from_f64(2.0);
         let mut reader = RowReader::new(width);
-        for (y, row) in rows.chunks_mut(len).enumerate() {
-            reader.read_motion(coarse, task * ROWS + y);
+        for (y, row) in (first..).zip(out.chunks_mut(len)) {
+            reader.read_motion(coarse, y);
             for k in 0..MOTION {
                 let target = &mut row[k * stride + LEFT..][..width];
                 target.copy_from_slice(reader.plane(k));
@@ -60,8 +79,7 @@ pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Pl
                 }
             }
         }
-    });
-    fine
+    }
 }
 
 /// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites'
@@ -69,7 +87,7 @@ pub(super) fn finer<T: SimdReal>(coarse: &Planes<T>, size: (usize, usize)) -> Pl
 ///
 /// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the Jacobian catch up.
 pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
-    *out = Planes::reuse(old.width, old.height, old.count, std::mem::take(out).into_data());
+    out.reshape(old.width, old.height, old.count);
     let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
     out.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
         for (y, row) in (task * ROWS..).zip(rows.chunks_mut(len)) {
@@ -134,7 +152,8 @@ mod tests {
     #[test]
     fn affine_motion_survives_refinement_and_reading() {
         let (coarse, want) = (affine(7, 5, 2.0), affine(13, 9, 1.0));
-        let fine = finer(&coarse, (26, 18));
+        let mut fine = Planes::default();
+        finer(Level::detect(), &coarse, (26, 18), &mut fine);
         assert_eq!((fine.width, fine.height), (13, 9));
         for k in 0..MOTION {
             for y in 0..9 {
@@ -178,6 +197,8 @@ mod tests {
     fn a_single_site_speaks_for_everything() {
         let one = affine(1, 1, 1.0);
         assert!((motion_at(&one, 2.0, 1.0, 1.0)[0] - 1.55).abs() < 1e-12);
-        assert_eq!(finer(&one, (2, 1)).width, 1);
+        let mut fine = Planes::default();
+        finer(Level::detect(), &one, (2, 1), &mut fine);
+        assert_eq!(fine.width, 1);
     }
 }

@@ -26,6 +26,7 @@ impl<T: SimdReal> RowReader<T> {
     }
 
     /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites their models, carried to the pixel, are averaged.
+    #[inline(always)]
     pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
         self.read(motion, y);
         let (half, one) = (T::from_f64(0.5), T::from_f64(1.0));
@@ -51,6 +52,7 @@ impl<T: SimdReal> RowReader<T> {
     }
 
     /// The means of the rows of sites around `y`.
+    #[inline(always)]
     fn read(&mut self, planes: &Planes<T>, y: usize) {
         let zero = T::from_f64(0.0);
         self.sites.clear();
@@ -65,18 +67,29 @@ impl<T: SimdReal> RowReader<T> {
 }
 
 /// Pixels of a row from its sites; with the slopes of the sites' models, between two sites both are carried to the middle.
+#[inline(always)]
 fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
     let half = T::from_f64(0.5);
     let last = sites.len() - 1;
-    for (x, pair) in pixels.chunks_mut(2).enumerate() {
-        pair[0] = sites[x];
-        if let Some(odd) = pair.get_mut(1) {
-            let next = (x + 1).min(last);
-            *odd = half * (sites[x] + sites[next]);
-            if let Some(slopes) = slopes {
-                *odd += if x < last { half * (slopes[x] - slopes[next]) } else { slopes[x] };
+    let (inner, rim) = pixels.split_at_mut((2 * last).min(pixels.len()));
+    let (here, next) = (&sites[..last], &sites[1..]);
+    match slopes {
+        None => {
+            for ((pair, &a), &b) in inner.chunks_exact_mut(2).zip(here).zip(next) {
+                (pair[0], pair[1]) = (a, half * (a + b));
             }
         }
+        Some(slopes) => {
+            let slopes = slopes[..last].iter().zip(&slopes[1..]);
+            for (((pair, &a), &b), (&p, &q)) in inner.chunks_exact_mut(2).zip(here).zip(next).zip(slopes) {
+                (pair[0], pair[1]) = (a, half * ((a + b) + (p - q)));
+            }
+        }
+    }
+    // The last site, and what it says of the pixel after it.
+    let beyond = slopes.map_or(sites[last], |slopes| sites[last] + slopes[last]);
+    for (pixel, value) in rim.iter_mut().zip([sites[last], beyond]) {
+        *pixel = value;
     }
 }
 

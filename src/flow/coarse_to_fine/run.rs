@@ -3,11 +3,12 @@
 use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{DataOptions, DataTerm, MOTION};
 use super::grid::Planes;
-use super::levels::{PyramidLevel, pyramid};
+use super::levels::PyramidLevel;
 use super::locking::Locking;
+use super::memory::{Memory, Workspace};
 use super::options::{CoarseToFineOptions, Effort};
 use super::output;
-use super::refine::{Evidence, Options as Refinement, Space, refine};
+use super::refine::{Evidence, Options as Refinement, refine};
 use super::resample::{finer, rederive};
 use crate::error::Result;
 use crate::flow::options::Common;
@@ -23,13 +24,14 @@ const LEAST_SCALE: f64 = 4e-3;
 #[derive(Debug)]
 pub(in crate::flow) struct CoarseToFine {
     options: CoarseToFineOptions,
+    memory: Memory,
 }
 
 impl CoarseToFine {
     /// Checks the options.
     pub fn new(options: &CoarseToFineOptions) -> Result<Self> {
         options.check()?;
-        Ok(Self { options: options.clone() })
+        Ok(Self { options: options.clone(), memory: Memory::default() })
     }
 
     /// Frames of one estimate, 2 or 3.
@@ -45,31 +47,35 @@ impl CoarseToFine {
     /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
     pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         common.threads.install(|| {
+            let simd = common.level();
             let range = Range::of(frames[0]);
-            let levels = pyramid(common.level(), frames, range, common.mask.as_ref(), self.options.levels);
-            let mut estimate = Descent::new(common.level(), self.options.preset.effort(), range).run(&levels);
-            let (motion, evidence) =
-                refine(common.level(), &mut Space::default(), &Refinement::default(), &estimate.motion, &estimate.data);
-            (estimate.motion, estimate.evidence) = (motion, evidence);
-            estimate.locking = Locking::measure(common.level(), &levels[0], &estimate.motion, estimate.scale);
-            estimate.locking.correct(common.level(), &mut estimate.motion);
-            output::fill(&estimate, frames, common, field);
+            let mut workspace = self.memory.take::<T>();
+            workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), self.options.levels);
+            let (coupled, scale) = descend(simd, self.options.preset.effort(), range, &mut workspace);
+            let Workspace { pyramid, data, space, .. } = &mut *workspace;
+            let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, data);
+            space.keep(coupled);
+            let locking = Locking::measure(simd, &pyramid.levels()[0], &motion, scale);
+            locking.correct(simd, &mut motion);
+            let estimate = Estimate { motion, data, range, evidence, locking };
+            output::fill(&estimate, space, frames, common, field);
+            space.keep(estimate.motion);
+            estimate.evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
+            self.memory.give(workspace);
         });
     }
 }
 
 /// The motion on the sites of the finest level, and what it rests on.
 #[derive(Debug)]
-pub(super) struct Estimate<T> {
+pub(super) struct Estimate<'a, T> {
     /// `u, v, u_x, v_x, u_y, v_y` on every second pixel, midway in time.
     pub motion: Planes<T>,
     /// The last data term.
-    pub data: Planes<T>,
+    pub data: &'a Planes<T>,
     /// How brightness was scaled.
     pub range: Range,
-    /// Standard deviation of the residual.
-    pub scale: Option<T>,
-    /// What the windows were chosen by; `None` before.
+    /// What the windows were chosen by; `None` without sites.
     pub evidence: Option<Evidence<T>>,
     /// How the motion was drawn before it was corrected.
     pub locking: Locking,
@@ -122,67 +128,56 @@ impl Range {
     }
 }
 
-/// The way from the coarsest level to the finest.
-struct Descent<T> {
+/// The way from the coarsest level of the filled pyramid to the finest: the coupled motion there with the standard deviation of the residual, and in the
+/// workspace the last data term.
+fn descend<T: SimdReal>(
     simd: Level,
     effort: Effort,
     range: Range,
-    term: DataTerm<T>,
-    data: Planes<T>,
-    /// Memory of the motion before the present one.
-    spare: Planes<T>,
-    scratch: CoupleScratch<T>,
+    workspace: &mut Workspace<T>,
+) -> (Planes<T>, Option<T>) {
+    let Workspace { pyramid, data, pool, scratch, space } = workspace;
+    let mut step =
+        Step { simd, range, term: DataTerm::new(simd, DataOptions::default(), pool), data, scratch, scale: None };
+    let mut motion = space.planes(0, 0, MOTION);
+    let mut old = space.planes(0, 0, MOTION);
+    for (k, level) in pyramid.levels().iter().enumerate().rev() {
+        if k + 1 == pyramid.levels().len() {
+            motion.reshape(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION);
+            motion.data_mut().fill(T::from_f64(0.0));
+        } else {
+            std::mem::swap(&mut motion, &mut old);
+            finer(simd, &old, level.size, &mut motion);
+        }
+        let (iterations, coupling) = effort.on_level(k);
+        for _ in 0..iterations {
+            std::mem::swap(&mut motion, &mut old);
+            rederive(&old, &mut motion);
+            step.iterate(level, &coupling, &mut motion);
+        }
+    }
+    space.keep(old);
+    (motion, step.scale)
+}
+
+/// One linearisation, and the motion that follows from it.
+struct Step<'a, T> {
+    simd: Level,
+    range: Range,
+    term: DataTerm<'a, T>,
+    data: &'a mut Planes<T>,
+    scratch: &'a mut CoupleScratch<T>,
     /// Standard deviation of what brightness changes by along the motion, from the iteration before.
     scale: Option<T>,
 }
 
-impl<T: SimdReal> Descent<T> {
-    fn new(simd: Level, effort: Effort, range: Range) -> Self {
-        Self {
-            simd,
-            effort,
-            range,
-            term: DataTerm::new(simd, DataOptions::default()),
-            data: Planes::default(),
-            spare: Planes::default(),
-            scratch: CoupleScratch::default(),
-            scale: None,
-        }
-    }
-
-    fn run(mut self, levels: &[PyramidLevel<T>]) -> Estimate<T> {
-        let mut motion: Option<Planes<T>> = None;
-        for (k, level) in levels.iter().enumerate().rev() {
-            let start = match &motion {
-                Some(coarse) => finer(coarse, level.size),
-                None => Planes::new(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION),
-            };
-            let (iterations, coupling) = self.effort.on_level(k);
-            motion = Some((0..iterations).fold(start, |old, _| {
-                let mut motion = std::mem::take(&mut self.spare);
-                rederive(&old, &mut motion);
-                self.spare = old;
-                self.iterate(level, &coupling, motion)
-            }));
-        }
-        let motion = motion.unwrap_or_else(|| Planes::new(0, 0, MOTION));
-        Estimate {
-            motion,
-            data: self.data,
-            range: self.range,
-            scale: self.scale,
-            evidence: None,
-            locking: Locking::default(),
-        }
-    }
-
-    /// One linearisation about `motion`, and the motion that follows from it.
-    fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, mut motion: Planes<T>) -> Planes<T> {
-        let residuals = self.term.linearise(level.size, &level.views(), &motion, self.scale, &mut self.data);
+impl<T: SimdReal> Step<'_, T> {
+    /// Linearises about `motion` and moves it.
+    fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, motion: &mut Planes<T>) {
+        let residuals = self.term.linearise(level.size, &level.views(), motion, self.scale, self.data);
         self.scale = self.spread(residuals);
         let floor = T::from_f64((LEAST_NOISE * self.range.contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
-        couple(self.simd, &self.data, &mut motion, coupling, floor, &mut self.scratch);
-        motion
+        couple(self.simd, self.data, motion, coupling, floor, self.scratch);
     }
 
     /// Robust standard deviation of residuals whose magnitudes these are.

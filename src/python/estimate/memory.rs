@@ -111,7 +111,7 @@ fn estimate<T: SimdReal>(estimator: &Estimator, frames: &[&Frame<T>], first_inde
     let common = estimator.common();
     let frame_size = match frames.first() {
         // Other methods take long enough for a fresh field not to matter.
-        Some(frame) if matches!(estimator.method(), Method::Instantaneous(_)) => frame.size(),
+        Some(frame) if matches!(estimator.method(), Method::Instantaneous(_) | Method::CoarseToFine(_)) => frame.size(),
         _ => return estimator.estimate(frames, first_index),
     };
     let layout = estimator.layout(frame_size, first_index);

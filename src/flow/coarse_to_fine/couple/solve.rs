@@ -44,30 +44,35 @@ impl<V: Lanes> Guard<V> {
     }
 }
 
-/// Solves `m x = right`, `m` the lower triangle of a positive semidefinite matrix, by `L D L^T`.
+/// Turns the lower triangle of a positive semidefinite matrix into its factors `L D L^T`: `L` below the diagonal, on it the inverse of `D`.
 ///
 /// Pivots are taken two by two, since that needs one division for two: with the leading block `[[a, b], [b, c]]` and its determinant `d` they are `a` and
 /// `d / a`, and their inverses follow from `1 / (a d)`.
 #[inline(always)]
-pub(super) fn solve<V: Lanes>(mut m: [V; ENTRIES], right: [V; 6], guard: &Guard<V>) -> [V; 6] {
+pub(super) fn factorise<V: Lanes>(m: &mut [V; ENTRIES], guard: &Guard<V>) {
     for i in 0..6 {
         let diagonal = m[lower(i, i)];
         m[lower(i, i)] = diagonal.mul_add(guard.share, diagonal + guard.least);
     }
-    let [i0, i1] = eliminate(&mut m, 0, guard);
-    let [i2, i3] = eliminate(&mut m, 2, guard);
-    let [i4, i5] = eliminate(&mut m, 4, guard);
-    let inverse = [i0, i1, i2, i3, i4, i5];
+    for i in [0, 2, 4] {
+        let [first, second] = eliminate(m, i, guard);
+        (m[lower(i, i)], m[lower(i + 1, i + 1)]) = (first, second);
+    }
+}
+
+/// Solves the equations that [`factorise`] was given the matrix of.
+#[inline(always)]
+pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     let mut x = right;
     for i in 1..6 {
         for k in 0..i {
-            x[i] = m[lower(i, k)].neg_mul_add(x[k], x[i]);
+            x[i] = factors[lower(i, k)].neg_mul_add(x[k], x[i]);
         }
     }
     for i in (0..6).rev() {
-        x[i] = x[i] * inverse[i];
+        x[i] = x[i] * factors[lower(i, i)];
         for k in i + 1..6 {
-            x[i] = m[lower(k, i)].neg_mul_add(x[k], x[i]);
+            x[i] = factors[lower(k, i)].neg_mul_add(x[k], x[i]);
         }
     }
     x
@@ -118,13 +123,18 @@ mod tests {
         (list, dense)
     }
 
+    fn solved<T: crate::simd::SimdReal>(mut m: [T; ENTRIES], right: [T; 6]) -> [T; 6] {
+        factorise(&mut m, &Guard::new());
+        solve(&m, right)
+    }
+
     #[test]
     fn solves_what_is_well_posed() {
         for seed in 0..20 {
             let (list, dense) = random(seed, 40);
             let want = Vector6::new(0.3, -0.2, 0.01, 0.02, -0.02, 0.01);
             let right = dense * want;
-            let got = solve::<f64>(list, right.into(), &Guard::new());
+            let got = solved::<f64>(list, right.into());
             for i in 0..6 {
                 assert!((got[i] - want[i]).abs() < 1e-11, "{seed}");
             }
@@ -140,9 +150,9 @@ mod tests {
                 let left = dense * Vector6::from(x) - right;
                 x.iter().all(|x| x.is_finite() && x.abs() < 10.0) && left.norm() <= tolerance * right.norm()
             };
-            let double = solve::<f64>(list, right.into(), &Guard::new());
+            let double = solved::<f64>(list, right.into());
             assert!(good(double, 1e-9), "{places} {seed}: {double:?}");
-            let single = solve::<f32>(list.map(|x| x as f32), std::array::from_fn(|i| right[i] as f32), &Guard::new());
+            let single = solved::<f32>(list.map(|x| x as f32), std::array::from_fn(|i| right[i] as f32));
             assert!(good(single.map(f64::from), 1e-3), "{places} {seed}: {single:?}");
         }
     }

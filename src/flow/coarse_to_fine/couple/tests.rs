@@ -4,7 +4,7 @@ use super::*;
 use crate::parallel::Threads;
 use reference::{affine, energy, filled, made, motion_at, naive, rough};
 
-const ROBUST: Coupling = Coupling { flow: 20.0, jacobian: 2000.0, break_at: 0.1, sweeps: 6 };
+const ROBUST: Coupling = Coupling { flow: 20.0, jacobian: 2000.0, break_at: 0.1, sweeps: 6, reweigh: 2 };
 const QUADRATIC: Coupling = Coupling { break_at: f64::INFINITY, ..ROBUST };
 fn run<T: SimdReal>(level: Level, data: &Planes<T>, motion: &mut Planes<T>, c: &Coupling) -> f64 {
     couple(level, data, motion, c, T::from_f64(0.05), &mut CoupleScratch::default()).to_f64()
@@ -23,7 +23,12 @@ fn worst<T: SimdReal>(motion: &Planes<T>, want: impl Fn(usize, usize) -> [f64; 6
 fn agrees<T: SimdReal>(tolerance: f64) {
     let some = |x, y| ((x * 7 + y * 3) % 5 != 0).then(|| rough(x, y));
     for (w, h) in [(1, 1), (2, 1), (1, 2), (5, 3), (33, 17), (150, 7)] {
-        for c in [ROBUST, QUADRATIC, Coupling { sweeps: 1, ..ROBUST }, Coupling { sweeps: 3, flow: 5.0, ..ROBUST }] {
+        for c in [
+            ROBUST,
+            QUADRATIC,
+            Coupling { sweeps: 1, ..ROBUST },
+            Coupling { sweeps: 5, reweigh: 3, flow: 5.0, ..ROBUST },
+        ] {
             let data = made::<T>(w, h, some);
             let start = filled::<T>(w, h, |x, y| rough(x + 300, y));
             for level in Level::available() {

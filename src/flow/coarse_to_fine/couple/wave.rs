@@ -12,16 +12,16 @@
 //!
 //! Whatever the number of bands, each visit finds what it would find in the plain order: the results are the same to the last bit.
 
-use super::visit::{Around, Bonds, pack, visit};
-use super::{EQUATIONS, Planes};
+use super::Planes;
+use super::visit::{Around, Bonds, Packed, WEIGHTS, visit, weigh};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The equations of the rows that a wave is at work on, and which rows these are.
+/// What the visits to the rows need that a wave is at work on, and which rows these are.
 #[derive(Debug, Default)]
 pub(super) struct Ring<T> {
-    packed: Vec<T>,
+    packed: Vec<Packed<T>>,
     rows: Vec<Option<usize>>,
 }
 
@@ -41,7 +41,14 @@ impl Span {
 }
 
 /// All sweeps over `motion`, whose samples beside the sites are zero.
-pub(super) fn sweep<T: SimdReal>(level: Level, bonds: &Bonds<'_, T>, motion: &mut Planes<T>, rings: &mut Vec<Ring<T>>) {
+pub(super) fn sweep<T: SimdReal>(
+    level: Level,
+    bonds: &Bonds<'_, T>,
+    motion: &mut Planes<T>,
+    weights: &mut Planes<T>,
+    rings: &mut Vec<Ring<T>>,
+) {
+    weights.reshape(motion.width, motion.height, WEIGHTS);
     let (height, stride, len) = (motion.height, motion.stride(), motion.row_len());
     let passes = bonds.coupling.sweeps + 1;
     // A wedge reaches `passes` rows into the bands at both sides, and sees one more.
@@ -49,8 +56,8 @@ pub(super) fn sweep<T: SimdReal>(level: Level, bonds: &Bonds<'_, T>, motion: &mu
     let count = rayon::current_num_threads().min(height / (2 * deep)).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
     rings.resize_with(rings.len().max(count), Ring::default);
-    let wave = |(rows, span, origin): (&mut [T], Span, usize), ring: &mut Ring<T>| {
-        dispatch(level, Wave { bonds, rows, origin, span, stride, ring });
+    let wave = |((rows, weights), span, origin): ((&mut [T], &mut [T]), Span, usize), ring: &mut Ring<T>| {
+        dispatch(level, Wave { bonds, rows, weights, origin, span, stride, ring });
     };
 
     let bands: Vec<Range<usize>> = starts.windows(2).map(|w| w[0]..w[1]).collect();
@@ -58,14 +65,15 @@ pub(super) fn sweep<T: SimdReal>(level: Level, bonds: &Bonds<'_, T>, motion: &mu
         let (top, bottom) = (usize::from(band.start > 0), usize::from(band.end < height));
         Span { first: band.start + top, last: band.end - bottom, slope: (top as isize, -(bottom as isize)) }
     });
-    let parts = cut(motion.data_mut(), len, &bands);
-    let work: Vec<_> = parts.into_iter().zip(spans).zip(&bands).map(|((part, s), b)| (part, s, b.start)).collect();
+    let parts = cut(motion.data_mut(), len, &bands).into_iter().zip(cut(weights.data_mut(), WEIGHTS * stride, &bands));
+    let work: Vec<_> = parts.zip(spans).zip(&bands).map(|((part, s), b)| (part, s, b.start)).collect();
     work.into_par_iter().zip(rings.par_iter_mut()).with_max_len(1).for_each(|(part, ring)| wave(part, ring));
 
     let wedges: Vec<Range<usize>> = starts[1..count].iter().map(|&s| s - deep..s + deep).collect();
     let spans = starts[1..count].iter().map(|&s| Span { first: s - 1, last: s + 1, slope: (-1, 1) });
-    let parts = cut(motion.data_mut(), len, &wedges);
-    let work: Vec<_> = parts.into_iter().zip(spans).zip(&wedges).map(|((part, s), w)| (part, s, w.start)).collect();
+    let parts =
+        cut(motion.data_mut(), len, &wedges).into_iter().zip(cut(weights.data_mut(), WEIGHTS * stride, &wedges));
+    let work: Vec<_> = parts.zip(spans).zip(&wedges).map(|((part, s), w)| (part, s, w.start)).collect();
     work.into_par_iter().zip(rings.par_iter_mut()).with_max_len(1).for_each(|(part, ring)| wave(part, ring));
 }
 
@@ -86,6 +94,8 @@ struct Wave<'a, T> {
     bonds: &'a Bonds<'a, T>,
     /// The rows from `origin` on, one row more than the span at each side where there is one.
     rows: &'a mut [T],
+    /// The bonds' weights there: a wedge goes on with those that the bands beside it left.
+    weights: &'a mut [T],
     origin: usize,
     span: Span,
     stride: usize,
@@ -97,12 +107,11 @@ impl<T: SimdReal> Kernel<T> for Wave<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { bonds, rows, origin, span, stride, ring } = self;
+        let Self { bonds, rows, weights, origin, span, stride, ring } = self;
         let passes = bonds.coupling.sweeps + 1;
         let row_len = 6 * stride;
         let end = origin + rows.len() / row_len;
-        let packed_len = EQUATIONS * bonds.edges.len();
-        ring.packed.resize(ring.packed.len().max(passes * packed_len), T::from_f64(0.0));
+        ring.packed.resize_with(ring.packed.len().max(passes), Packed::default);
         ring.rows.clear();
         ring.rows.resize(passes, None);
         // Row and pass are of one parity, so their sum, the front, is even.
@@ -114,11 +123,13 @@ impl<T: SimdReal> Kernel<T> for Wave<'_, T> {
                 }
                 // A row is visited during `passes` fronts, and the row that takes its place in the ring comes after.
                 let place = y % passes;
-                let packed = &mut ring.packed[place * packed_len..][..packed_len];
-                if ring.rows[place] != Some(y) {
-                    pack::<V, T>(bonds, y, packed);
+                let packed = &mut ring.packed[place];
+                let mut is_new = ring.rows[place] != Some(y);
+                if is_new {
+                    packed.fill::<V>(bonds, y);
                     ring.rows[place] = Some(y);
                 }
+                let weights = &mut weights[(y - origin) * WEIGHTS * stride..][..WEIGHTS * stride];
                 let (above, rest) = rows.split_at_mut((y - origin) * row_len);
                 let (own, below) = rest.split_at_mut(row_len);
                 let around = Around {
@@ -127,8 +138,16 @@ impl<T: SimdReal> Kernel<T> for Wave<'_, T> {
                     stride,
                 };
                 let visits = if pass == 0 || pass == passes - 1 { 1 } else { 2 };
-                for _ in 0..visits {
-                    visit::<V, T>(bonds, packed, own, around);
+                for number in (pass.max(1) - 1..).take(visits) {
+                    let reweigh = number.is_multiple_of(bonds.coupling.reweigh);
+                    if reweigh {
+                        weigh::<V, T>(bonds, own, around, weights);
+                    }
+                    if reweigh || is_new {
+                        packed.factorise::<V>(bonds, weights);
+                        is_new = false;
+                    }
+                    visit::<V, T>(bonds, (packed, weights), own, around);
                 }
             }
         }

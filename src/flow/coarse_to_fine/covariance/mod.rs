@@ -41,10 +41,10 @@ type Entries = [f64; ENTRIES];
 ///
 /// `energy`: the residual energy that the noise is known to leave; without it, it is read from the residuals. `carried`: told at the pixels of the first
 /// frame, where the motion of a pair is found midway.
-pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Option<f64>, carried: bool) -> Spread<T> {
+pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Option<f64>, carried: bool) -> Spread<T> {
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
-    let noise = noise::Noise::new(evidence, &estimate.data, energy);
+    let noise = noise::Noise::new(evidence, estimate.data, energy);
     let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);

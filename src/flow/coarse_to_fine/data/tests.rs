@@ -139,7 +139,8 @@ fn time_of_a_pixel() {
                 }
             }
             for level in [Level::avx2(), Level::avx512()].into_iter().flatten() {
-                let term = DataTerm::<f32>::new(level, DataOptions::default());
+                let pool = Pool::default();
+                let term = DataTerm::<f32>::new(level, DataOptions::default(), &pool);
                 let mut out = Planes::default();
                 Threads::new(Some(1)).unwrap().install(|| {
                     let mut times: Vec<f64> = (0..40)

@@ -1,5 +1,5 @@
 use super::*;
-use crate::flow::coarse_to_fine::levels::pyramid;
+use crate::flow::coarse_to_fine::levels::Pyramid;
 use crate::flow::coarse_to_fine::run::Range;
 use crate::math::random::CounterRng;
 use crate::types::Frame;
@@ -29,13 +29,14 @@ fn spots(sigma: f64, (u, v): (f64, f64)) -> Frame<f64> {
 fn measured(sigma: f64, flow: (f64, f64)) -> Locking {
     let half = (0.5 * flow.0, 0.5 * flow.1);
     let frames = [spots(sigma, (-half.0, -half.1)), spots(sigma, half)];
-    let levels = pyramid(Level::detect(), &[&frames[0], &frames[1]], AS_IT_IS, None, Some(1));
+    let mut pyramid = Pyramid::default();
+    pyramid.fill(Level::detect(), &[&frames[0], &frames[1]], AS_IT_IS, None, Some(1));
     let mut motion = Planes::new(64, 56, 6);
     for y in 0..56 {
         motion.line_mut(0, y).fill(flow.0);
         motion.line_mut(1, y).fill(flow.1);
     }
-    Locking::measure(Level::detect(), &levels[0], &motion, None)
+    Locking::measure(Level::detect(), &pyramid.levels()[0], &motion, None)
 }
 
 #[test]

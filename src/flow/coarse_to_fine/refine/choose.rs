@@ -4,10 +4,10 @@
 //! explains.
 
 use super::Options;
-use super::field::Space;
 use super::ladder::{Ladder, difference_variance};
 use super::region::Layout;
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 

@@ -23,6 +23,11 @@ impl<T: SimdReal> Evidence<T> {
         Self { means, choice: choice.planes, sigmas }
     }
 
+    /// The memory.
+    pub fn into_planes(self) -> [Planes<T>; 2] {
+        [self.means, self.choice]
+    }
+
     /// Places along x and y.
     pub fn size(&self) -> (usize, usize) {
         (self.means.width, self.means.height)

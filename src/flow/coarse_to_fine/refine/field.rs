@@ -1,8 +1,8 @@
 //! Planes that go on beyond the frame, so that windows need no special case at its edge.
 
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::simd::SimdReal;
-use std::cell::RefCell;
 use std::ops::Range;
 
 /// Sites on each side of the frame: no window may reach farther.
@@ -17,45 +17,6 @@ pub(super) enum Beyond {
     Even,
 }
 
-/// Memory for fields, kept from one refinement to the next: fresh memory costs as much time as the work itself.
-#[derive(Debug, Default)]
-pub(in crate::flow::coarse_to_fine) struct Space<T> {
-    free: RefCell<Vec<Vec<T>>>,
-}
-
-impl<T: SimdReal> Space<T> {
-    /// Room for `len` values, of any content.
-    fn take(&self, len: usize) -> Vec<T> {
-        let mut free = self.free.borrow_mut();
-        let fitting = free.iter().enumerate().filter(|(_, room)| room.capacity() >= len);
-        match fitting.min_by_key(|(_, room)| room.capacity()).map(|(at, _)| at) {
-            Some(at) => free.swap_remove(at),
-            None => Vec::with_capacity(len),
-        }
-    }
-
-    /// A field of `width x height` sites (both positive) with any finite content.
-    pub(super) fn field(&self, width: usize, height: usize, count: usize) -> Field<T> {
-        Field { planes: self.planes(width, height + 2 * RIM, count), width, height }
-    }
-
-    /// Planes with any finite content.
-    pub(super) fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
-        Planes::reuse(width, height, count, self.take(Planes::<T>::len(width, height, count)))
-    }
-
-    /// Takes planes back.
-    #[cfg(test)]
-    pub fn reclaim(&self, planes: Planes<T>) {
-        self.free.borrow_mut().push(planes.into_data());
-    }
-
-    /// Takes fields back.
-    pub(super) fn keep(&self, fields: impl IntoIterator<Item = Field<T>>) {
-        self.free.borrow_mut().extend(fields.into_iter().map(|field| field.planes.into_data()));
-    }
-}
-
 /// Planes with [`RIM`] more sites on every side.
 pub(super) struct Field<T> {
     planes: Planes<T>,
@@ -64,6 +25,16 @@ pub(super) struct Field<T> {
 }
 
 impl<T: SimdReal> Field<T> {
+    /// `width x height` sites (both positive) with any finite content.
+    pub fn make(space: &Space<T>, width: usize, height: usize, count: usize) -> Self {
+        Self { planes: space.planes(width, height + 2 * RIM, count), width, height }
+    }
+
+    /// Gives the memory of fields back.
+    pub fn keep(space: &Space<T>, fields: impl IntoIterator<Item = Self>) {
+        fields.into_iter().for_each(|field| space.keep(field.planes));
+    }
+
     /// Zeros on `width x height` sites (both positive) and beyond.
     #[cfg(test)]
     pub fn new(width: usize, height: usize, count: usize) -> Self {

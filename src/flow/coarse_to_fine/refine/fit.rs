@@ -1,8 +1,9 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
-use super::field::{Beyond, Field, RIM, Space};
+use super::field::{Beyond, Field, RIM};
 use super::ladder::{Scale, Taps};
 use crate::flow::coarse_to_fine::grid::LEFT;
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::flow::windowed::window::filter;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
@@ -77,7 +78,7 @@ impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
 
 /// Single fits of the window `scale` to `from` (planes of [`FLOW`]): planes of [`FIT`].
 pub(super) fn fits<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
-    let mut out = space.field(from.width, from.height, FIT);
+    let mut out = Field::make(space, from.width, from.height, FIT);
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Fits { from, scale, rows, out }));
     out.extend(0..2, Beyond::Odd, RIM);
@@ -148,7 +149,7 @@ pub(super) fn pick<T: Copy>(from: &[T], step: usize, out: &mut [T]) {
 /// The next coarser grid: planes of [`FLOW`], ready to be fitted.
 pub(super) fn halve<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
     let (width, height) = (from.width.div_ceil(2), from.height.div_ceil(2));
-    let mut out = space.field(width, height, FLOW);
+    let mut out = Field::make(space, width, height, FLOW);
     let (len, stride) = (out.row_len(), out.stride());
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Halve { from, taps, rows, out, stride, width });
@@ -210,7 +211,7 @@ pub(super) fn samples<T: SimdReal>(
     step: usize,
 ) -> Field<T> {
     let (width, height) = (fits.width.div_ceil(step), fits.height.div_ceil(step));
-    let mut out = space.field(width, height, 2);
+    let mut out = Field::make(space, width, height, 2);
     let (len, stride, taps) = (out.row_len(), out.stride(), &scale.second);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Samples { fits, taps, step, rows, out, stride, width });

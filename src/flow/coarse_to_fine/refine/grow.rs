@@ -1,9 +1,10 @@
 //! From coarse sites to fine ones.
 
 use super::choose::Choice;
-use super::field::{Beyond, Field, RIM, Space};
+use super::field::{Beyond, Field, RIM};
 use super::ladder::MAX_OCTAVE;
 use crate::flow::coarse_to_fine::grid::LEFT;
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::math::Real;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
@@ -113,7 +114,7 @@ pub(super) fn grow<T: SimdReal>(
     count: usize,
     like: &Field<T>,
 ) -> Field<T> {
-    let mut out = space.field(like.width, like.height, count);
+    let mut out = Field::make(space, like.width, like.height, count);
     let (len, stride, width) = (out.row_len(), out.stride(), out.width);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Grow { from, rows, out, count, stride, width });

@@ -2,11 +2,12 @@
 
 use super::Options;
 use super::choose::Choice;
-use super::field::{Beyond, Field, RIM, Space};
+use super::field::{Beyond, Field, RIM};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
 use super::ladder::Scale;
 use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
@@ -110,7 +111,7 @@ impl<T: SimdReal> Kernel<T> for Collapse<'_, T> {
 
 /// The plain estimate of a coarse grid.
 pub(super) fn collapse<T: SimdReal>(simd: Level, space: &Space<T>, plain: &Plain<'_, T>) -> Field<T> {
-    let mut out = space.field(plain.grid.width, plain.grid.height, FIT);
+    let mut out = Field::make(space, plain.grid.width, plain.grid.height, FIT);
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Collapse { plain, rows, out }));
     out.extend(0..2, Beyond::Odd, 2);

@@ -3,10 +3,11 @@
 //! The level is a power mean `(G * f^p)^(1/p)`: with p = 1/4 it lies near a median, with p = -1/4 near the calm part of the region.
 
 use super::Options;
-use super::field::{Beyond, Field, RIM, Space};
+use super::field::{Beyond, Field, RIM};
 use super::fit::{FIT, pick, smooth_row};
 use super::ladder::{Ladder, MAX_OCTAVE, Taps};
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
+use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
@@ -80,7 +81,7 @@ pub(super) fn regional_means<T: SimdReal>(
             continue;
         }
         let half = |n: usize| n.div_ceil(1 << octave);
-        let mut field = space.field(half(data.width), half(data.height), features.targets.len());
+        let mut field = Field::make(space, half(data.width), half(data.height), features.targets.len());
         let (len, stride, width) = (field.row_len(), field.stride(), field.width);
         let (items, step) = (features.items.as_slice(), 1 << octave);
         for_each_band(field.rows_mut(), len, |_, rows, out| {
@@ -92,7 +93,7 @@ pub(super) fn regional_means<T: SimdReal>(
         for_each_band(out.data_mut(), len, |_, rows, out| {
             dispatch(simd, Means { from, targets, step, rows, out, len, stride, width });
         });
-        space.keep([field]);
+        Field::keep(space, [field]);
     }
     out
 }

@@ -54,7 +54,7 @@ fn density(deviation: f64) -> f64 {
 }
 
 fn refined<T: SimdReal>(motion: &Planes<T>, data: &Planes<T>) -> Planes<T> {
-    refine(Level::detect(), &mut Space::default(), &seven(), motion, data).0
+    refine(Level::detect(), &Space::default(), &seven(), motion, data).0
 }
 
 /// Root of the mean square over the sites `keep`, of some planes, against the truth `f(plane, x px, y px)`.
@@ -151,7 +151,7 @@ fn motion_boundaries_stay_sharp() {
         (2.0..16.0).contains(&distance.abs()) && (10.0..140.0).contains(&y)
     };
     let mixed = refined(&motion, &data);
-    let plain = refine(Level::detect(), &mut Space::default(), &Options { gate: 1e9, ..seven() }, &motion, &data).0;
+    let plain = refine(Level::detect(), &Space::default(), &Options { gate: 1e9, ..seven() }, &motion, &data).0;
     let (with, without) = (rms(&mixed, 2..6, near, truth), rms(&plain, 2..6, near, truth));
     assert!(with < 0.5 * without, "{with} {without}");
     // Of the flow itself the narrow plain windows lose little.
@@ -178,9 +178,9 @@ fn the_number_of_threads_changes_no_bit() {
 #[test]
 fn every_instruction_set_agrees() {
     let (motion, data) = (busy::<f64>(), evidence(83, 70, density(0.03)));
-    let want = refine(Level::SCALAR, &mut Space::default(), &seven(), &motion, &data).0;
+    let want = refine(Level::SCALAR, &Space::default(), &seven(), &motion, &data).0;
     for level in Level::available() {
-        let got = refine(level, &mut Space::default(), &seven(), &motion, &data).0;
+        let got = refine(level, &Space::default(), &seven(), &motion, &data).0;
         for (k, y) in (0..8).flat_map(|k| (0..70).map(move |y| (k, y))) {
             for (a, b) in got.line(k, y).iter().zip(want.line(k, y)) {
                 assert!((a - b).abs() < 1e-9 * (1.0 + b.abs()), "{level:?} {k} {a} {b}");
@@ -207,16 +207,16 @@ fn time() {
         cells + (x / 60.0 + k as f64).sin() + 0.05 * white((x / PITCH) as usize, (y / PITCH) as usize, k)
     });
     let data = evidence(320, 240, density(0.05));
-    let mut space = Space::default();
+    let space = Space::default();
     let levels = Level::from_environment().unwrap().map_or_else(Level::available, |level| vec![level]);
     for level in levels {
         let mut best = f64::INFINITY;
         for _ in 0..8 {
             let start = std::time::Instant::now();
             let out = Threads::new(Some(1)).unwrap();
-            let out = out.install(|| refine(level, &mut space, &seven(), &motion, &data).0);
+            let out = out.install(|| refine(level, &space, &seven(), &motion, &data).0);
             best = best.min(start.elapsed().as_secs_f64());
-            space.reclaim(out);
+            space.keep(out);
         }
         println!("{}: {:.2} ms, {:.1} ns/pixel", level.name(), best * 1e3, best * 1e9 / (640.0 * 480.0));
     }

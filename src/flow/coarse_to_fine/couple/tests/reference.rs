@@ -40,6 +40,7 @@ pub(super) fn naive<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Coupl
     let size @ (w, h) = (motion.width, motion.height);
     let mut m: Vec<[f64; 6]> = (0..w * h).map(|i| motion_at(motion, i % w, i / w)).collect();
     let start = m.clone();
+    let mut omegas = vec![[0.0; 4]; w * h];
     for sweep in 0..c.sweeps {
         for parity in [sweep % 2, 1 - sweep % 2] {
             for y in (parity..h).step_by(2) {
@@ -48,12 +49,13 @@ pub(super) fn naive<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Coupl
                     let (n, r) = site(data, x, y);
                     let loc = noise + data.at(ERROR, x, y).to_f64().max(0.0);
                     let (mut a, mut b) = (n / loc, r / loc);
-                    let here = old[y * w + x];
-                    for way in AROUND {
+                    for (way, omega) in AROUND.into_iter().zip(&mut omegas[y * w + x]) {
                         let Some((nx, ny)) = beside(x, y, way, size) else { continue };
                         let (there, way) = (old[ny * w + nx], (way.0 as f64, way.1 as f64));
-                        let (du, dj) = strain(&here, &there, way);
-                        let omega = 1.0 / (1.0 + (c.flow * squares(&du) + c.jacobian * squares(&dj)) / c.break_at);
+                        if sweep % c.reweigh == 0 {
+                            let (du, dj) = strain(&old[y * w + x], &there, way);
+                            *omega = 1.0 / (1.0 + (c.flow * squares(&du) + c.jacobian * squares(&dj)) / c.break_at);
+                        }
                         // Rows of a least-squares problem: weight, the six coefficients, the right side.
                         let t = [1.0, HALF * way.0, HALF * way.1];
                         for k in 0..6 {
@@ -65,8 +67,8 @@ pub(super) fn naive<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Coupl
                                 row[k] = 1.0;
                                 (c.jacobian, there[k])
                             };
-                            a += row * row.transpose() * (omega * weight);
-                            b += row * (omega * weight * value);
+                            a += row * row.transpose() * (*omega * weight);
+                            b += row * (*omega * weight * value);
                         }
                     }
                     if let Some(solved) = a.cholesky() {

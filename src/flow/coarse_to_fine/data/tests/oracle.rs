@@ -50,7 +50,8 @@ impl Case {
 
     /// The code under test.
     pub fn run<T: SimdReal>(&self, level: Level, threads: usize) -> (Planes<T>, Vec<T>) {
-        let term = DataTerm::<T>::new(level, self.options);
+        let pool = Pool::default();
+        let term = DataTerm::<T>::new(level, self.options, &pool);
         let splines: Vec<Spline<T>> =
             self.frames.iter().map(|f| Spline::new(level, &f.map(|v| T::from_f64(*v)))).collect();
         let masks: Vec<_> = self.masks.iter().map(Option::as_ref).collect();

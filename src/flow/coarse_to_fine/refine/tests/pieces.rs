@@ -221,7 +221,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let motion = field::<f64>(WIDTH, HEIGHT, |k, x, y| if x > 30.0 { 2.0 } else { rough(k, x, y) });
     let data = evidence::<f64>(WIDTH, HEIGHT, 1e6);
     let options = Options { ladder: &[2.5], gate: 1e-9, ..seven() };
-    let got = refine(Level::detect(), &mut Space::default(), &options, &motion, &data).0;
+    let got = refine(Level::detect(), &Space::default(), &options, &motion, &data).0;
     let base = mean_motion(&motion);
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
     let grids = grids(Level::detect(), &Space::default(), &ladder, &motion, &base);
