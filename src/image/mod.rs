@@ -23,7 +23,7 @@ pub use sample::Interpolation;
 pub use smooth::GaussianSmoother;
 
 pub(crate) use fill::fill_holes;
-pub(crate) use pyramid::{halve_into, halve_mask};
+pub(crate) use pyramid::{halve_into, halve_mask, halved_noise, halved_size};
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};
 pub(crate) use spline::Spline;

@@ -14,6 +14,16 @@ pub(crate) fn halved_size((width, height): (usize, usize)) -> (usize, usize) {
     (width.div_ceil(2), height.div_ceil(2))
 }
 
+/// What halving leaves of the variance of white noise.
+pub(crate) fn halved_noise() -> f64 {
+    taps().iter().map(|w| w * w).sum::<f64>().powi(2)
+}
+
+/// Weights of the smoothing before a frame is halved, at distances -3 to 3.
+fn taps() -> Vec<f64> {
+    GaussianSmoother { sigma: 1.0, truncate: RADIUS as f64, border: super::Border::Replicate }.kernel()
+}
+
 /// The frame smoothed by a Gaussian of 1 px, at every second pixel:
 /// `out(x, y) = sum_j sum_i w_i w_j in(2 x + i, 2 y + j)`, `w_i = exp(-i^2 / 2) / sum`, `|i| <= 3`, the border replicated: one step of the pyramid of
 /// P. J. Burt and E. H. Adelson, "The Laplacian pyramid as a compact image code", 1983, with sampled Gaussian weights.
@@ -34,7 +44,7 @@ pub(crate) fn halve_into<T: SimdReal>(level: Level, frame: &Frame<T>, out: &mut 
     if frame.data().is_empty() {
         return;
     }
-    let taps = GaussianSmoother { sigma: 1.0, truncate: RADIUS as f64, border: super::Border::Replicate }.kernel();
+    let taps = taps();
     let half = std::array::from_fn(|k| T::from_f64(taps[RADIUS + k]));
     for_each_band(out.data_mut(), width, |_, rows, output| {
         dispatch(level, Band { frame, half, first_row: rows.start, output });

@@ -18,7 +18,7 @@ const REACH: usize = 3;
 #[derive(Debug, Default)]
 pub(super) struct PyramidLevel<T> {
     pub size: (usize, usize),
-    /// One a frame.
+    /// One a frame; on levels that are not worked on they are of no frame at all, or of an earlier one.
     pub splines: Vec<Spline<T>>,
     /// Pixels whose neighbourhood is usable, one a frame; `None`: all.
     pub usable: Vec<Option<Mask>>,
@@ -57,10 +57,19 @@ impl<T: SimdReal> Pyramid<T> {
         self.levels.iter().map(|level| 2 * level.frames.iter().map(|f| f.data().len()).sum::<usize>()).sum()
     }
 
-    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px.
-    pub fn fill(&mut self, simd: Level, frames: &[&Frame<T>], range: Range, mask: Option<&Mask>, most: Option<usize>) {
+    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px. Returns which is the finest that can be
+    /// warped: `last`, if there are so many.
+    pub fn fill(
+        &mut self,
+        simd: Level,
+        frames: &[&Frame<T>],
+        range: Range,
+        mask: Option<&Mask>,
+        (most, last): (Option<usize>, usize),
+    ) -> usize {
         let size = frames.first().map_or((0, 0), |frame| frame.size());
         self.count = count(size, most);
+        let last = last.min(self.count - 1);
         self.levels.resize_with(self.levels.len().max(self.count), PyramidLevel::default);
         let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, range, mask)).collect();
         for k in 0..self.count {
@@ -86,10 +95,13 @@ impl<T: SimdReal> Pyramid<T> {
             }
             level.size = level.frames[0].size();
             level.usable = masks.iter().map(|mask| mask.as_ref().map(|m| shrunk(m, REACH))).collect();
-            for (spline, frame) in level.splines.iter_mut().zip(&level.frames) {
-                spline.refill(simd, frame);
+            if k >= last {
+                for (spline, frame) in level.splines.iter_mut().zip(&level.frames) {
+                    spline.refill(simd, frame);
+                }
             }
         }
+        last
     }
 }
 
@@ -144,7 +156,7 @@ mod tests {
 
     fn pyramid(frames: &[&Frame<f32>], most: Option<usize>) -> Pyramid<f32> {
         let mut pyramid = Pyramid::default();
-        pyramid.fill(Level::SCALAR, frames, Range { mean: 0.0, gain: 1.0, contrast: 1.0 }, None, most);
+        pyramid.fill(Level::SCALAR, frames, Range { mean: 0.0, gain: 1.0, contrast: 1.0 }, None, (most, 0));
         pyramid
     }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 /// How much work an estimate may cost. Errors and times of each are measured by `benchmarks/compare.py`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Preset {
-    /// One linearisation on the finest level and few sweeps.
+    /// The motion at half the resolution, where few iterations cost little; detail of a few px is lost.
     Fast,
     /// Two linearisations on the finest level.
     #[default]
@@ -43,10 +43,12 @@ impl Preset {
     pub(super) fn effort(self) -> Effort {
         let coupling = Coupling::default();
         match self {
-            Self::Fast => Effort { finest: 1, second: 3, third: 4, coupling: Coupling { sweeps: 4, ..coupling } },
-            Self::Balanced => Effort { finest: 2, second: 5, third: 4, coupling },
+            Self::Fast => {
+                Effort { last: 1, finest: 3, second: 4, third: 4, coupling: Coupling { sweeps: 4, ..coupling } }
+            }
+            Self::Balanced => Effort { last: 0, finest: 2, second: 5, third: 4, coupling },
             Self::Accurate => {
-                Effort { finest: 4, second: 6, third: 6, coupling: Coupling { break_at: 0.2, ..coupling } }
+                Effort { last: 0, finest: 4, second: 6, third: 6, coupling: Coupling { break_at: 0.2, ..coupling } }
             }
         }
     }
@@ -55,7 +57,9 @@ impl Preset {
 /// Numbers of iterations: linearisations, each followed by coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effort {
-    /// On the finest level.
+    /// The finest level that is worked on, 0 being the frame itself.
+    pub last: usize,
+    /// On that level.
     pub finest: usize,
     /// On the next.
     pub second: usize,
@@ -65,17 +69,19 @@ pub(super) struct Effort {
     pub coupling: Coupling,
 }
 
-/// Iterations and sweeps on all coarser levels: they cost next to nothing, and what they miss is lost.
+/// Pixels of a level on which work costs next to nothing.
+const SMALL: usize = 2500;
+/// Iterations and sweeps there: what coarse levels miss is lost.
 const COARSE: (usize, usize) = (10, 10);
 
 impl Effort {
-    /// Iterations on level `k`, 0 being the finest, and how strongly and often sites are coupled there.
-    pub fn on_level(&self, k: usize) -> (usize, Coupling) {
-        match k {
+    /// Iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there.
+    pub fn on_level(&self, k: usize, size: (usize, usize)) -> (usize, Coupling) {
+        match k - self.last.min(k) {
+            _ if size.0 * size.1 <= SMALL => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
             0 => (self.finest, self.coupling),
             1 => (self.second, self.coupling),
-            2 => (self.third, self.coupling),
-            _ => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
+            _ => (self.third, self.coupling),
         }
     }
 }

@@ -5,12 +5,13 @@ use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
 use super::memory::Space;
 use super::reference::at_first_frame;
-use super::resample::motion_at;
+use super::resample::{finer, motion_at};
 use super::rows::RowReader;
 use super::run::Estimate;
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
 use crate::flow::windowed::solve::ENTRIES;
+use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, Sites, Status};
 use rayon::prelude::*;
@@ -26,16 +27,21 @@ pub(super) fn fill<T: SimdReal>(
     common: &Common,
     field: &mut FlowField<T>,
 ) {
-    let moved = (frames.len() == 2).then(|| at_first_frame(common.level(), space, &estimate.motion));
+    let simd = common.level();
+    let moved = (frames.len() == 2).then(|| at_first_frame(simd, space, &estimate.motion));
+    let found = moved.as_ref().unwrap_or(&estimate.motion);
+    let full = at_full_resolution(simd, space, (estimate.level, found), frames[0].size());
     // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
-    let noise = common.noise.map(|sigma| share * rows * (sigma * estimate.range.gain).powi(2));
+    let left = halved_noise().powi(estimate.level as i32);
+    let noise = common.noise.map(|sigma| share * rows * left * (sigma * estimate.range.gain).powi(2));
     let writer = Writer {
-        simd: common.level(),
+        simd,
+        pitch: 2 << estimate.level,
         data: estimate.data,
         per_row: 1.0 / (rows.sqrt() * estimate.range.gain),
-        motion: moved.as_ref().unwrap_or(&estimate.motion),
+        motion: full.as_ref().unwrap_or(found),
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
@@ -46,9 +52,24 @@ pub(super) fn fill<T: SimdReal>(
         Sites::Points(points) => writer.points(points, &mut band),
         Sites::Grid { .. } => dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band }),
     });
-    if let Some(moved) = moved {
-        space.keep(moved);
+    moved.into_iter().chain(full).for_each(|planes| space.keep(planes));
+}
+
+/// The motion on the sites of the frame, where it was found on a coarser level.
+fn at_full_resolution<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    (level, found): (usize, &Planes<T>),
+    size: (usize, usize),
+) -> Option<Planes<T>> {
+    let mut motion: Option<Planes<T>> = None;
+    for level in (0..level).rev() {
+        let size = (0..level).fold(size, |size, _| halved_size(size));
+        let mut next = space.planes(0, 0, MOTION);
+        finer(simd, motion.as_ref().unwrap_or(found), size, &mut next);
+        motion.replace(next).into_iter().for_each(|planes| space.keep(planes));
     }
+    motion
 }
 
 /// Whether anything at all was seen: a constant image says nothing about motion.
@@ -60,6 +81,8 @@ fn is_observable<T: SimdReal>(estimate: &Estimate<'_, T>) -> bool {
 /// What the sites of the field are filled from.
 struct Writer<'a, T: Clone> {
     simd: Level,
+    /// Pixels between the sites of the data.
+    pitch: usize,
     data: &'a Planes<T>,
     /// From the root of the residual energy to grey levels.
     per_row: f64,
@@ -106,7 +129,7 @@ impl<T: SimdReal> Writer<'_, T> {
 
     /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
     fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
-        let (x, y) = (x / 2, y / 2);
+        let (x, y) = (x / self.pitch, y / self.pitch);
         if let Some(residual) = &mut band.residual {
             let energy = self.data.at(ERROR, x, y).to_f64().max(0.0);
             residual[at] = T::from_f64(if known { self.per_row * energy.sqrt() } else { f64::NAN });

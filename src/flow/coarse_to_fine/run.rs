@@ -50,14 +50,18 @@ impl CoarseToFine {
             let simd = common.level();
             let range = Range::of(frames[0]);
             let mut workspace = self.memory.take::<T>();
-            workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), self.options.levels);
-            let (coupled, scale) = descend(simd, self.options.preset.effort(), range, &mut workspace);
+            let effort = self.options.preset.effort();
+            let levels = (self.options.levels, effort.last);
+            let level = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
+            let (coupled, scale) = descend(simd, &effort, range, level, &mut workspace);
             let Workspace { pyramid, data, space, .. } = &mut *workspace;
             let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, data);
             space.keep(coupled);
-            let locking = Locking::measure(simd, &pyramid.levels()[0], &motion, scale);
+            // Detail too fine for the pixels does not reach coarser levels.
+            let frame = (level == 0).then(|| &pyramid.levels()[0]);
+            let locking = frame.map(|frame| Locking::measure(simd, frame, &motion, scale)).unwrap_or_default();
             locking.correct(simd, &mut motion);
-            let estimate = Estimate { motion, data, range, evidence, locking };
+            let estimate = Estimate { level, motion, data, range, evidence, locking };
             output::fill(&estimate, space, frames, common, field);
             space.keep(estimate.motion);
             estimate.evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
@@ -66,9 +70,11 @@ impl CoarseToFine {
     }
 }
 
-/// The motion on the sites of the finest level, and what it rests on.
+/// The motion on the sites of the finest level worked on, and what it rests on.
 #[derive(Debug)]
 pub(super) struct Estimate<'a, T> {
+    /// The level of the pyramid that all lengths are in pixels of.
+    pub level: usize,
     /// `u, v, u_x, v_x, u_y, v_y` on every second pixel, midway in time.
     pub motion: Planes<T>,
     /// The last data term.
@@ -128,12 +134,13 @@ impl Range {
     }
 }
 
-/// The way from the coarsest level of the filled pyramid to the finest: the coupled motion there with the standard deviation of the residual, and in the
+/// The way from the coarsest level of the filled pyramid to the level `last`: the coupled motion there with the standard deviation of the residual, and in the
 /// workspace the last data term.
 fn descend<T: SimdReal>(
     simd: Level,
-    effort: Effort,
+    effort: &Effort,
     range: Range,
+    last: usize,
     workspace: &mut Workspace<T>,
 ) -> (Planes<T>, Option<T>) {
     let Workspace { pyramid, data, pool, scratch, space } = workspace;
@@ -141,7 +148,7 @@ fn descend<T: SimdReal>(
         Step { simd, range, term: DataTerm::new(simd, DataOptions::default(), pool), data, scratch, scale: None };
     let mut motion = space.planes(0, 0, MOTION);
     let mut old = space.planes(0, 0, MOTION);
-    for (k, level) in pyramid.levels().iter().enumerate().rev() {
+    for (k, level) in pyramid.levels().iter().enumerate().skip(last).rev() {
         if k + 1 == pyramid.levels().len() {
             motion.reshape(level.size.0.div_ceil(2), level.size.1.div_ceil(2), MOTION);
             motion.data_mut().fill(T::from_f64(0.0));
@@ -149,7 +156,7 @@ fn descend<T: SimdReal>(
             std::mem::swap(&mut motion, &mut old);
             finer(simd, &old, level.size, &mut motion);
         }
-        let (iterations, coupling) = effort.on_level(k);
+        let (iterations, coupling) = effort.on_level(k, level.size);
         for _ in 0..iterations {
             std::mem::swap(&mut motion, &mut old);
             rederive(&old, &mut motion);

@@ -58,7 +58,7 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Option
     if carried {
         places = carry::to_first_frame(&places, &estimate.motion, (width, height));
     }
-    Spread::new(&places, (width, height))
+    Spread::new(&places, (width, height), estimate.level)
 }
 
 /// Adds noise of the density times its share in the flow and in the derivatives along x and y.

@@ -30,7 +30,7 @@ fn measured(sigma: f64, flow: (f64, f64)) -> Locking {
     let half = (0.5 * flow.0, 0.5 * flow.1);
     let frames = [spots(sigma, (-half.0, -half.1)), spots(sigma, half)];
     let mut pyramid = Pyramid::default();
-    pyramid.fill(Level::detect(), &[&frames[0], &frames[1]], AS_IT_IS, None, Some(1));
+    pyramid.fill(Level::detect(), &[&frames[0], &frames[1]], AS_IT_IS, None, (Some(1), 0));
     let mut motion = Planes::new(64, 56, 6);
     for y in 0..56 {
         motion.line_mut(0, y).fill(flow.0);
