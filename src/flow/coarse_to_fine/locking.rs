@@ -20,7 +20,7 @@ const SIDE: usize = 16;
 /// Samples of a patch.
 const SAMPLES: usize = SIDE * SIDE;
 /// Patches, about.
-const PATCHES: f64 = 96.0;
+const PATCHES: f64 = 64.0;
 /// Fewer patches tell nothing.
 const FEWEST: usize = 4;
 /// Amplitudes beyond this are no peak locking, px.
@@ -204,8 +204,10 @@ impl Warped {
         // Steps along the axis and across it.
         let (a, b) = if c == 0 { (1, SIDE) } else { (SIDE, 1) };
         let (mean, rate) = (&self.mean, &self.rate);
-        let value = |p: &[f64; SAMPLES], i: usize, step: usize| (p[i - step] + 4.0 * p[i] + p[i + step]) / 6.0;
-        let smooth = |p: &[f64; SAMPLES], at: [usize; 3], step: usize| at.map(|i| value(p, i, step));
+        let value = |p: &[f64; SAMPLES], i: usize, step: usize| (p[i - step] + 4.0 * p[i] + p[i + step]) * (1.0 / 6.0);
+        let smooth = |p: &[f64; SAMPLES], [before, here, after]: [usize; 3], step: usize| {
+            [value(p, before, step), value(p, here, step), value(p, after, step)]
+        };
         let slope = |[before, _, after]: [f64; 3]| 0.5 * (after - before);
         let across = smooth(mean, [i - a, i, i + a], b);
         let (first, second) = (slope(across), across[0] - 2.0 * across[1] + across[2]);

@@ -46,7 +46,13 @@ impl Preset {
             Self::Fast => {
                 Effort { last: 1, finest: 3, second: 4, third: 4, coupling: Coupling { sweeps: 4, ..coupling } }
             }
-            Self::Balanced => Effort { last: 0, finest: 2, second: 5, third: 4, coupling },
+            Self::Balanced => Effort {
+                last: 0,
+                finest: 2,
+                second: 5,
+                third: 6,
+                coupling: Coupling { sweeps: 4, break_at: 0.13, ..coupling },
+            },
             Self::Accurate => {
                 Effort { last: 0, finest: 4, second: 6, third: 6, coupling: Coupling { break_at: 0.2, ..coupling } }
             }

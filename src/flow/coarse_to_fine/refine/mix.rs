@@ -16,6 +16,8 @@ use std::ops::Range;
 const ASIDE: f64 = 1.5;
 /// Variance added to what a window is judged by, px^2.
 const SOFT: f64 = 1e-4;
+/// Shares of the edge fits below this count as none, so that calm places can pass them by.
+const SHUT: f64 = 0.12;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
@@ -198,20 +200,26 @@ impl<T: SimdReal> Final<'_, T> {
     #[inline(always)]
     fn chunk<V: Lanes<Scalar = T>>(&self, x: usize, y: usize, plain: &[T], weights: &[T], out: &mut [T]) {
         let stride = self.plain.grid.stride();
+        let cube = V::constant(self.options.gate.powi(3));
+        let mut gates = [T::from_f64(0.0); CHUNK];
+        for i in (0..CHUNK).step_by(V::LANES) {
+            let misfit = V::load(&plain[(FIT - 1) * stride + LEFT + x + i..]).max(V::zero());
+            let third = misfit * misfit * misfit;
+            let gate = third / (third + cube);
+            ((gate - V::constant(SHUT)).max(V::zero()) * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates[i..]);
+        }
         let mut sums = [[T::from_f64(0.0); CHUNK]; 6];
+        let is_open = any(&gates);
         for (edge, weight) in self.edges.iter().zip(weights.chunks_exact(2 * stride).skip(3)) {
             let weight = chunk_of(&weight[x..]);
-            if any(weight) {
+            if is_open && any(weight) {
                 self.edge::<V>(edge, [x, y], weight, &mut sums);
             }
         }
-        let cube = V::constant(self.options.gate.powi(3));
         let slope = [self.base[2], self.base[3], self.base[4], self.base[5]].map(|b| b * self.pitch);
         for i in (0..CHUNK).step_by(V::LANES) {
             let at = LEFT + x + i;
-            let misfit = V::load(&plain[(FIT - 1) * stride + at..]).max(V::zero());
-            let third = misfit * misfit * misfit;
-            let gate = V::constant(1.0) - cube / (third + cube);
+            let gate = V::load(&gates[i..]);
             for (k, sum) in sums.iter().enumerate() {
                 let value = V::load(&plain[k * stride + at..]);
                 let mut value = (V::load(&sum[i..]) - value).mul_add(gate, value);
