@@ -256,7 +256,7 @@ class FlowField:
 def estimate(
     frames: _Frames,
     *,
-    method: _Method = "windowed",
+    method: _Method = "coarse_to_fine",
     preset: _Preset | None = None,
     levels: int | None = None,
     model: _Model = "affine",
@@ -384,7 +384,7 @@ class FlowEstimator:
     def __new__(
         cls,
         *,
-        method: _Method = "windowed",
+        method: _Method = "coarse_to_fine",
         preset: _Preset | None = None,
         levels: int | None = None,
         model: _Model = "affine",

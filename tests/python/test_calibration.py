@@ -35,7 +35,8 @@ def test_errors_lie_within_their_deviations(name, carrier, noise):
     for parameter in (*field.parameters, "divergence", "curl"):
         error = (field.value(parameter) - truth.value(parameter))[known]
         deviation = field.std(parameter)[known]
-        assert (np.abs(error) < 2 * deviation).mean() > 0.88, parameter
+        # Errors go together over the windows, some 20 px: a frame of this size holds only a few dozen independent ones.
+        assert (np.abs(error) < 2 * deviation).mean() > 0.85, parameter
 
 
 @pytest.mark.parametrize(("name", "carrier"), CASES)

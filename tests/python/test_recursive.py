@@ -84,8 +84,8 @@ def test_points_are_those_of_the_whole(frames):
 def test_holes_are_predicted(frames):
     holed = frames.astype(np.float32)
     holed[4, 28, 30] = np.nan
-    fields = jacoflow.estimate(holed, temporal="recursive")
-    clean = jacoflow.estimate(frames, temporal="recursive")
+    fields = jacoflow.estimate(holed, method="windowed", temporal="recursive")
+    clean = jacoflow.estimate(frames, method="windowed", temporal="recursive")
     # Triples 2 to 4 see frame 4.
     status = fields.status[:, 28, 30]
     assert status.tolist() == [Status.OK] * 2 + [Status.PREDICTED] * 3 + [Status.OK] * 2

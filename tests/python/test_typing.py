@@ -28,7 +28,9 @@ def test_estimate() -> None:
     covariance = field.covariance
     assert covariance is not None and covariance.shape[-2:] == (6, 6)
     assert Status(int(field.status[5, 5])) is Status.OK
-    points = jacoflow.estimate(stack, points=[(3, 4), (5, 6)], neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)])
+    points = jacoflow.estimate(
+        stack, method="windowed", points=[(3, 4), (5, 6)], neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    )
     assert points.shape == (2, 2)
 
 

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 pub struct MethodArguments {
     /// Estimator: windowed (accurate), coarse-to-fine (large motions, edges, untextured areas), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the baselines
     /// lucas-kanade and horn-schunck
-    #[arg(long, value_name = "NAME", default_value = "windowed")]
+    #[arg(long, value_name = "NAME", default_value = "coarse-to-fine")]
     pub method: String,
     /// coarse-to-fine: cost against error, fast, balanced (default) or accurate
     #[arg(long, value_name = "NAME")]

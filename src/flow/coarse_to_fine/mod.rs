@@ -26,5 +26,5 @@ mod run;
 pub use options::{CoarseToFineOptions, LEAST_SIDE, Preset};
 pub(super) use run::CoarseToFine;
 
-/// How far errors of neighbouring estimates go together, px: about the middle of the windows that are chosen.
-pub(super) const CORRELATION_LENGTH: f64 = 4.0;
+/// How far errors of neighbouring estimates go together, px: that of wide windows, so that means over regions are not told too well.
+pub(super) const CORRELATION_LENGTH: f64 = 8.0;

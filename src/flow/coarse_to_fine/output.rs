@@ -1,6 +1,6 @@
 //! From the sites' motion to the field that was asked for.
 
-use super::covariance::{Spread, covariance};
+use super::covariance::{Energy, Spread, covariance};
 use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
 use super::memory::Space;
@@ -10,6 +10,7 @@ use super::rows::RowReader;
 use super::run::Estimate;
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
+use crate::flow::windowed::run::are_rounded;
 use crate::flow::windowed::solve::ENTRIES;
 use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
@@ -35,7 +36,12 @@ pub(super) fn fill<T: SimdReal>(
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
     let left = halved_noise().powi(estimate.level as i32);
-    let noise = common.noise.map(|sigma| share * rows * left * (sigma * estimate.range.gain).powi(2));
+    let energy_of = |variance: f64| share * rows * left * variance * estimate.range.gain.powi(2);
+    let noise = || match common.noise {
+        Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
+        // Rounding is the least noise that whole numbers can have.
+        None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
+    };
     let writer = Writer {
         simd,
         pitch: 2 << estimate.level,
@@ -45,7 +51,7 @@ pub(super) fn fill<T: SimdReal>(
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
-        covariance: field.covariance.is_some().then(|| covariance(estimate, noise, frames.len() == 2)),
+        covariance: field.covariance.is_some().then(|| covariance(estimate, noise(), frames.len() == 2)),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {

@@ -13,7 +13,7 @@ use super::resample::{finer, rederive};
 use crate::error::Result;
 use crate::flow::options::Common;
 use crate::simd::{Level, SimdReal};
-use crate::types::{FlowField, Frame};
+use crate::types::{FlowField, Frame, Mask};
 
 /// Noise is taken for at least this share of the brightness' standard deviation.
 const LEAST_NOISE: f64 = 1e-3;
@@ -48,7 +48,7 @@ impl CoarseToFine {
     pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         common.threads.install(|| {
             let simd = common.level();
-            let range = Range::of(frames[0]);
+            let range = Range::of(frames[0], common.mask.as_ref());
             let mut workspace = self.memory.take::<T>();
             let effort = self.options.preset.effort();
             let levels = (self.options.levels, effort.last);
@@ -106,10 +106,12 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// That of the first frame's finite samples: of the middle nine tenths of them, since a single no-data value may be as large as 1e9.
-    fn of<T: SimdReal>(frame: &Frame<T>) -> Self {
+    /// That of the first frame's finite samples that may be used: of the middle nine tenths of them, since a single no-data value may be as large as 1e9.
+    fn of<T: SimdReal>(frame: &Frame<T>, mask: Option<&Mask>) -> Self {
         let every = (frame.data().len() / MOST_SAMPLES).max(1);
-        let mut values: Vec<f64> = frame.data().iter().step_by(every).map(|value| value.to_f64()).collect();
+        let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
+        let places = (0..frame.data().len()).step_by(every).filter(|&at| allowed(at));
+        let mut values: Vec<f64> = places.map(|at| frame.data()[at].to_f64()).collect();
         values.retain(|value| value.is_finite());
         if values.is_empty() {
             return Self { mean: 0.0, gain: 1.0, contrast: 0.0 };

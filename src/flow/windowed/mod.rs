@@ -51,7 +51,7 @@ mod noise_setting;
 mod options;
 mod results;
 mod rows;
-mod run;
+pub(in crate::flow) mod run;
 mod sandwich;
 pub(crate) mod solve;
 mod sound;

@@ -207,7 +207,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
 }
 
 /// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them: rounding is then the least noise they can have.
-fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
+pub(in crate::flow) fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
     const STEPS: f64 = 8.0;
     let range = |frame: &&Frame<T>| {
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);

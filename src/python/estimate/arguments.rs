@@ -21,7 +21,7 @@ macro_rules! estimator_options {
     ($then:ident $target:tt) => {
         with_common! {
             $then $target
-            method: String as &str = "windowed",
+            method: String as &str = "coarse_to_fine",
             preset: Option<String> as Option<String> = None,
             levels: Option<Integer> as Option<Integer> = None,
             model: String as &str = "affine",

@@ -19,6 +19,7 @@ use super::locking::Locking;
 use super::run::Estimate;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
+pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
@@ -39,9 +40,9 @@ type Entries = [f64; ENTRIES];
 
 /// The covariance at every place of the evidence.
 ///
-/// `energy`: the residual energy that the noise is known to leave; without it, it is read from the residuals. `carried`: told at the pixels of the first
+/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first
 /// frame, where the motion of a pair is found midway.
-pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Option<f64>, carried: bool) -> Spread<T> {
+pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Energy, carried: bool) -> Spread<T> {
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
     let noise = noise::Noise::new(evidence, estimate.data, energy);

@@ -23,6 +23,15 @@ const EXCESS: [f64; 2] = [0.5, 50.0];
 /// Least weight of wider windows at a place that counts.
 const COUNTS: f64 = 0.1;
 
+/// The residual energy that noise leaves, grey^2.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::flow::coarse_to_fine) enum Energy {
+    /// That of noise which is known.
+    Known(f64),
+    /// As the residuals tell, but no less.
+    AtLeast(f64),
+}
+
 /// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
 pub(super) struct Left {
     pub density: [f64; 3],
@@ -52,15 +61,15 @@ impl Edges {
 /// The noise of one estimate.
 pub(super) struct Noise<'a, T> {
     evidence: &'a Evidence<T>,
-    energy: Option<f64>,
+    energy: Energy,
     excess: f64,
     columns: Edges,
     rows: Edges,
 }
 
 impl<'a, T: SimdReal> Noise<'a, T> {
-    /// `energy`: known, or read from the residuals.
-    pub fn new(evidence: &'a Evidence<T>, data: &Planes<T>, energy: Option<f64>) -> Self {
+    /// For the estimate's last data term.
+    pub fn new(evidence: &'a Evidence<T>, data: &Planes<T>, energy: Energy) -> Self {
         let (width, height) = evidence.size();
         Self {
             evidence,
@@ -74,7 +83,10 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     /// What is left at a place.
     pub fn at(&self, x: usize, y: usize) -> Left {
         let [a, b, c] = informed(self.evidence.information(x, y));
-        let energy = self.energy.unwrap_or_else(|| self.evidence.energy(x, y));
+        let energy = match self.energy {
+            Energy::Known(energy) => energy,
+            Energy::AtLeast(least) => self.evidence.energy(x, y).max(least),
+        };
         let scale = self.excess * energy / (a * c - b * b);
         let mut left = Left { density: [c * scale, -b * scale, a * scale], flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
