@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MethodArguments {
-    /// Estimator: windowed (accurate), coarse-to-fine (large motions, edges, untextured areas), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the baselines
+    /// Estimator: coarse-to-fine (large motions, edges, untextured areas), windowed (one window, motions of a pixel or two), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the baselines
     /// lucas-kanade and horn-schunck
     #[arg(long, value_name = "NAME", default_value = "coarse-to-fine")]
     pub method: String,
