@@ -20,7 +20,7 @@ const SIDE: usize = 16;
 /// Samples of a patch.
 const SAMPLES: usize = SIDE * SIDE;
 /// Patches, about.
-const PATCHES: f64 = 64.0;
+const PATCHES: f64 = 48.0;
 /// Fewer patches tell nothing.
 const FEWEST: usize = 4;
 /// Amplitudes beyond this are no peak locking, px.

@@ -50,7 +50,7 @@ impl Preset {
                 last: 0,
                 finest: 2,
                 second: 5,
-                third: 6,
+                third: 5,
                 coupling: Coupling { sweeps: 4, break_at: 0.13, ..coupling },
             },
             Self::Accurate => {

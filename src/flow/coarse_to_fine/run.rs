@@ -57,9 +57,7 @@ impl CoarseToFine {
             let Workspace { pyramid, data, space, .. } = &mut *workspace;
             let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, data);
             space.keep(coupled);
-            // Detail too fine for the pixels does not reach coarser levels.
-            let frame = (level == 0).then(|| &pyramid.levels()[0]);
-            let locking = frame.map(|frame| Locking::measure(simd, frame, &motion, scale)).unwrap_or_default();
+            let locking = Locking::measure(simd, &pyramid.levels()[level], &motion, scale);
             locking.correct(simd, &mut motion);
             let estimate = Estimate { level, motion, data, range, evidence, locking };
             output::fill(&estimate, space, frames, common, field);

@@ -17,7 +17,7 @@ const ASIDE: f64 = 1.5;
 /// Variance added to what a window is judged by, px^2.
 const SOFT: f64 = 1e-4;
 /// Shares of the edge fits below this count as none, so that calm places can pass them by.
-const SHUT: f64 = 0.12;
+const SHUT: f64 = 0.2;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
