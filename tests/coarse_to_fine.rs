@@ -167,6 +167,31 @@ fn holes_get_their_status_and_their_surroundings_an_estimate() {
 }
 
 #[test]
+fn nothing_but_noise_is_told_apart_from_motion() {
+    let blank = Frame::filled(SIZE, SIZE, 100.0);
+    let noisy = |seed: u64| Sensor::eight_bit(3.0, seed).apply(&blank, seed).map(|&value| value as f32);
+    let frames = [noisy(1), noisy(2)];
+    for preset in Preset::EVERY {
+        let options = CoarseToFineOptions { preset, ..CoarseToFineOptions::pair() };
+        let field = estimate(options, Common { covariance: true, ..Common::default() }, &frames);
+        let (u, spread) = (field.plane("u").unwrap(), field.standard_deviation("u").unwrap());
+        let wrong =
+            u.iter().zip(&spread).filter(|(u, spread)| u.abs() > 3.0 * **spread).count() as f64 / u.len() as f64;
+        println!("{}: {wrong:.3} of the sites claim to move", preset.name());
+        assert!(wrong < 0.2, "{}: {wrong}", preset.name());
+    }
+}
+
+#[test]
+fn wide_frames_and_single_levels_find_small_motions() {
+    let scene = AffineTexture::moving((200, 20), [1.0, 0.5, 0.0, 0.0, 0.0, 0.0], 5).unwrap();
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &frames(&scene, 1.0, &[0.0, 1.0]));
+    let (u, v) = (field.plane("u").unwrap(), field.plane("v").unwrap());
+    let mean = |plane: &[f32]| plane.iter().map(|v| f64::from(*v)).sum::<f64>() / plane.len() as f64;
+    assert!((mean(u) - 1.0).abs() < 0.05 && (mean(v) - 0.5).abs() < 0.05, "{} {}", mean(u), mean(v));
+}
+
+#[test]
 fn constant_frames_are_unobservable_and_small_ones_no_error() {
     let flat = vec![Frame::filled(20, 16, 7.0_f32), Frame::filled(20, 16, 7.0)];
     let field = estimate(CoarseToFineOptions::pair(), Common::default(), &flat);

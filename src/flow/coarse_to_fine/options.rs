@@ -81,10 +81,11 @@ const SMALL: usize = 2500;
 const COARSE: (usize, usize) = (10, 10);
 
 impl Effort {
-    /// Iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there.
-    pub fn on_level(&self, k: usize, size: (usize, usize)) -> (usize, Coupling) {
+    /// Iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there; on the coarsest nothing is known
+    /// yet.
+    pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> (usize, Coupling) {
         match k - self.last.min(k) {
-            _ if size.0 * size.1 <= SMALL => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
+            _ if is_coarsest || size.0 * size.1 <= SMALL => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
             0 => (self.finest, self.coupling),
             1 => (self.second, self.coupling),
             _ => (self.third, self.coupling),

@@ -156,7 +156,7 @@ fn descend<T: SimdReal>(
             std::mem::swap(&mut motion, &mut old);
             finer(simd, &old, level.size, &mut motion);
         }
-        let (iterations, coupling) = effort.on_level(k, level.size);
+        let (iterations, coupling) = effort.on_level(k, level.size, k + 1 == pyramid.levels().len());
         for _ in 0..iterations {
             std::mem::swap(&mut motion, &mut old);
             rederive(&old, &mut motion);

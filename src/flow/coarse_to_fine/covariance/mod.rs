@@ -45,7 +45,7 @@ type Entries = [f64; ENTRIES];
 pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Energy, carried: bool) -> Spread<T> {
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
-    let noise = noise::Noise::new(evidence, estimate.data, energy);
+    let noise = noise::Noise::new(evidence, estimate.data, energy, carried);
     let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
