@@ -18,7 +18,7 @@ REACHED = {
     "_dimetrodon": (0.13, 0.0175),
     "_yosemite": (0.085, 0.0123),
     # Asked: 0.34, 0.038.
-    "_sintel": (0.353, 0.0402),
+    "_sintel": (0.354, 0.0402),
     # Asked: 0.072, 0.016.
     "_piv DNS_turbulence_00001": (0.078, 0.0162),
     "_piv backstep_Re800_00001": (0.034, 0.0032),
