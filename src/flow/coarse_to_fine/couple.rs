@@ -63,8 +63,8 @@ pub(super) struct CoupleScratch<T> {
     rings: Vec<wave::Ring<T>>,
 }
 
-/// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the sites, and returns `s^2`: the median over the
-/// sites with data of their residual energy, at least `floor` (positive), grey^2.
+/// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the sites. `s^2` is the median over the sites with
+/// data of their residual energy, at least `floor` (positive), grey^2. Returns the root mean square over the sites of the change of the flow, px.
 ///
 /// The flow ends no further than 2 px from where it was. Where neither data nor neighbours say anything the motion stays. The result is the same for any
 /// number of threads; call it inside [`Threads::install`](crate::parallel::Threads::install).
@@ -75,17 +75,16 @@ pub(super) fn couple<T: SimdReal>(
     coupling: &Coupling,
     floor: T,
     scratch: &mut CoupleScratch<T>,
-) -> T {
+) -> f64 {
     let noise = typical_energy(data, floor, &mut scratch.energies);
     let (width, height) = (motion.width, motion.height);
     if width == 0 || height == 0 || coupling.sweeps == 0 {
-        return noise;
+        return 0.0;
     }
     keep_start(motion, &mut scratch.start);
     let bonds = visit::Bonds { data, noise, coupling };
     wave::sweep(level, &bonds, motion, &mut scratch.weights, &mut scratch.rings);
-    limit(level, motion, &scratch.start);
-    noise
+    limit(level, motion, &scratch.start)
 }
 
 /// The upper median of the energies of sites with data, at least `floor`.
@@ -120,39 +119,49 @@ fn keep_start<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     });
 }
 
-/// Scales changes of the flow back to [`LONGEST`].
-fn limit<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Planes<T>) {
-    let (rows, stride) = (motion.row_len(), motion.stride());
-    motion.data_mut().par_chunks_mut(rows).with_min_len(16).enumerate().for_each(|(y, row)| {
+/// Scales changes of the flow back to [`LONGEST`]; returns their root mean square.
+fn limit<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Planes<T>) -> f64 {
+    let (rows, stride, sites) = (motion.row_len(), motion.stride(), motion.width * motion.height);
+    let rows = motion.data_mut().par_chunks_mut(rows).with_min_len(16).enumerate().map(|(y, row)| {
         let (u, v) = row[..2 * stride].split_at_mut(stride);
         let (u0, v0) = start.row(y).split_at(stride);
-        dispatch(level, Limit { now: [u, v], start: [u0, v0] });
+        dispatch(level, Limit { now: [u, v], start: [u0, v0] })
     });
+    // Row by row, so that the sum does not depend on who made which.
+    let sums: Vec<f64> = rows.collect();
+    (sums.iter().sum::<f64>() / sites as f64).sqrt()
 }
 
-/// One row of [`limit`].
+/// One row of [`limit`], and the sum over its sites of the squared change.
 struct Limit<'a, T> {
     now: [&'a mut [T]; 2],
     start: [&'a [T]; 2],
 }
 
 impl<T: SimdReal> Kernel<T> for Limit<'_, T> {
-    type Output = ();
+    type Output = f64;
 
     #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
+    fn run<V: Lanes<Scalar = T>>(self) -> f64 {
         let [now_u, now_v] = self.now;
         let start = self.start[0].chunks_exact(V::LANES).zip(self.start[1].chunks_exact(V::LANES));
         let now = now_u.chunks_exact_mut(V::LANES).zip(now_v.chunks_exact_mut(V::LANES));
         let longest = V::constant(LONGEST);
+        // What lies beside the sites is zero before and after.
+        let mut sums = V::zero();
         for ((u, v), (u0, v0)) in now.zip(start) {
             let (from_u, from_v, to_u, to_v) = (V::load(u0), V::load(v0), V::load(u), V::load(v));
             let (du, dv) = (to_u - from_u, to_v - from_v);
-            let length = du.mul_add(du, dv * dv).sqrt();
+            let square = du.mul_add(du, dv * dv);
+            sums = sums + square;
+            let length = square.sqrt();
             let far = longest.lt(length);
             let factor = longest / length;
             V::select(far, du.mul_add(factor, from_u), to_u).store(u);
             V::select(far, dv.mul_add(factor, from_v), to_v).store(v);
         }
+        let mut lanes = [T::from_f64(0.0); LEFT];
+        sums.store(&mut lanes);
+        lanes[..V::LANES].iter().map(|sum| sum.to_f64()).sum()
     }
 }

@@ -70,6 +70,12 @@ impl<'a, T: SimdReal> View<'a, T> {
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
     }
 
+    /// Two frames, at the first one's time: what differs from [`View::pair`] is whose pixels the motion belongs to.
+    pub fn ahead(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
+        let parts = [(0.0, 0.5, -1.0), (1.0, 0.5, 1.0)];
+        std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
+    }
+
     fn new(spline: &'a Spline<T>, usable: Option<&'a Mask>, (time, mean, rate): (f64, f64, f64)) -> Self {
         let [time, mean, rate] = [time, mean, rate].map(T::from_f64);
         Self { spline, usable, time, mean, rate }

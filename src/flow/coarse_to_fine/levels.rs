@@ -2,7 +2,7 @@
 
 use super::data::View;
 use super::options::LEAST_SIDE;
-use super::run::Range;
+use super::range::Range;
 use crate::image::{Spline, fill_holes, halve_into, halve_mask};
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
@@ -13,6 +13,15 @@ const CHUNK: usize = 1 << 16;
 
 /// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of the stencils.
 const REACH: usize = 3;
+
+/// Which frames are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compared {
+    /// All of them, warped towards the middle of their times.
+    All,
+    /// A triple's middle frame with the next.
+    Ahead,
+}
 
 /// The frames of one level.
 #[derive(Debug, Default)]
@@ -28,11 +37,12 @@ pub(super) struct PyramidLevel<T> {
 
 impl<T: SimdReal> PyramidLevel<T> {
     /// The two or three frames as the data term sees them.
-    pub fn views(&self) -> Vec<View<'_, T>> {
+    pub fn views(&self, compared: Compared) -> Vec<View<'_, T>> {
         let usable = |k: usize| self.usable[k].as_ref();
-        match self.splines.as_slice() {
-            [a, b] => View::pair([a, b], [usable(0), usable(1)]).to_vec(),
-            [a, b, c, ..] => View::triple([a, b, c], [usable(0), usable(1), usable(2)]).to_vec(),
+        match (self.splines.as_slice(), compared) {
+            ([_, b, c, ..], Compared::Ahead) => View::ahead([b, c], [usable(1), usable(2)]).to_vec(),
+            ([a, b], _) => View::pair([a, b], [usable(0), usable(1)]).to_vec(),
+            ([a, b, c, ..], _) => View::triple([a, b, c], [usable(0), usable(1), usable(2)]).to_vec(),
             _ => Vec::new(),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Detail of more than half a cycle per pixel is recorded at a wrong wave number, `k - 2 pi` instead of `k`. Shifting a frame by `d` px turns the true wave by
 //! `k d`, but the recorded one by `(k - 2 pi) d`. A pair is warped by `-u / 2` and `u / 2`, so what remains between the two is proportional to
-//! `sin(pi u)`, and draws the flow by `A sin(pi u)` towards half-integer displacements; for a triple, warped by `-u`, 0 and `u`, by `A sin(2 pi u)`. Particle images
+//! `sin(pi u)`, and draws the flow by `A sin(pi u)` towards half-integer displacements; where a frame stays as it is (a triple, warped by `-u`, 0 and `u`) by `A sin(2 pi u)`. Particle images
 //! show it most (M. Raffel et al., *Particle Image Velocimetry*, on peak locking).
 //!
 //! `A` is a property of the texture, and can be seen: with the warped frames sampled half a pixel aside, the wrong waves change their sign and everything else stays.
@@ -10,7 +10,7 @@
 
 use super::data::{DataOptions, View};
 use super::grid::{LEFT, Planes};
-use super::levels::PyramidLevel;
+use super::levels::{Compared, PyramidLevel};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -33,15 +33,21 @@ pub(super) struct Locking {
     pub amplitude: [f64; 2],
     /// Variance of the amplitudes, px^2.
     pub variance: [f64; 2],
-    /// Cycles per px of flow: 1/2 for a pair, 1 for a triple.
+    /// Cycles per px of flow: 1/2 for frames that are both warped halfway, 1 where one stays as it is.
     pub cycles: f64,
 }
 
 impl Locking {
     /// Measures it on the finest `level`, whose motion is known. `scale`: the standard deviation of the residual, for the robust weights of the rows.
-    pub fn measure<T: SimdReal>(simd: Level, level: &PyramidLevel<T>, motion: &Planes<T>, scale: Option<T>) -> Self {
-        let views = level.views();
-        let cycles = if views.len() == 2 { 0.5 } else { 1.0 };
+    pub fn measure<T: SimdReal>(
+        simd: Level,
+        (level, compared): (&PyramidLevel<T>, Compared),
+        motion: &Planes<T>,
+        scale: Option<T>,
+    ) -> Self {
+        let views = level.views(compared);
+        let stays = views.iter().any(|view| view.time.to_f64() == 0.0);
+        let cycles = if stays { 1.0 } else { 0.5 };
         let (width, height) = level.size;
         let spacing = (((width * height) as f64 / PATCHES).sqrt() as usize).max(SIDE) & !1;
         let count = |len: usize| if len < SIDE { 0 } else { (len - SIDE) / spacing + 1 };

@@ -29,7 +29,9 @@ impl<T: SimdReal> Space<T> {
 
     /// Takes planes back.
     pub fn keep(&self, planes: Planes<T>) {
-        lock(&self.free).push(planes);
+        if planes.room() > 0 {
+            lock(&self.free).push(planes);
+        }
     }
 
     /// Samples that are free.

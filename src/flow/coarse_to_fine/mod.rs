@@ -11,12 +11,14 @@
 mod couple;
 mod covariance;
 mod data;
+mod descend;
 mod grid;
 mod levels;
 mod locking;
 mod memory;
 mod options;
 mod output;
+mod range;
 mod reference;
 mod refine;
 mod resample;

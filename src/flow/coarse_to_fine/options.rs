@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 pub enum Preset {
     /// The motion at half the resolution, where few iterations cost little; detail of a few px is lost.
     Fast,
-    /// Two linearisations on the finest level.
+    /// Every level until it settles, three linearisations at most on the finest.
     #[default]
     Balanced,
     /// More of everything, for offline work.
@@ -43,35 +43,43 @@ impl Preset {
     pub(super) fn effort(self) -> Effort {
         let coupling = Coupling::default();
         match self {
-            Self::Fast => {
-                Effort { last: 1, finest: 3, second: 4, third: 4, coupling: Coupling { sweeps: 4, ..coupling } }
-            }
+            Self::Fast => Effort {
+                last: 1,
+                iterations: [3, 4, 4],
+                ahead: [2, 2],
+                settled: 0.02,
+                coupling: Coupling { sweeps: 4, ..coupling },
+            },
             Self::Balanced => Effort {
                 last: 0,
-                finest: 2,
-                second: 5,
-                third: 5,
-                coupling: Coupling { sweeps: 4, break_at: 0.13, ..coupling },
+                iterations: [3, 5, 5],
+                ahead: [2, 2],
+                settled: 0.01,
+                coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
             },
-            Self::Accurate => {
-                Effort { last: 0, finest: 4, second: 6, third: 6, coupling: Coupling { break_at: 0.2, ..coupling } }
-            }
+            Self::Accurate => Effort {
+                last: 0,
+                iterations: [4, 6, 6],
+                ahead: [3, 3],
+                settled: 0.003,
+                coupling: Coupling { break_at: 0.2, ..coupling },
+            },
         }
     }
 }
 
-/// Numbers of iterations: linearisations, each followed by coupling.
+/// How much is done: linearisations, each followed by coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effort {
     /// The finest level that is worked on, 0 being the frame itself.
     pub last: usize,
-    /// On that level.
-    pub finest: usize,
-    /// On the next.
-    pub second: usize,
-    /// On the third.
-    pub third: usize,
-    /// After each.
+    /// Most iterations on that level, the next and every coarser one.
+    pub iterations: [usize; 3],
+    /// The same for what a triple's next frame alone says, which begins on the second of these levels.
+    pub ahead: [usize; 2],
+    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root mean square).
+    pub settled: f64,
+    /// After each iteration.
     pub coupling: Coupling,
 }
 
@@ -81,15 +89,21 @@ const SMALL: usize = 2500;
 const COARSE: (usize, usize) = (10, 10);
 
 impl Effort {
-    /// Iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there; on the coarsest nothing is known
-    /// yet.
+    /// Most iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there; on the coarsest
+    /// nothing is known yet.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> (usize, Coupling) {
-        match k - self.last.min(k) {
-            _ if is_coarsest || size.0 * size.1 <= SMALL => (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling }),
-            0 => (self.finest, self.coupling),
-            1 => (self.second, self.coupling),
-            _ => (self.third, self.coupling),
+        if is_coarsest || size.0 * size.1 <= SMALL {
+            return (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling });
         }
+        let [finest, second, others] = self.iterations;
+        (
+            match k.saturating_sub(self.last) {
+                0 => finest,
+                1 => second,
+                _ => others,
+            },
+            self.coupling,
+        )
     }
 }
 
@@ -98,8 +112,8 @@ impl Effort {
 pub struct CoarseToFineOptions {
     /// Cost against error. Default [`Preset::Balanced`].
     pub preset: Preset,
-    /// Frames of one estimate: 3 (default), the field then belongs to the middle frame, or 2: it belongs to the first, and tells where its pixels are in
-    /// the second.
+    /// Frames of one estimate: 3 (default) or 2. The field tells where the pixels of the middle frame (of the first of two) are in the next; a frame before
+    /// helps as far as motion goes on as it was.
     pub frames: usize,
     /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels` px. `None` (default): as many as the frame
     /// allows, down to [`LEAST_SIDE`] px.

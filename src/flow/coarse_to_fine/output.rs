@@ -22,7 +22,7 @@ const STEP: f64 = 2.0;
 
 /// Writes the estimate at the field's sites. A pair's motion is carried from midway to the first frame.
 pub(super) fn fill<T: SimdReal>(
-    estimate: &Estimate<'_, T>,
+    estimate: &Estimate<T>,
     space: &Space<T>,
     frames: &[&Frame<T>],
     common: &Common,
@@ -45,7 +45,7 @@ pub(super) fn fill<T: SimdReal>(
     let writer = Writer {
         simd,
         pitch: 2 << estimate.level,
-        data: estimate.data,
+        data: &estimate.data,
         per_row: 1.0 / (rows.sqrt() * estimate.range.gain),
         motion: full.as_ref().unwrap_or(found),
         reference: frames[frames.len() - 2],
@@ -79,8 +79,8 @@ fn at_full_resolution<T: SimdReal>(
 }
 
 /// Whether anything at all was seen: a constant image says nothing about motion.
-fn is_observable<T: SimdReal>(estimate: &Estimate<'_, T>) -> bool {
-    let (data, least) = (estimate.data, 1e-9 * estimate.range.contrast.powi(2));
+fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
+    let (data, least) = (&estimate.data, 1e-9 * estimate.range.contrast.powi(2));
     (0..data.height).any(|y| data.line(0, y).iter().chain(data.line(12, y)).any(|v| v.to_f64() > least))
 }
 

@@ -8,11 +8,13 @@
 //!   `d_l` its variance for white noise of unit density and `a` the noise density of the flow, `R_l = level(D_l) / (d_l a)`, the acceptance is
 //!   `A_0 = 1`, `A_{l+1} = A_l / (1 + (R_l / kappa)^4)`, and window l has the weight `A_l - A_{l+1}`.
 //! * *Edges* ([`mix`]). Nine windows around the site, each fit transported to it, weighed by how affine the flow is in the window and how near the fit comes to the site's flow
-//!   (after M. Kuwahara et al., 1976). They take over where the misfit of the plain window stands out of its region.
+//!   (after M. Kuwahara et al., 1976). They take over where the misfit of the plain window stands out of its region. Slopes there are those of wider windows:
+//!   what lies right beside a step knows the flow best, and the slope least.
 //!
 //! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before taking sites is part of the window, since variances of Gaussians add.
 
 mod choose;
+mod edges;
 mod evidence;
 mod field;
 mod fit;
@@ -53,6 +55,18 @@ pub(super) struct Options {
     pub noise_region: f64,
     /// Relative misfit at which edge fits and plain fits count equally.
     pub gate: f64,
+    /// Relative misfit at which slopes are half those of wider edge fits: a motion boundary is a step, and the slope of what the windows make of it is none.
+    pub step_gate: f64,
+    /// Whether the field may be nothing but affine over the whole frame: beyond the widest window there is then one more choice.
+    pub may_vanish: bool,
+}
+
+impl Options {
+    /// For what one step of the motion differs by from another, which is small and smooth or nothing.
+    pub fn for_changes() -> Self {
+        let default = Self::default();
+        Self { kappa: 2.0 * default.kappa, kappa_edge: 2.0 * default.kappa_edge, may_vanish: true, ..default }
+    }
 }
 
 impl Default for Options {
@@ -66,6 +80,8 @@ impl Default for Options {
             misfit_region: 14.0,
             noise_region: 8.0,
             gate: 2.5,
+            step_gate: 6.0,
+            may_vanish: false,
         }
     }
 }
@@ -106,7 +122,7 @@ pub(super) fn refine<T: SimdReal>(
         Field::keep(space, coarser.replace(complete));
     }
 
-    let wanted: Vec<usize> = (0..ladder.scales.len()).filter(|l| choice.wants_edges(*l)).collect();
+    let wanted = edges::wanted(&choice);
     let mut grown: Vec<Option<Field<T>>> = Vec::new();
     for &l in &wanted {
         let mut finer: Option<Field<T>> = None;
@@ -119,7 +135,7 @@ pub(super) fn refine<T: SimdReal>(
     let edges = wanted.iter().zip(&grown);
     let edges = edges.map(|(&l, g)| {
         let fits = g.as_ref().unwrap_or(&fitted.fits[l]);
-        mix::Edges::new(l, ladder.scales[l].sigma, PITCH, fits)
+        edges::Edges::new(l, ladder.scales[l].sigma, PITCH, fits)
     });
     let edges = edges.collect();
     let plain = plain(&ladder, &fitted, &choice, &grids[0], 0, coarser.as_ref());

@@ -82,6 +82,16 @@ impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
     }
 }
 
+/// The motion on the `size` sites of the level half as fine: that of every second site, flow halved. The inverse of [`finer`].
+pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coarse: &mut Planes<T>) {
+    coarse.reshape(size.0, size.1, MOTION);
+    for (k, y) in (0..MOTION).flat_map(|k| (0..size.1).map(move |y| (k, y))) {
+        let factor = T::from_f64(if k < 2 { 0.5 } else { 1.0 });
+        let sites = fine.line(k, 2 * y).iter().step_by(2);
+        coarse.line_mut(k, y).iter_mut().zip(sites).for_each(|(to, from)| *to = factor * *from);
+    }
+}
+
 /// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites'
 /// affine models. Sites of the rim keep theirs across it.
 ///
@@ -162,6 +172,9 @@ mod tests {
                 }
             }
         }
+        let mut back = Planes::default();
+        coarser(&fine, (7, 5), &mut back);
+        assert!((0..MOTION).all(|k| (0..5).all(|y| back.line(k, y) == coarse.line(k, y))));
         let m = motion_at(&want, 2.0, 26.5, 3.25);
         assert!((m[0] - (1.5 + 0.02 * 26.5 + 0.03 * 3.25)).abs() < 1e-12 && (m[3] + 0.01).abs() < 1e-15);
     }

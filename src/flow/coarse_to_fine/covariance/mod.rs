@@ -6,7 +6,7 @@
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
-//! * *Acceleration*, a triple's only.
+//! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
 //!
 //! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs and triples) and checked on others; `benchmarks/coverage.py` measures what they hold.
 
@@ -32,6 +32,10 @@ const BENDING: bending::Shares = bending::Shares { fixed: [0.41, 0.6], chosen: [
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.
 const AMPLITUDE: f64 = 0.06;
+/// White noise in the difference of two frames over that in half the difference of the outer ones of three.
+const AHEAD_ENERGY: f64 = 4.0;
+/// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: what the next frame alone has beside what all three have.
+const CHANGE: f64 = 0.75;
 /// Share of the acceleration, px/frame^2, that a triple takes for motion.
 const ACCELERATION: f64 = 0.015;
 
@@ -42,15 +46,20 @@ type Entries = [f64; ENTRIES];
 ///
 /// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first
 /// frame, where the motion of a pair is found midway.
-pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Energy, carried: bool) -> Spread<T> {
+pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, carried: bool) -> Spread<T> {
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
-    let noise = noise::Noise::new(evidence, estimate.data, energy, carried);
+    let noise = noise::Noise::new(evidence, &estimate.data, energy, carried);
+    let change = estimate.change.as_ref();
+    let change = change.map(|evidence| noise::Noise::new(evidence, &estimate.data, energy.times(AHEAD_ENERGY), true));
     let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
         let motion = bending::motion_at(&estimate.motion, at);
-        add_noise(place, &noise.at(at.0, at.1));
+        add_noise(place, &noise.at(at.0, at.1), 1.0);
+        if let Some(change) = &change {
+            add_noise(place, &change.at(at.0, at.1), CHANGE);
+        }
         add_locking(place, &motion, &estimate.locking);
         if !carried {
             add_acceleration(place, &motion);
@@ -63,8 +72,9 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<'_, T>, energy: Energy
 }
 
 /// Adds noise of the density times its share in the flow and in the derivatives along x and y.
-fn add_noise(place: &mut Entries, left: &noise::Left) {
-    let factors = [FLOW_NOISE * left.flow, SLOPE_NOISE * left.slopes[0], SLOPE_NOISE * left.slopes[1]];
+fn add_noise(place: &mut Entries, left: &noise::Left, share: f64) {
+    let factors =
+        [FLOW_NOISE * left.flow, SLOPE_NOISE * left.slopes[0], SLOPE_NOISE * left.slopes[1]].map(|f| share * f);
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             place[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];

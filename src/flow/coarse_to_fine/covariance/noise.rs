@@ -39,6 +39,16 @@ pub(in crate::flow::coarse_to_fine) enum Energy {
     AtLeast(f64),
 }
 
+impl Energy {
+    /// So many times as much, where it is known; residuals tell by themselves.
+    pub fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Known(energy) => Self::Known(factor * energy),
+            Self::AtLeast(energy) => Self::AtLeast(factor * energy),
+        }
+    }
+}
+
 /// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
 pub(super) struct Left {
     pub density: [f64; 3],

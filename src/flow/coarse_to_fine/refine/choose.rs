@@ -18,7 +18,7 @@ const QUIET: f64 = 1e-9;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
 const FLAT: f64 = 1e-6;
 
-/// Planes of the choice, for `windows` windows: weights of the plain fits, of the edge fits, of the misfits; then the noise density and the mean sigma of
+/// Planes of the choice, for `windows` windows: weights (of sum 1, or less where the field vanishes) of the plain fits, of the edge fits, of the misfits; then the noise density and the mean sigma of
 /// either kind, px.
 pub(super) struct Choice<T> {
     pub planes: Planes<T>,
@@ -56,7 +56,8 @@ pub(super) fn choose<T: SimdReal>(
 ) -> Choice<T> {
     let windows = ladder.scales.len();
     let sigmas: Vec<f64> = ladder.scales.iter().map(|s| s.sigma).collect();
-    let noise: Vec<f64> = sigmas.windows(2).map(|s| difference_variance(s[0], s[1])).collect();
+    let wider = sigmas.iter().skip(1).copied().chain(options.may_vanish.then_some(f64::INFINITY));
+    let noise: Vec<f64> = sigmas.iter().zip(wider).map(|(&s, wider)| difference_variance(s, wider)).collect();
     let mut planes = space.planes(means.width, means.height, 3 * windows + 3);
     let len = planes.row_len();
     for_each_band(planes.data_mut(), len, |_, rows, out| {
@@ -82,7 +83,7 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
     fn run<V: Lanes<Scalar = T>>(self) {
         let Self { means, options, sigmas, noise, y, out } = self;
         let (row, stride, windows) = (means.row(y), means.stride(), sigmas.len());
-        let layout = Layout { windows };
+        let layout = Layout::new(options);
         for x in (0..means.padded()).step_by(V::LANES) {
             let means = &row[LEFT + x..];
             let out = &mut out[LEFT + x..];
@@ -93,7 +94,7 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                 let (mut accepted, mut sigma) = (V::constant(1.0), V::zero());
                 for l in 0..windows {
                     let mut next = V::zero();
-                    if l + 1 < windows {
+                    if l < layout.steps {
                         let change = if kind == 0 {
                             power4(V::load(&means[Layout::change(l) * stride..]))
                         } else {
@@ -108,6 +109,8 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                     *sum = *sum + weight;
                     weight.store(&mut out[(kind * windows + l) * stride..]);
                 }
+                // What goes on beyond the widest window is nothing at all.
+                *sum = *sum + accepted;
                 (sigma / *sum).store(&mut out[(3 * windows + 1 + kind) * stride..]);
             }
             density.store(&mut out[3 * windows * stride..]);

@@ -89,7 +89,7 @@ impl<T: SimdReal> Ladder<T> {
     }
 }
 
-/// Variance of the difference between the twiced fits of two windows, for white noise of unit density (per px^2).
+/// Variance of the difference between the twiced fits of two windows, for white noise of unit density (per px^2); the second may be infinite.
 ///
 /// Twicing makes `H = 2 G - G^2` of the transfer function `G = exp(-sigma^2 w^2 / 2)`; the result is `integral (H_a - H_b)^2 w dw / (2 pi)`, each
 /// term of which is a Gaussian.

@@ -2,7 +2,8 @@
 
 use super::Options;
 use super::choose::Choice;
-use super::field::{Beyond, Field, RIM};
+use super::edges::{self, Edges, Site};
+use super::field::{Beyond, Field};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
 use super::ladder::Scale;
@@ -12,12 +13,10 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Distance of the eight windows from the site, in units of sigma.
-const ASIDE: f64 = 1.5;
-/// Variance added to what a window is judged by, px^2.
-const SOFT: f64 = 1e-4;
 /// Shares of the edge fits below this count as none, so that calm places can pass them by.
 const SHUT: f64 = 0.2;
+/// Lines of weights before those of the edges' windows.
+const FIRST_EDGE: usize = 3;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
@@ -86,7 +85,7 @@ impl<T: SimdReal> Plain<'_, T> {
 }
 
 #[inline(always)]
-fn any<T: SimdReal>(weights: &[T]) -> bool {
+pub(super) fn any<T: SimdReal>(weights: &[T]) -> bool {
     let mut most = T::from_f64(0.0);
     for w in weights {
         most = if most < *w { *w } else { most };
@@ -121,38 +120,6 @@ pub(super) fn collapse<T: SimdReal>(simd: Level, space: &Space<T>, plain: &Plain
     out
 }
 
-/// One of the windows around a site.
-struct Aside<T> {
-    /// Samples from the site to the window's centre.
-    offset: isize,
-    /// The same, px.
-    dx: T,
-    dy: T,
-}
-
-/// Edge fits of one window of the ladder.
-pub(super) struct Edges<'a, T> {
-    place: usize,
-    /// Single fits at the finest sites.
-    fits: &'a Field<T>,
-    windows: [Aside<T>; 9],
-}
-
-impl<'a, T: SimdReal> Edges<'a, T> {
-    /// For the window `place` of the ladder, of `sigma` px, on sites `pitch` px apart.
-    pub fn new(place: usize, sigma: f64, pitch: f64, fits: &'a Field<T>) -> Self {
-        let aside = (ASIDE * sigma / pitch).min(RIM as f64);
-        let (a, d) = (aside.round() as isize, (aside / std::f64::consts::SQRT_2).round() as isize);
-        let around = [(0, 0), (a, 0), (-a, 0), (0, a), (0, -a), (d, d), (d, -d), (-d, d), (-d, -d)];
-        let windows = around.map(|(dx, dy)| Aside {
-            offset: dy * fits.row_len() as isize + dx,
-            dx: T::from_f64(dx as f64 * pitch),
-            dy: T::from_f64(dy as f64 * pitch),
-        });
-        Self { place, fits, windows }
-    }
-}
-
 /// What the last step needs beside the plain estimate.
 pub(super) struct Final<'a, T> {
     pub plain: Plain<'a, T>,
@@ -178,7 +145,7 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
         let (stride, choice) = (job.plain.grid.stride(), job.plain.choice);
         let mut scratch = Scratch::new(stride);
         let mut row = vec![T::from_f64(0.0); FIT * stride];
-        let mut weights = vec![T::from_f64(0.0); 2 * stride * (job.edges.len() + 3)];
+        let mut weights = vec![T::from_f64(0.0); 2 * stride * (job.edges.len() + FIRST_EDGE)];
         for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
             job.plain.row::<V>(y, &mut scratch, &mut row);
             let planes = [choice.density(), choice.sigma(false), choice.sigma(true)];
@@ -201,19 +168,22 @@ impl<T: SimdReal> Final<'_, T> {
     fn chunk<V: Lanes<Scalar = T>>(&self, x: usize, y: usize, plain: &[T], weights: &[T], out: &mut [T]) {
         let stride = self.plain.grid.stride();
         let cube = V::constant(self.options.gate.powi(3));
-        let mut gates = [T::from_f64(0.0); CHUNK];
+        let sixth = V::constant(self.options.step_gate.powi(6));
+        let (mut gates, mut steps) = ([T::from_f64(0.0); CHUNK], [T::from_f64(0.0); CHUNK]);
         for i in (0..CHUNK).step_by(V::LANES) {
             let misfit = V::load(&plain[(FIT - 1) * stride + LEFT + x + i..]).max(V::zero());
             let third = misfit * misfit * misfit;
             let gate = third / (third + cube);
             ((gate - V::constant(SHUT)).max(V::zero()) * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates[i..]);
+            (third * third / third.mul_add(third, sixth)).store(&mut steps[i..]);
         }
         let mut sums = [[T::from_f64(0.0); CHUNK]; 6];
-        let is_open = any(&gates);
-        for (edge, weight) in self.edges.iter().zip(weights.chunks_exact(2 * stride).skip(3)) {
-            let weight = chunk_of(&weight[x..]);
-            if is_open && any(weight) {
-                self.edge::<V>(edge, [x, y], weight, &mut sums);
+        if any(&gates) {
+            let own = [0, 1].map(|k| chunk_of(&self.plain.grid.line(k, y as isize)[LEFT + x..]));
+            let site = Site { x, y, own, steps: &steps };
+            let lines = |n: usize| chunk_of(&weights[2 * stride * (FIRST_EDGE + n) + x..]);
+            for n in 0..self.edges.len() {
+                edges::add::<V, T>(&self.edges, n, lines, &site, &mut sums);
             }
         }
         let slope = [self.base[2], self.base[3], self.base[4], self.base[5]].map(|b| b * self.pitch);
@@ -237,57 +207,10 @@ impl<T: SimdReal> Final<'_, T> {
             V::load(line(0)).store(&mut out[7 * stride + at..]);
         }
     }
-
-    /// Adds weight times edge fit of one window: nine windows around the site, the better the closer to affine and to the site's own flow.
-    ///
-    /// M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows; here each is an affine model, and all count.
-    #[inline(always)]
-    fn edge<V: Lanes<Scalar = T>>(
-        &self,
-        edge: &Edges<'_, T>,
-        site: [usize; 2],
-        weights: &[T; CHUNK],
-        sums: &mut [[T; CHUNK]; 6],
-    ) {
-        let ([x, y], fits) = (site, edge.fits);
-        let at = fits.start(0, y as isize) + LEFT + x;
-        // Cut to a known length here, so that the loop below has nothing to check.
-        let windows: [[&[T; CHUNK]; FIT]; 9] = std::array::from_fn(|n| {
-            let window = &fits.data()[at.wrapping_add_signed(edge.windows[n].offset)..];
-            std::array::from_fn(|k| chunk_of(&window[k * fits.stride()..]))
-        });
-        let own = [0, 1].map(|k| chunk_of(&self.plain.grid.line(k, y as isize)[LEFT + x..]));
-        for i in (0..CHUNK).step_by(V::LANES) {
-            let (own_u, own_v) = (V::load(&own[0][i..]), V::load(&own[1][i..]));
-            let (mut total, mut sum) = (V::zero(), [V::zero(); 6]);
-            for (fit, window) in windows.iter().zip(&edge.windows) {
-                let (back, up) = (V::splat(window.dx), V::splat(window.dy));
-                let (u_x, v_x) = (V::load(&fit[2][i..]), V::load(&fit[3][i..]));
-                let (u_y, v_y) = (V::load(&fit[4][i..]), V::load(&fit[5][i..]));
-                let u = u_y.neg_mul_add(up, u_x.neg_mul_add(back, V::load(&fit[0][i..])));
-                let v = v_y.neg_mul_add(up, v_x.neg_mul_add(back, V::load(&fit[1][i..])));
-                let (du, dv) = (u - own_u, v - own_v);
-                let misfit = V::load(&fit[6][i..]).max(V::zero()) + V::constant(SOFT);
-                let error = du.mul_add(du, dv.mul_add(dv, misfit));
-                let weight = V::constant(1.0) / (error * error);
-                total = total + weight;
-                sum[0] = u.mul_add(weight, sum[0]);
-                sum[1] = v.mul_add(weight, sum[1]);
-                sum[2] = u_x.mul_add(weight, sum[2]);
-                sum[3] = v_x.mul_add(weight, sum[3]);
-                sum[4] = u_y.mul_add(weight, sum[4]);
-                sum[5] = v_y.mul_add(weight, sum[5]);
-            }
-            let share = V::load(&weights[i..]) / total;
-            for k in 0..6 {
-                sum[k].mul_add(share, V::load(&sums[k][i..])).store(&mut sums[k][i..]);
-            }
-        }
-    }
 }
 
 #[inline(always)]
-fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
+pub(super) fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
     values.first_chunk().expect("rows end with a rim")
 }
 

@@ -19,21 +19,27 @@ const TINY: f64 = 1e-12;
 /// of its inverse, then (per window) of the inverse root of the misfit.
 pub(super) struct Layout {
     pub windows: usize,
+    /// From each window to the next; from the widest to nothing as well, where the field may be nothing.
+    pub steps: usize,
 }
 
 impl Layout {
     pub const ENERGY: usize = 3;
+    pub fn new(options: &Options) -> Self {
+        let windows = options.ladder.len();
+        Self { windows, steps: if options.may_vanish { windows } else { windows.saturating_sub(1) } }
+    }
     pub fn change(l: usize) -> usize {
         4 + l
     }
     pub fn calm(&self, l: usize) -> usize {
-        3 + self.windows + l
+        4 + self.steps + l
     }
     pub fn misfit(&self, l: usize) -> usize {
-        2 + 2 * self.windows + l
+        4 + 2 * self.steps + l
     }
     pub fn count(&self) -> usize {
-        2 + 3 * self.windows
+        4 + 2 * self.steps + self.windows
     }
 }
 
@@ -43,8 +49,8 @@ enum Item<'a, T> {
     Data(usize),
     /// The fourth root of the residual energy.
     Energy(usize),
-    /// The fourth root, and its inverse, of the squared change from one window to the next; each with its distance of sites.
-    Change([(&'a Field<T>, usize); 2]),
+    /// The fourth root, and its inverse, of the squared change from one window to the next, or to nothing; each with its distance of sites.
+    Change((&'a Field<T>, usize), Option<(&'a Field<T>, usize)>),
     /// The inverse fourth root of the misfit.
     Misfit(&'a Field<T>, usize),
 }
@@ -72,7 +78,7 @@ pub(super) fn regional_means<T: SimdReal>(
     fitted: &Fitted<T>,
     data: &Planes<T>,
 ) -> Planes<T> {
-    let layout = Layout { windows: ladder.scales.len() };
+    let layout = Layout::new(options);
     let quarter = |n: usize| n.div_ceil(1 << MAX_OCTAVE);
     let mut out = space.planes(quarter(data.width), quarter(data.height), layout.count());
     for octave in 1..=MAX_OCTAVE {
@@ -105,7 +111,7 @@ fn collect<'a, T: SimdReal>(
     fitted: &'a Fitted<T>,
     octave: usize,
 ) -> Features<'a, T> {
-    let layout = Layout { windows: ladder.scales.len() };
+    let layout = Layout::new(options);
     let taps = |px: f64| Taps::gaussian(px / (ladder.pitch * f64::from(1 << octave as u32)), 1.0);
     let (mut items, mut targets) = (Vec::new(), Vec::new());
     if octave == 1 {
@@ -113,10 +119,11 @@ fn collect<'a, T: SimdReal>(
         targets.extend((0..=Layout::ENERGY).map(|k| (k, taps(options.noise_region))));
     }
     let place: Vec<usize> = ladder.scales.iter().map(|s| s.octave.max(1)).collect();
-    for l in 0..layout.windows.saturating_sub(1) {
-        if place[l + 1] == octave {
+    for l in 0..layout.steps {
+        let next = (l + 1).min(layout.windows - 1);
+        if place[next] == octave {
             let finer = (&fitted.samples[l], 1 << (octave - place[l]));
-            items.push(Item::Change([finer, (&fitted.samples[l + 1], 1)]));
+            items.push(Item::Change(finer, (next > l).then(|| (&fitted.samples[next], 1))));
             targets.push((Layout::change(l), taps(options.region)));
             targets.push((layout.calm(l), taps(options.calm_region)));
         }
@@ -148,7 +155,7 @@ impl<T: SimdReal> Kernel<T> for Roots<'_, T> {
     fn run<V: Lanes<Scalar = T>>(self) {
         let Self { items, data, step, rows, out, stride, width } = self;
         let mut buffer = vec![T::from_f64(0.0); 4 * stride];
-        let planes = items.iter().map(|item| if let Item::Change(_) = item { 2 } else { 1 }).sum::<usize>();
+        let planes = items.iter().map(|item| if let Item::Change(..) = item { 2 } else { 1 }).sum::<usize>();
         for (y, out) in rows.zip(out.chunks_exact_mut(planes * stride)) {
             let mut lines = out.chunks_exact_mut(stride).map(|line| &mut line[LEFT..]);
             for item in items {
@@ -159,8 +166,9 @@ impl<T: SimdReal> Kernel<T> for Roots<'_, T> {
                         pick(sites(data, *k, step * y), step, &mut buffer[..width]);
                         roots::<V>(&buffer, line);
                     }
-                    Item::Change(pair) => {
-                        for (n, (field, step)) in pair.iter().enumerate() {
+                    Item::Change(finer, coarser) => {
+                        buffer[2 * stride..].fill(T::from_f64(0.0));
+                        for (n, (field, step)) in [finer].into_iter().chain(coarser).enumerate() {
                             for k in 0..2 {
                                 let source = &field.line(k, (step * y) as isize)[LEFT..];
                                 pick(source, *step, &mut buffer[(2 * n + k) * stride..][..width]);

@@ -116,7 +116,7 @@ fn grids_grow_back_without_bending_cubics() {
 fn choices_follow_the_formulas() {
     let options = seven();
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
-    let layout = Layout { windows: 7 };
+    let layout = Layout::new(&seven());
     let mut means = Planes::<f64>::new(9, 1, layout.count());
     let roots = |l: usize, x: usize| 0.02 + 0.02 * x as f64 - 0.002 * l as f64;
     for x in 0..9 {
@@ -199,7 +199,7 @@ fn regional_levels_are_power_means() {
         sum
     };
     let root = |v: f64| (v + 1e-12).powf(0.25);
-    let layout = Layout { windows: 7 };
+    let layout = Layout::new(&seven());
     for (x, y) in [(0, 0), (4, 3), (9, 6)] {
         let want = mean(8.0, x, y, &|i, j| root(data.at(24, 2 * i, 2 * j)));
         assert!((means.at(Layout::ENERGY, x, y) - want).abs() < 1e-10);

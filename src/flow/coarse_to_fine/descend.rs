@@ -1,0 +1,127 @@
+//! From level to level: the iterations.
+
+use super::couple::{CoupleScratch, Coupling, couple};
+use super::data::{DataOptions, DataTerm, MOTION};
+use super::grid::Planes;
+use super::levels::{Compared, PyramidLevel};
+use super::memory::Workspace;
+use super::options::Effort;
+use super::range::Range;
+use super::resample::{coarser, finer, rederive};
+use crate::simd::{Level, SimdReal};
+
+/// Noise is taken for at least this share of the brightness' standard deviation.
+const LEAST_NOISE: f64 = 1e-3;
+/// The scale of the robust weights is at least this share of the brightness' standard deviation.
+const LEAST_SCALE: f64 = 4e-3;
+
+/// What all iterations have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plan {
+    pub simd: Level,
+    pub effort: Effort,
+    /// How brightness was scaled.
+    pub range: Range,
+    /// The finest level there is to work on.
+    pub last: usize,
+}
+
+/// The coupled motion on the finest level, and the standard deviation of the residual there.
+pub(super) type Found<T> = (Planes<T>, Option<T>);
+
+impl Plan {
+    /// The way down from the coarsest level of the filled pyramid, where nothing is known. The last data term stays in the workspace.
+    pub fn from_nothing<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> Found<T> {
+        let levels = workspace.pyramid.levels();
+        let coarsest = levels.len() - 1;
+        let sites = sites(levels[coarsest].size);
+        let limits: Vec<_> =
+            (0..levels.len()).map(|k| self.effort.on_level(k, levels[k].size, k == coarsest)).collect();
+        let mut motion = workspace.space.planes(sites.0, sites.1, MOTION);
+        motion.data_mut().fill(T::from_f64(0.0));
+        self.descend(workspace, Compared::All, motion, &limits)
+    }
+
+    /// The same for the step to the next frame alone, from one level above the finest down, where it is no other than `motion`.
+    pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
+        let (levels, [finest, second]) = (workspace.pyramid.levels(), self.effort.ahead);
+        let mut start = workspace.space.planes(motion.width, motion.height, MOTION);
+        let mut limits = vec![(0, self.effort.coupling); self.last];
+        limits.push((finest, self.effort.coupling));
+        if let Some(level) = levels.get(self.last + 1) {
+            limits.push((second, self.effort.coupling));
+            coarser(motion, sites(level.size), &mut start);
+        } else {
+            start.data_mut().copy_from_slice(motion.data());
+        }
+        self.descend(workspace, Compared::Ahead, start, &limits)
+    }
+
+    /// From the coarsest of the levels that `limits` names, on which `motion` is.
+    fn descend<T: SimdReal>(
+        &self,
+        workspace: &mut Workspace<T>,
+        compared: Compared,
+        mut motion: Planes<T>,
+        limits: &[(usize, Coupling)],
+    ) -> Found<T> {
+        let Workspace { pyramid, data, pool, scratch, space } = workspace;
+        let term = DataTerm::new(self.simd, DataOptions::default(), pool);
+        let mut step = Step { plan: self, compared, term, data, scratch, scale: None };
+        let mut old = space.planes(0, 0, MOTION);
+        for (k, (level, (most, coupling))) in pyramid.levels().iter().zip(limits).enumerate().skip(self.last).rev() {
+            if k + 1 < limits.len() {
+                std::mem::swap(&mut motion, &mut old);
+                finer(self.simd, &old, level.size, &mut motion);
+            }
+            for _ in 0..*most {
+                std::mem::swap(&mut motion, &mut old);
+                rederive(&old, &mut motion);
+                if step.iterate(level, coupling, &mut motion) <= self.effort.settled {
+                    break;
+                }
+            }
+        }
+        space.keep(old);
+        (motion, step.scale)
+    }
+}
+
+/// Sites along x and y of a level of `size` pixels.
+fn sites(size: (usize, usize)) -> (usize, usize) {
+    (size.0.div_ceil(2), size.1.div_ceil(2))
+}
+
+/// One linearisation, and the motion that follows from it.
+struct Step<'a, T> {
+    plan: &'a Plan,
+    compared: Compared,
+    term: DataTerm<'a, T>,
+    data: &'a mut Planes<T>,
+    scratch: &'a mut CoupleScratch<T>,
+    /// Standard deviation of what brightness changes by along the motion, from the iteration before.
+    scale: Option<T>,
+}
+
+impl<T: SimdReal> Step<'_, T> {
+    /// Linearises about `motion` and moves it; by how much, px (root mean square).
+    fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, motion: &mut Planes<T>) -> f64 {
+        let views = level.views(self.compared);
+        let residuals = self.term.linearise(level.size, &views, motion, self.scale, self.data);
+        self.scale = self.spread(residuals);
+        let contrast = self.plan.range.contrast;
+        let floor = T::from_f64((LEAST_NOISE * contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
+        couple(self.plan.simd, self.data, motion, coupling, floor, self.scratch)
+    }
+
+    /// Robust standard deviation of residuals whose magnitudes these are.
+    fn spread(&self, mut residuals: Vec<T>) -> Option<T> {
+        if residuals.is_empty() {
+            return None;
+        }
+        let middle = residuals.len() / 2;
+        residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
+        let least = (LEAST_SCALE * self.plan.range.contrast).max(f64::from(f32::MIN_POSITIVE));
+        Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
+    }
+}

@@ -1,0 +1,143 @@
+//! Fits that keep to one side of a motion boundary.
+//!
+//! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows beside a site; here each of nine is an affine model, and all
+//! count: the better the closer to affine the flow is in the window, and the closer the model comes to the site's own flow.
+//!
+//! Slopes are taken from windows some steps wider: where the flow jumps, what windows make of the jump has a slope that no motion has, and reaches as far as they do.
+
+use super::choose::Choice;
+use super::field::{Field, RIM};
+use super::fit::FIT;
+use super::mix::{any, chunk_of};
+use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT};
+use crate::simd::{Lanes, SimdReal};
+
+/// Distance of the eight windows from the site, in units of sigma.
+const ASIDE: f64 = 1.5;
+/// Variance added to what a window is judged by, px^2.
+const SOFT: f64 = 1e-4;
+/// Steps of the ladder from the windows that tell the flow to those that tell its slopes.
+const WIDER: usize = 2;
+
+/// The windows whose edge fits are used at any site.
+pub(super) fn wanted<T: SimdReal>(choice: &Choice<T>) -> Vec<usize> {
+    let flow: Vec<bool> = (0..choice.windows).map(|l| choice.wants_edges(l)).collect();
+    let slopes = |l: usize| (l >= WIDER && flow[l - WIDER]) || (l + 1 == choice.windows && flow.contains(&true));
+    (0..choice.windows).filter(|&l| flow[l] || slopes(l)).collect()
+}
+
+/// One of the windows around a site.
+struct Aside<T> {
+    /// Samples from the site to the window's centre.
+    offset: isize,
+    /// The same, px.
+    dx: T,
+    dy: T,
+}
+
+/// Edge fits of one window of the ladder.
+pub(super) struct Edges<'a, T> {
+    /// Which window of the ladder.
+    pub place: usize,
+    /// Single fits at the finest sites.
+    fits: &'a Field<T>,
+    windows: [Aside<T>; 9],
+}
+
+impl<'a, T: SimdReal> Edges<'a, T> {
+    /// For the window `place` of the ladder, of `sigma` px, on sites `pitch` px apart.
+    pub fn new(place: usize, sigma: f64, pitch: f64, fits: &'a Field<T>) -> Self {
+        let aside = (ASIDE * sigma / pitch).min(RIM as f64);
+        let (a, d) = (aside.round() as isize, (aside / std::f64::consts::SQRT_2).round() as isize);
+        let around = [(0, 0), (a, 0), (-a, 0), (0, a), (0, -a), (d, d), (d, -d), (-d, d), (-d, -d)];
+        let windows = around.map(|(dx, dy)| Aside {
+            offset: dy * fits.row_len() as isize + dx,
+            dx: T::from_f64(dx as f64 * pitch),
+            dy: T::from_f64(dy as f64 * pitch),
+        });
+        Self { place, fits, windows }
+    }
+}
+
+/// [`CHUNK`] sites of a row.
+pub(super) struct Site<'a, T> {
+    pub x: usize,
+    pub y: usize,
+    /// Their own flow.
+    pub own: [&'a [T; CHUNK]; 2],
+    /// How far slopes are those of wider windows, 0 to 1.
+    pub steps: &'a [T; CHUNK],
+}
+
+/// Adds what window `n` of `edges` has to say; `lines(n)`: the weights of the windows.
+#[inline(always)]
+pub(super) fn add<'a, V: Lanes<Scalar = T>, T: SimdReal>(
+    edges: &[Edges<'_, T>],
+    n: usize,
+    lines: impl Fn(usize) -> &'a [T; CHUNK],
+    site: &Site<'_, T>,
+    sums: &mut [[T; CHUNK]; 6],
+) {
+    // Windows are wanted together with those that are WIDER steps wider, so what these stand for is in the list.
+    let place = edges[n].place;
+    let is_last = n + 1 == edges.len();
+    let mut slopes = [T::from_f64(0.0); CHUNK];
+    for (m, narrow) in edges.iter().enumerate() {
+        if narrow.place + WIDER == place || (is_last && narrow.place + WIDER > place) {
+            slopes.iter_mut().zip(lines(m)).for_each(|(sum, weight)| *sum = *sum + *weight);
+        }
+    }
+    let flow = lines(n);
+    for ((slope, flow), step) in slopes.iter_mut().zip(flow).zip(site.steps) {
+        *slope = *flow + (*slope - *flow) * *step;
+    }
+    if any(flow) || any(&slopes) {
+        edges[n].add::<V>(site, [flow, &slopes], sums);
+    }
+}
+
+impl<T: SimdReal> Edges<'_, T> {
+    /// Adds weight times fit; the weights are those of the flow and of the slopes.
+    #[inline(always)]
+    fn add<V: Lanes<Scalar = T>>(
+        &self,
+        site: &Site<'_, T>,
+        [flow, slopes]: [&[T; CHUNK]; 2],
+        sums: &mut [[T; CHUNK]; 6],
+    ) {
+        let fits = self.fits;
+        let at = fits.start(0, site.y as isize) + LEFT + site.x;
+        // Cut to a known length here, so that the loop below has nothing to check.
+        let windows: [[&[T; CHUNK]; FIT]; 9] = std::array::from_fn(|n| {
+            let window = &fits.data()[at.wrapping_add_signed(self.windows[n].offset)..];
+            std::array::from_fn(|k| chunk_of(&window[k * fits.stride()..]))
+        });
+        for i in (0..CHUNK).step_by(V::LANES) {
+            let (own_u, own_v) = (V::load(&site.own[0][i..]), V::load(&site.own[1][i..]));
+            let (mut total, mut sum) = (V::zero(), [V::zero(); 6]);
+            for (fit, window) in windows.iter().zip(&self.windows) {
+                let (back, up) = (V::splat(window.dx), V::splat(window.dy));
+                let (u_x, v_x) = (V::load(&fit[2][i..]), V::load(&fit[3][i..]));
+                let (u_y, v_y) = (V::load(&fit[4][i..]), V::load(&fit[5][i..]));
+                let u = u_y.neg_mul_add(up, u_x.neg_mul_add(back, V::load(&fit[0][i..])));
+                let v = v_y.neg_mul_add(up, v_x.neg_mul_add(back, V::load(&fit[1][i..])));
+                let (du, dv) = (u - own_u, v - own_v);
+                let misfit = V::load(&fit[6][i..]).max(V::zero()) + V::constant(SOFT);
+                let error = du.mul_add(du, dv.mul_add(dv, misfit));
+                let weight = V::constant(1.0) / (error * error);
+                total = total + weight;
+                sum[0] = u.mul_add(weight, sum[0]);
+                sum[1] = v.mul_add(weight, sum[1]);
+                sum[2] = u_x.mul_add(weight, sum[2]);
+                sum[3] = v_x.mul_add(weight, sum[3]);
+                sum[4] = u_y.mul_add(weight, sum[4]);
+                sum[5] = v_y.mul_add(weight, sum[5]);
+            }
+            let whole = V::constant(1.0) / total;
+            let shares = [V::load(&flow[i..]) * whole, V::load(&slopes[i..]) * whole];
+            for k in 0..6 {
+                sum[k].mul_add(shares[usize::from(k >= 2)], V::load(&sums[k][i..])).store(&mut sums[k][i..]);
+            }
+        }
+    }
+}
