@@ -48,7 +48,7 @@ class Family:
         camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=seed)
         times = (0.0, 1.0) if count == 2 else (-1.0, 0.0, 1.0)
         pictures = [camera.apply_u8(scene.frame(t), index=int(t) + 8) for t in times]
-        return pictures, scene.truth(0.0, between=(times[0], times[-1]))
+        return pictures, scene.truth(0.0, between=(0.0, 1.0))
 
 
 def affine(u: float, v: float, u_x: float = 0.0, v_x: float = 0.0, u_y: float = 0.0, v_y: float = 0.0) -> tuple[str, dict[str, float]]:

@@ -48,11 +48,12 @@ fn errors(field: &FlowField<f32>, truth: &FlowField<f64>) -> (f64, f64) {
 #[test]
 fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
     let scene = scene(FAST);
+    // Pairs and triples tell the same: where the pixels are one frame later.
+    let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();
     for preset in Preset::EVERY {
         // The fastest works at half the resolution.
         let (most_flow, most_jacobian) = if preset == Preset::Fast { (0.025, 0.0008) } else { (0.012, 0.0005) };
-        for (number, times, between) in [(2, &[0.0, 1.0][..], (0.0, 1.0)), (3, &[-1.0, 0.0, 1.0], (-1.0, 1.0))] {
-            let truth = mean_truth(&scene, 0.0, between).unwrap();
+        for (number, times) in [(2, &[0.0, 1.0][..]), (3, &[-1.0, 0.0, 1.0])] {
             let options = CoarseToFineOptions { preset, frames: number, ..CoarseToFineOptions::default() };
             let field = estimate(options, Common::default(), &frames(&scene, 1.0, times));
             let (flow, jacobian) = errors(&field, &truth);

@@ -1,6 +1,6 @@
 use super::*;
-use crate::flow::coarse_to_fine::levels::Pyramid;
-use crate::flow::coarse_to_fine::run::Range;
+use crate::flow::coarse_to_fine::levels::{Compared, Pyramid};
+use crate::flow::coarse_to_fine::range::Range;
 use crate::math::random::CounterRng;
 use crate::types::Frame;
 
@@ -36,7 +36,7 @@ fn measured(sigma: f64, flow: (f64, f64)) -> Locking {
         motion.line_mut(0, y).fill(flow.0);
         motion.line_mut(1, y).fill(flow.1);
     }
-    Locking::measure(Level::detect(), &pyramid.levels()[0], &motion, None)
+    Locking::measure(Level::detect(), (&pyramid.levels()[0], Compared::All), &motion, None)
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows beside a site; here each of nine is an affine model, and all
 //! count: the better the closer to affine the flow is in the window, and the closer the model comes to the site's own flow.
 //!
-//! Slopes are taken from windows some steps wider: where the flow jumps, what windows make of the jump has a slope that no motion has, and reaches as far as they do.
+//! Slopes are taken from the best of windows some steps wider: where the flow jumps, what windows make of the jump has a slope that no motion has, and reaches as far as they do.
 
 use super::choose::Choice;
 use super::field::{Field, RIM};
@@ -114,7 +114,7 @@ impl<T: SimdReal> Edges<'_, T> {
         });
         for i in (0..CHUNK).step_by(V::LANES) {
             let (own_u, own_v) = (V::load(&site.own[0][i..]), V::load(&site.own[1][i..]));
-            let (mut total, mut sum) = (V::zero(), [V::zero(); 6]);
+            let (mut total, mut sum) = ([V::zero(); 2], [V::zero(); 6]);
             for (fit, window) in windows.iter().zip(&self.windows) {
                 let (back, up) = (V::splat(window.dx), V::splat(window.dy));
                 let (u_x, v_x) = (V::load(&fit[2][i..]), V::load(&fit[3][i..]));
@@ -125,16 +125,16 @@ impl<T: SimdReal> Edges<'_, T> {
                 let misfit = V::load(&fit[6][i..]).max(V::zero()) + V::constant(SOFT);
                 let error = du.mul_add(du, dv.mul_add(dv, misfit));
                 let weight = V::constant(1.0) / (error * error);
-                total = total + weight;
+                let sharp = weight * weight;
+                total = [total[0] + weight, total[1] + sharp];
                 sum[0] = u.mul_add(weight, sum[0]);
                 sum[1] = v.mul_add(weight, sum[1]);
-                sum[2] = u_x.mul_add(weight, sum[2]);
-                sum[3] = v_x.mul_add(weight, sum[3]);
-                sum[4] = u_y.mul_add(weight, sum[4]);
-                sum[5] = v_y.mul_add(weight, sum[5]);
+                sum[2] = u_x.mul_add(sharp, sum[2]);
+                sum[3] = v_x.mul_add(sharp, sum[3]);
+                sum[4] = u_y.mul_add(sharp, sum[4]);
+                sum[5] = v_y.mul_add(sharp, sum[5]);
             }
-            let whole = V::constant(1.0) / total;
-            let shares = [V::load(&flow[i..]) * whole, V::load(&slopes[i..]) * whole];
+            let shares = [V::load(&flow[i..]) / total[0], V::load(&slopes[i..]) / total[1]];
             for k in 0..6 {
                 sum[k].mul_add(shares[usize::from(k >= 2)], V::load(&sums[k][i..])).store(&mut sums[k][i..]);
             }

@@ -228,7 +228,8 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let scale: &Scale<f64> = &ladder.scales[0];
     let fits = fit::fits(Level::detect(), &Space::default(), &grids[0], scale);
     for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
-        let (mut sum, mut total) = ([0.0; 6], 0.0);
+        // Of the flow, and of its slopes, which are weighed more sharply.
+        let (mut sum, mut total) = ([0.0; 6], [0.0; 2]);
         // 1.5 sigma is 1.9 sites, and 1.3 along the diagonals.
         for (dx, dy) in [(0, 0), (2, 0), (-2, 0), (0, 2), (0, -2), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
             let (i, j) = ((x as isize + dx) as usize, (y as isize + dy) as usize);
@@ -236,11 +237,12 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
             (0..2).for_each(|k| m[k] -= PITCH * (m[2 + k] * dx as f64 + m[4 + k] * dy as f64));
             let own: f64 = (0..2).map(|k| (m[k] - grids[0].at(k, x, y)).powi(2)).sum();
             let weight = (fits.at(6, i, j) + own + 1e-4).powi(-2);
-            total += weight;
-            sum.iter_mut().zip(m).for_each(|(s, m)| *s += weight * m);
+            let weights = [weight, weight * weight];
+            (0..2).for_each(|n| total[n] += weights[n]);
+            (0..6).for_each(|k| sum[k] += weights[usize::from(k > 1)] * m[k]);
         }
         for k in 0..6 {
-            let mut want = sum[k] / total + base[k];
+            let mut want = sum[k] / total[usize::from(k > 1)] + base[k];
             if k < 2 {
                 want += PITCH * (base[2 + k] * x as f64 + base[4 + k] * y as f64);
             }
