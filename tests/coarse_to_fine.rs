@@ -66,6 +66,47 @@ fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
 }
 
 #[test]
+fn three_frames_tell_the_step_to_the_next_or_the_mean_of_both() {
+    let scene = scene(FAST);
+    let frames = frames(&scene, 1.0, &[-1.0, 0.0, 1.0]);
+    for (central, own, other) in [(false, (0.0, 1.0), (-1.0, 1.0)), (true, (-1.0, 1.0), (0.0, 1.0))] {
+        let options = CoarseToFineOptions { central, ..CoarseToFineOptions::default() };
+        let field = estimate(options, Common::default(), &frames);
+        let [own, other] = [own, other].map(|between| errors(&field, &mean_truth(&scene, 0.0, between).unwrap()));
+        assert!(own.0 < 0.012 && own.1 < 0.0005, "{central}: {own:?}");
+        // Half the acceleration, .12 px.
+        assert!(other.0 > 0.1, "{central}: {other:?}");
+    }
+}
+
+/// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a steady flow.
+#[test]
+fn things_that_accelerate_are_where_they_will_be() {
+    let place = |t: f64| 80.0 + 2.0 * t + t * t;
+    let texture = |x: f64, y: f64| {
+        let wave = |a: f64, b: f64, c: f64| (a * x + b * y + c).sin();
+        128.0 + 22.0 * (wave(0.9, 0.3, 0.0) + wave(-0.4, 0.8, 1.0) + wave(0.5, 0.6, 2.0) + wave(0.2, -0.9, 3.0))
+    };
+    let inside = |x: f64, y: f64, t: f64| (x - place(t)).hypot(y - 80.0) < 40.0;
+    let frame = |t: f64| {
+        Frame::<f32>::from_fn(SIZE, SIZE, |x, y| {
+            let (x, y) = (x as f64, y as f64);
+            let value = if inside(x, y, t) { texture(x - place(t) + 31.0, y + 7.0) } else { texture(x + 0.5 * t, y) };
+            value.round() as f32
+        })
+    };
+    let field = estimate(CoarseToFineOptions::default(), Common::default(), &[-1.0, 0.0, 1.0].map(frame));
+    let mean = |keep: &dyn Fn(f64) -> bool| {
+        let sites = (0..SIZE * SIZE).map(|at| (at, (at / SIZE) as f64 - 80.0, (at % SIZE) as f64 - 80.0));
+        let inner = sites.filter(|&(_, y, x)| y.abs() < 56.0 && x.abs() < 56.0 && keep(x.hypot(y)));
+        let u: Vec<f64> = inner.map(|(at, ..)| f64::from(field.affine(at).to_array()[0])).collect();
+        u.iter().sum::<f64>() / u.len() as f64
+    };
+    let (disc, ground) = (mean(&|r| r < 30.0), mean(&|r| r > 50.0));
+    assert!((disc - 3.0).abs() < 0.03 && (ground + 0.5).abs() < 0.03, "{disc} {ground}");
+}
+
+#[test]
 fn errors_are_about_as_large_as_the_covariance_says() {
     let scene = scene([3.3, -2.2, 0.01, 0.02, -0.02, 0.01]);
     let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();

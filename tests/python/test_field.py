@@ -112,7 +112,7 @@ def test_the_deviation_of_a_regions_mean_holds_the_bias_of_clean_frames(name):
         scene = scenes.Scene(name, width=96, height=96, seed=seed)
         camera = scenes.Sensor(noise=0.0, rounding="nearest", saturate=True)
         seen = jacoflow.estimate([camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))])
-        truth = scene.truth(0.0)
+        truth = scene.truth(0.0, between=(0.0, 1.0))
         value, std, _ = seen.region_mean("divergence", (16, 16, 64, 64))
         ratios.append((value - truth.value("divergence")[48, 48]) / std)
         assert std < 0.6 * np.nanmedian(seen.std("divergence"))

@@ -30,7 +30,7 @@ pub struct MethodArguments {
     /// instantaneous: motion model, affine (default), translational or accelerating
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
-    /// windowed, instantaneous: time differences, central (default) or backward (the patent's)
+    /// Time differences: forward (coarse-to-fine, its default), central (default of the others) or backward (windowed, instantaneous)
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// windowed, baselines: estimate from two frames instead of three (also chosen when there are just two)
@@ -88,11 +88,12 @@ impl MethodArguments {
         self.refuse_foreign(&method)?;
         let pair = self.pair || frames == Some(2);
         Ok(match method {
-            Method::CoarseToFine(options) => Method::CoarseToFine(CoarseToFineOptions {
-                preset: self.preset.as_deref().map_or(Ok(options.preset), Preset::parse)?,
-                frames: if pair { 2 } else { options.frames },
-                levels: self.levels,
-            }),
+            Method::CoarseToFine(mut options) => {
+                options.preset = self.preset.as_deref().map_or(Ok(options.preset), Preset::parse)?;
+                options.frames = if pair { 2 } else { options.frames };
+                self.scheme.as_deref().map_or(Ok(()), |name| options.set_scheme(name))?;
+                Method::CoarseToFine(CoarseToFineOptions { levels: self.levels, ..options })
+            }
             Method::Windowed(_) => Method::Windowed(self.windowed(pair, smooth)?),
             Method::Instantaneous(options) => Method::Instantaneous(self.instantaneous(options)?),
             Method::LucasKanade(mut options) => {
@@ -153,7 +154,7 @@ impl MethodArguments {
             ("preset", self.preset.is_some(), coarse_to_fine),
             ("levels", self.levels.is_some(), coarse_to_fine),
             ("model", self.model.is_some(), instantaneous),
-            ("scheme", self.scheme.is_some(), windowed || instantaneous),
+            ("scheme", self.scheme.is_some(), coarse_to_fine || windowed || instantaneous),
             ("pair", self.pair, !instantaneous),
             ("neighbourhood", self.neighbourhood.is_some(), windowed || instantaneous),
             ("window", self.window.is_some(), windowed || lucas_kanade),

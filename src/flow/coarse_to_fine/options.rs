@@ -115,6 +115,9 @@ pub struct CoarseToFineOptions {
     /// Frames of one estimate: 3 (default) or 2. The field tells where the pixels of the middle frame (of the first of two) are in the next; a frame before
     /// helps as far as motion goes on as it was.
     pub frames: usize,
+    /// Whether three frames tell the mean of both steps instead, `(-1, 1) / 2`: the velocity at the middle frame, to second order in time where it
+    /// accelerates. Default: no.
+    pub central: bool,
     /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels` px. `None` (default): as many as the frame
     /// allows, down to [`LEAST_SIDE`] px.
     pub levels: Option<usize>,
@@ -122,7 +125,7 @@ pub struct CoarseToFineOptions {
 
 impl Default for CoarseToFineOptions {
     fn default() -> Self {
-        Self { preset: Preset::default(), frames: 3, levels: None }
+        Self { preset: Preset::default(), frames: 3, central: false, levels: None }
     }
 }
 
@@ -135,6 +138,19 @@ impl CoarseToFineOptions {
     /// The default for two frames.
     pub fn pair() -> Self {
         Self { frames: 2, ..Self::default() }
+    }
+
+    /// Tells three frames' motion as the time scheme called `name` has it: `forward` to the next frame or `central`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `scheme` for another word.
+    pub fn set_scheme(&mut self, name: &str) -> Result<()> {
+        self.central = match name {
+            "forward" => false,
+            "central" => true,
+            other => return Err(Error::argument("scheme", "forward or central for a coarse-to-fine estimate", other)),
+        };
+        Ok(())
     }
 
     /// Refuses values that mean nothing.

@@ -45,6 +45,8 @@ pub(super) struct Options {
     pub kappa: f64,
     /// The same for edge fits, whose change is that of the calm part of a wider region.
     pub kappa_edge: f64,
+    /// The same for the change from the widest plain fit to nothing.
+    pub kappa_nothing: f64,
     /// Region of the changes.
     pub region: f64,
     /// Region whose calm part judges the edge fits.
@@ -75,6 +77,7 @@ impl Default for Options {
             ladder: &[1.25, 1.9, 2.8, 4.2, 6.3, 9.5, 14.0, 21.0],
             kappa: 10.0,
             kappa_edge: 6.0,
+            kappa_nothing: 16.0,
             region: 10.0,
             calm_region: 20.0,
             misfit_region: 14.0,

@@ -1,6 +1,7 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
-use super::data::{COUNT, MOTION};
+use super::change::add_change;
+use super::data::COUNT;
 use super::descend::Plan;
 use super::grid::Planes;
 use super::levels::Compared;
@@ -49,7 +50,8 @@ impl CoarseToFine {
             let levels = (self.options.levels, effort.last);
             let last = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
             let plan = Plan { simd, effort, range, last };
-            let estimate = estimate(&plan, frames.len() == 3, &mut workspace);
+            let changes = frames.len() == 3 && !self.options.central;
+            let estimate = estimate(&plan, changes, &mut workspace);
             output::fill(&estimate, &workspace.space, frames, common, field);
             estimate.keep(&mut workspace);
             self.memory.give(workspace);
@@ -57,8 +59,8 @@ impl CoarseToFine {
     }
 }
 
-/// From the filled pyramid to the motion.
-fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
+/// From the filled pyramid to the motion; `changes`: of three frames, to the next and not the mean of both steps.
+fn estimate<T: SimdReal>(plan: &Plan, changes: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
     let (simd, last) = (plan.simd, plan.last);
     let (mut coupled, scale) = plan.from_nothing(workspace);
     let Workspace { pyramid, data, space, .. } = &mut *workspace;
@@ -66,35 +68,13 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, workspace: &mut Workspace
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::All), &motion, scale);
     locking.correct(simd, &mut motion);
     let data = std::mem::take(data);
-    let change = is_triple.then(|| {
+    let change = changes.then(|| {
         workspace.data = workspace.space.planes(data.width, data.height, COUNT);
         locking.correct(simd, &mut coupled);
-        change(plan, workspace, &coupled, &mut motion)
+        add_change(plan, workspace, &coupled, &mut motion)
     });
     workspace.space.keep(coupled);
     Estimate { level: last, motion, data, range: plan.range, evidence, change: change.flatten(), locking }
-}
-
-/// Adds to a triple's `motion`, the mean of both steps, what the step to the next frame alone differs by from the `coupled` motion: the flow then tells where the middle
-/// frame's pixels are in the next, whether or not they go on as they came. What noise explains is nothing.
-fn change<T: SimdReal>(
-    plan: &Plan,
-    workspace: &mut Workspace<T>,
-    coupled: &Planes<T>,
-    motion: &mut Planes<T>,
-) -> Option<Evidence<T>> {
-    let (simd, last) = (plan.simd, plan.last);
-    let (mut ahead, scale) = plan.ahead(workspace, coupled);
-    let Workspace { pyramid, data, space, .. } = workspace;
-    let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
-    locking.correct(simd, &mut ahead);
-    ahead.data_mut().iter_mut().zip(coupled.data()).for_each(|(ahead, both)| *ahead = *ahead - *both);
-    let (change, evidence) = refine(simd, space, &Refinement::for_changes(), &ahead, data);
-    for (y, k) in (0..motion.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
-        motion.line_mut(k, y).iter_mut().zip(change.line(k, y)).for_each(|(sum, change)| *sum = *sum + *change);
-    }
-    [ahead, change].into_iter().for_each(|planes| space.keep(planes));
-    evidence
 }
 
 /// The motion on the sites of the finest level worked on, and what it rests on.

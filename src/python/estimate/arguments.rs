@@ -136,9 +136,9 @@ impl Arguments {
         self.refuse(&["neighbourhood", "window_sigma", "rows", "smoothness", "iterations", "rank_deficient"])?;
         self.expect_model("affine")?;
         match self.time_scheme.as_deref() {
-            None | Some("central") => {}
+            None => {}
             Some(PAIR) => o.frames = 2,
-            Some(_) => return Err(unknown_scheme(self, "central or pair").into()),
+            Some(name) => o.set_scheme(name).map_err(|_| unknown_scheme(self, "forward, central or pair"))?,
         }
         o.preset = self.preset.as_deref().map_or(Ok(o.preset), Preset::parse)?;
         o.levels = self.levels.map(|levels| options::count("levels", levels)).transpose()?;

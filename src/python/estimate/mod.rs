@@ -103,9 +103,11 @@ macro_rules! define_estimate {
         ///     Pyramid levels of "coarse_to_fine"; default as many as the frame allows.
         /// model : "affine", "translational" or "accelerating"
         ///     Motion model of "instantaneous".
-        /// time_scheme : "central", "backward" or "pair"
-        ///     How time derivatives are taken, and so to which frame the field belongs: the middle one of three (default), the newest of three ("windowed" and
-        ///     "instantaneous" only), or the first of two (the default for two frames; not "instantaneous").
+        /// time_scheme : "forward", "central", "backward" or "pair"
+        ///     How time derivatives are taken, and so to which frame the field belongs: the middle one of three, the newest of three ("backward", "windowed" and
+        ///     "instantaneous" only), or the first of two ("pair", the default for two frames; not "instantaneous"). "forward", the default of "coarse_to_fine"
+        ///     and only known there, tells where the middle frame's pixels are in the next frame, as a pair does; the frame before helps as far as motion goes on as
+        ///     it was. "central", the default of the others, is the mean of the steps before and after: the velocity at the middle frame.
         /// neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
         ///     Pixels that the local quadratic is fitted to; default 3 x 3.
         /// neighbourhood_sigma : float, px

@@ -56,6 +56,9 @@ pub(super) struct Left {
     pub slopes: [f64; 2],
 }
 
+/// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
+const UNSEEN: f64 = 0.5;
+
 /// Shares of one window, and of the frame's edges.
 struct Edges {
     /// For each window and each place along an axis: the factor of means and of slopes along the edge, and that of slopes across it.
@@ -108,9 +111,11 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         };
         let inverse = inverse_without_noise(informed(self.evidence.information(x, y)), self.gradient * energy);
         let scale = self.excess * energy;
+        let widest = self.evidence.sigmas.len() - 1;
+        let nothing = UNSEEN * (1.0 - (0..=widest).map(|l| self.evidence.weight(l, x, y)).sum::<f64>()).max(0.0);
         let mut left = Left { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
-            let weight = self.evidence.weight(l, x, y);
+            let weight = self.evidence.weight(l, x, y) + if l == widest { nothing } else { 0.0 };
             let (flow, slope) = (11.0 / 6.0 / (4.0 * PI * sigma.powi(2)), 89.0 / 36.0 / (8.0 * PI * sigma.powi(4)));
             let ([mean_x, across_x], [mean_y, across_y]) = (self.columns.factors[l][x], self.rows.factors[l][y]);
             left.flow += weight * flow * mean_x * mean_y;

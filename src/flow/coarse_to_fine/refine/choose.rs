@@ -100,6 +100,7 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                         } else {
                             V::constant(1.0) / power4(V::load(&means[layout.calm(l) * stride..]))
                         };
+                        let kappa = if l + 1 < windows { kappa } else { options.kappa_nothing };
                         let ratio = change / (density * V::constant(noise[l] * kappa));
                         next = accepted / (V::constant(1.0) + power4(ratio));
                     }

@@ -1,0 +1,155 @@
+//! What a triple's step to the next frame differs by from the mean of its two steps.
+//!
+//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a scene, that is `M (u, v) / 2`, known without looking; where things
+//! go on as they are, as objects do, it is nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left is measured like motion itself
+//! and believed as far as noise does not explain it.
+
+use super::data::MOTION;
+use super::descend::Plan;
+use super::grid::Planes;
+use super::levels::Compared;
+use super::locking::Locking;
+use super::memory::{Space, Workspace};
+use super::refine::{Evidence, Options, PITCH, refine};
+use crate::simd::SimdReal;
+
+/// Rounds of reweighing.
+const ROUNDS: usize = 4;
+
+/// Adds it to the `motion`, of which `coupled` is what it was before it was refined: the flow then tells where the middle frame's pixels are in the next, whether or not
+/// they go on as they came. Returns what its windows were chosen by.
+pub(super) fn add_change<T: SimdReal>(
+    plan: &Plan,
+    workspace: &mut Workspace<T>,
+    coupled: &Planes<T>,
+    motion: &mut Planes<T>,
+) -> Option<Evidence<T>> {
+    let (simd, last) = (plan.simd, plan.last);
+    let (mut ahead, scale) = plan.ahead(workspace, coupled);
+    let Workspace { pyramid, data, space, .. } = workspace;
+    let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
+    locking.correct(simd, &mut ahead);
+    add(&mut ahead, coupled, -1.0);
+    let steady = steady(space, motion);
+    let share = share(&ahead, &steady);
+    add(&mut ahead, &steady, -share);
+    let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, data);
+    add(motion, &change, 1.0);
+    add(motion, &steady, share);
+    [ahead, change, steady].into_iter().for_each(|planes| space.keep(planes));
+    evidence
+}
+
+/// Adds `factor` times the first planes of `more`.
+fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
+    let factor = T::from_f64(factor);
+    for (y, k) in (0..to.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
+        to.line_mut(k, y).iter_mut().zip(more.line(k, y)).for_each(|(to, more)| *to = *to + factor * *more);
+    }
+}
+
+/// Half the acceleration of a steady flow, `M (u, v) / 2`, with its derivatives by differences of neighbouring sites.
+fn steady<T: SimdReal>(space: &Space<T>, motion: &Planes<T>) -> Planes<T> {
+    let (width, height) = (motion.width, motion.height);
+    let mut out = space.planes(width, height, MOTION);
+    let half = T::from_f64(0.5);
+    for y in 0..height {
+        let [u, v, u_x, v_x, u_y, v_y] = std::array::from_fn(|k| motion.line(k, y));
+        for (k, along, across) in [(0, u_x, u_y), (1, v_x, v_y)] {
+            for (x, out) in out.line_mut(k, y).iter_mut().enumerate() {
+                *out = half * (along[x] * u[x] + across[x] * v[x]);
+            }
+        }
+    }
+    for y in 0..height {
+        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+        for x in 0..width {
+            let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
+            for k in 0..2 {
+                let along = slope(out.at(k, left, y), out.at(k, right, y), right - left);
+                let across = slope(out.at(k, x, above), out.at(k, x, below), below - above);
+                out.line_mut(2 + k, y)[x] = along;
+                out.line_mut(4 + k, y)[x] = across;
+            }
+        }
+    }
+    out
+}
+
+/// Over so many sites.
+fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
+    T::from_f64((to.to_f64() - from.to_f64()) / (PITCH * sites.max(1) as f64))
+}
+
+/// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights that fall where the rest is larger than usual (Cauchy's).
+fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
+    let (mut share, mut usual) = (0.0, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let (mut product, mut square, mut rests) = (0.0, 0.0, Vec::new());
+        for y in 0..change.height {
+            let [u, v] = [0, 1].map(|k| (change.line(k, y), steady.line(k, y)));
+            for x in 0..change.width {
+                let [(d, s), (e, t)] = [u, v].map(|(d, s)| (d[x].to_f64(), s[x].to_f64()));
+                let rest = (d - share * s).powi(2) + (e - share * t).powi(2);
+                let weight = 1.0 / (1.0 + rest / usual);
+                product += weight * (d * s + e * t);
+                square += weight * (s * s + t * t);
+                rests.push(rest);
+            }
+        }
+        if rests.is_empty() || square <= f64::MIN_POSITIVE {
+            return 0.0;
+        }
+        let middle = rests.len() / 2;
+        usual = rests.select_nth_unstable_by(middle, f64::total_cmp).1.max(f64::MIN_POSITIVE);
+        share = (product / square).clamp(0.0, 1.0);
+    }
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
+        let mut planes = Planes::new(20, 15, MOTION);
+        for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
+            let line = planes.line_mut(k, y);
+            line.iter_mut().enumerate().for_each(|(x, m)| *m = f(k, PITCH * x as f64, PITCH * y as f64));
+        }
+        planes
+    }
+
+    /// Rotation about (20, 15) px with `w` radians a frame.
+    fn rotation(w: f64) -> Planes<f64> {
+        filled(|k, x, y| [-w * (y - 15.0), w * (x - 20.0), 0.0, w, -w, 0.0][k])
+    }
+
+    #[test]
+    fn steady_rotation_accelerates_towards_its_centre() {
+        let w = 0.03;
+        let got = steady(&Space::default(), &rotation(w));
+        let want = filled(|k, x, y| -0.5 * w * w * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
+        for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
+            assert!(got.line(k, y).iter().zip(want.line(k, y)).all(|(a, b)| (a - b).abs() < 1e-15), "{k} {y}");
+        }
+    }
+
+    #[test]
+    fn the_share_of_steady_flow_is_found_beside_objects_with_their_own_ways() {
+        let steady = steady(&Space::default(), &rotation(0.03));
+        let seen = |share: f64| {
+            let mut change = steady.clone();
+            change.data_mut().iter_mut().for_each(|m| *m *= share);
+            (0..15).for_each(|y| change.line_mut(0, y)[14..].fill(0.5));
+            change
+        };
+        for want in [0.0, 0.4, 1.0] {
+            let got = share(&seen(want), &steady);
+            assert!((got - want).abs() < 0.1, "{got} {want}");
+        }
+        assert_eq!(share(&seen(-1.0), &steady), 0.0);
+        let nothing = Planes::<f64>::new(20, 15, MOTION);
+        assert_eq!(share(&nothing, &nothing), 0.0);
+    }
+}
