@@ -82,17 +82,15 @@ fn three_frames_tell_the_step_to_the_next_or_the_mean_of_both() {
 /// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a steady flow.
 #[test]
 fn things_that_accelerate_are_where_they_will_be() {
-    let place = |t: f64| 80.0 + 2.0 * t + t * t;
-    let texture = |x: f64, y: f64| {
-        let wave = |a: f64, b: f64, c: f64| (a * x + b * y + c).sin();
-        128.0 + 22.0 * (wave(0.9, 0.3, 0.0) + wave(-0.4, 0.8, 1.0) + wave(0.5, 0.6, 2.0) + wave(0.2, -0.9, 3.0))
-    };
-    let inside = |x: f64, y: f64, t: f64| (x - place(t)).hypot(y - 80.0) < 40.0;
+    let ground = scene([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let skin = AffineTexture::moving((SIZE, SIZE), [0.0; 6], 9).unwrap().frame(0.0);
+    // 79, 80 and 83.
+    let place = |t: f64| (80.0 + 2.0 * t + t * t) as usize;
     let frame = |t: f64| {
+        let behind = ground.frame(t);
         Frame::<f32>::from_fn(SIZE, SIZE, |x, y| {
-            let (x, y) = (x as f64, y as f64);
-            let value = if inside(x, y, t) { texture(x - place(t) + 31.0, y + 7.0) } else { texture(x + 0.5 * t, y) };
-            value.round() as f32
+            let is_disc = (x as f64 - place(t) as f64).hypot(y as f64 - 80.0) < 40.0;
+            (if is_disc { skin.get(x + 80 - place(t), y) } else { behind.get(x, y) }).round() as f32
         })
     };
     let field = estimate(CoarseToFineOptions::default(), Common::default(), &[-1.0, 0.0, 1.0].map(frame));
@@ -103,7 +101,7 @@ fn things_that_accelerate_are_where_they_will_be() {
         u.iter().sum::<f64>() / u.len() as f64
     };
     let (disc, ground) = (mean(&|r| r < 30.0), mean(&|r| r > 50.0));
-    assert!((disc - 3.0).abs() < 0.03 && (ground + 0.5).abs() < 0.03, "{disc} {ground}");
+    assert!((disc - 3.0).abs() < 0.1 && (ground + 0.5).abs() < 0.02, "{disc} {ground}");
 }
 
 #[test]
