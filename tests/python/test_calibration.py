@@ -25,21 +25,24 @@ def flow_error(field, truth, known):
     return np.sqrt(np.mean(np.sum((field.flow - truth.flow)[known] ** 2, axis=-1)))
 
 
-# Errors of the second go together over some 20 px: a frame of this size holds only a few dozen independent ones.
-@pytest.mark.parametrize(("method", "share"), [("windowed", 0.88), ("coarse_to_fine", 0.85)])
+# Errors of the second go together over some 20 px: a frame of this size holds only a few independent ones, so that it takes more frames.
+@pytest.mark.parametrize(("method", "seeds", "share"), [("windowed", 1, 0.88), ("coarse_to_fine", 4, 0.88)])
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 @pytest.mark.parametrize(("name", "carrier"), CASES)
-def test_errors_lie_within_their_deviations(name, carrier, noise, method, share):
-    scene = scenes.Scene(name, width=112, height=96, seed=3, carrier=carrier)
-    # To the next frame, or at the middle one.
-    truth = scene.truth(0.0, between=(0.0, 1.0)) if method == "coarse_to_fine" else scene.truth(0.0)
-    field = jacoflow.estimate(camera_frames(scene, noise, 1), method=method)
-    known = inner(field, truth)
-    assert known.sum() > 0.99 * (112 - 2 * MARGIN) * (96 - 2 * MARGIN)
-    for parameter in (*field.parameters, "divergence", "curl"):
-        error = (field.value(parameter) - truth.value(parameter))[known]
-        deviation = field.std(parameter)[known]
-        assert (np.abs(error) < 2 * deviation).mean() > share, parameter
+def test_errors_lie_within_their_deviations(name, carrier, noise, method, seeds, share):
+    held = {}
+    for seed in range(3, 3 + seeds):
+        scene = scenes.Scene(name, width=112, height=96, seed=seed, carrier=carrier)
+        # To the next frame, or at the middle one.
+        truth = scene.truth(0.0, between=(0.0, 1.0)) if method == "coarse_to_fine" else scene.truth(0.0)
+        field = jacoflow.estimate(camera_frames(scene, noise, seed), method=method)
+        known = inner(field, truth)
+        assert known.sum() > 0.99 * (112 - 2 * MARGIN) * (96 - 2 * MARGIN)
+        for parameter in (*field.parameters, "divergence", "curl"):
+            error = (field.value(parameter) - truth.value(parameter))[known]
+            held.setdefault(parameter, []).append(np.mean(np.abs(error) < 2 * field.std(parameter)[known]))
+    for parameter, shares in held.items():
+        assert np.mean(shares) > share, (parameter, shares)
 
 
 @pytest.mark.parametrize(("name", "carrier"), CASES)
