@@ -36,7 +36,9 @@ pub(super) fn add_change<T: SimdReal>(
     let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, data);
     add(motion, &change, 1.0);
     add(motion, &steady, share);
-    [ahead, change, steady].into_iter().for_each(|planes| space.keep(planes));
+    for planes in [ahead, change, steady] {
+        space.keep(planes);
+    }
     evidence
 }
 
@@ -44,7 +46,7 @@ pub(super) fn add_change<T: SimdReal>(
 fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     let factor = T::from_f64(factor);
     for (y, k) in (0..to.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
-        to.line_mut(k, y).iter_mut().zip(more.line(k, y)).for_each(|(to, more)| *to = *to + factor * *more);
+        to.line_mut(k, y).iter_mut().zip(more.line(k, y)).for_each(|(to, more)| *to += factor * *more);
     }
 }
 

@@ -31,7 +31,7 @@ pub(super) type Found<T> = (Planes<T>, Option<T>);
 
 impl Plan {
     /// The way down from the coarsest level of the filled pyramid, where nothing is known. The last data term stays in the workspace.
-    pub fn from_nothing<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> Found<T> {
+    pub fn all<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> Found<T> {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
         let sites = sites(levels[coarsest].size);

@@ -62,7 +62,7 @@ impl CoarseToFine {
 /// From the filled pyramid to the motion; `changes`: of three frames, to the next and not the mean of both steps.
 fn estimate<T: SimdReal>(plan: &Plan, changes: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
     let (simd, last) = (plan.simd, plan.last);
-    let (mut coupled, scale) = plan.from_nothing(workspace);
+    let (mut coupled, scale) = plan.all(workspace);
     let Workspace { pyramid, data, space, .. } = &mut *workspace;
     let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, data);
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::All), &motion, scale);

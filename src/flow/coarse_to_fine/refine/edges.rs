@@ -84,7 +84,7 @@ pub(super) fn add<'a, V: Lanes<Scalar = T>, T: SimdReal>(
     let mut slopes = [T::from_f64(0.0); CHUNK];
     for (m, narrow) in edges.iter().enumerate() {
         if narrow.place + WIDER == place || (is_last && narrow.place + WIDER > place) {
-            slopes.iter_mut().zip(lines(m)).for_each(|(sum, weight)| *sum = *sum + *weight);
+            slopes.iter_mut().zip(lines(m)).for_each(|(sum, weight)| *sum += *weight);
         }
     }
     let flow = lines(n);
