@@ -24,6 +24,8 @@ class Setting:
     """The most frames it is given: 2 for a pair even where there are three."""
     moment: float = 0.5
     """Where between the two frames of a pair its field belongs: 0 the first, 0.5 the middle. Three frames: always the middle one."""
+    forward: bool = False
+    """Whether three frames tell the step from the middle one to the next, and not the mean of both steps."""
     window: float | None = None
     """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it has no single one."""
 
@@ -46,7 +48,7 @@ def windowed(smooth: float, window: float, **more: Any) -> Setting:
 def coarse_to_fine(preset: str, frames: int = 3) -> Setting:
     """The estimator for everyday frames."""
     options = {"method": "coarse_to_fine", "preset": preset, "covariance": False}
-    return Setting(f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""), options, frames=frames, moment=0.0)
+    return Setting(f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""), options, frames=frames, moment=0.0, forward=True)
 
 
 PRESETS = ("fast", "balanced", "accurate")

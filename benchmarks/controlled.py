@@ -92,13 +92,16 @@ class Contestant:
     frames: int = 2
     moment: float = 0.0
     """When a pair's result is that of a pixel: 0 in the first frame, 0.5 halfway. A triple's: in the middle frame."""
+    forward: bool = False
+    """Whether a triple's result is the step to the next frame, and not the mean of both."""
     window: float | None = None
     """Standard deviation of its Gaussian window, px, for the noise bound."""
 
     @classmethod
     def of(cls, setting: Setting) -> Contestant:
         """One of our settings."""
-        return cls(setting.name, setting.estimate, setting.frames, 0.0 if setting.frames == 3 else setting.moment, setting.window)
+        moment = 0.0 if setting.frames == 3 else setting.moment
+        return cls(setting.name, setting.estimate, setting.frames, moment, setting.forward, setting.window)
 
     def times(self) -> tuple[float, ...]:
         """Times of its frames."""
@@ -106,7 +109,7 @@ class Contestant:
 
     def truth(self, case: Case) -> tuple[Array, Array]:
         """What it should answer."""
-        first, last = self.times()[0], self.times()[-1]
+        first, last = (0.0, 1.0) if self.forward else (self.times()[0], self.times()[-1])
         return truth(case.wavelength, case.speed, case.seed, self.moment, (first - self.moment, last - self.moment))
 
     def errors(self, case: Case) -> tuple[float, float, float]:

@@ -69,10 +69,12 @@ def test_controlled_scenes_have_the_speed_asked_for_and_exact_truth():
     def knows(frames):
         return answer
 
-    for frames, moment, t, between in ((2, 0.0, 0.0, (0, 1)), (2, 0.5, 0.5, (-0.5, 0.5)), (3, 0.0, 0.0, (-1, 1))):
+    pairs = ((2, False, 0.0, 0.0, (0, 1)), (2, False, 0.5, 0.5, (-0.5, 0.5)))
+    triples = ((3, False, 0.0, 0.0, (-1, 1)), (3, True, 0.0, 0.0, (0, 1)))
+    for frames, forward, moment, t, between in (*pairs, *triples):
         truth = case.scene().truth(t, between=between)
         answer = truth.flow, truth.jacobian
-        contestant = controlled.Contestant("exact", knows, frames=frames, moment=moment)
+        contestant = controlled.Contestant("exact", knows, frames=frames, moment=moment, forward=forward)
         assert contestant.errors(case) == (0.0, 1.0, 0.0)
     assert len(controlled.cases()) == 16
 

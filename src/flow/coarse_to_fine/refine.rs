@@ -43,7 +43,7 @@ pub(super) struct Options {
     pub ladder: &'static [f64],
     /// Change, over what noise explains, that the plain fits accept.
     pub kappa: f64,
-    /// The same for edge fits, whose change is that of the calm part of a wider region.
+    /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,
     /// The same for the change from the widest plain fit to nothing.
     pub kappa_nothing: f64,
@@ -78,7 +78,7 @@ impl Default for Options {
             kappa: 10.0,
             kappa_edge: 6.0,
             kappa_nothing: 16.0,
-            region: 10.0,
+            region: 20.0,
             calm_region: 20.0,
             misfit_region: 14.0,
             noise_region: 8.0,

@@ -101,13 +101,15 @@ pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
     let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
     out.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
         for (y, row) in (task * ROWS..).zip(rows.chunks_mut(len)) {
-            row.copy_from_slice(old.row(y));
+            row[..2 * stride].copy_from_slice(&old.row(y)[..2 * stride]);
             for k in 0..2 {
                 let along_x = &mut row[(2 + k) * stride + LEFT..][..width];
                 slopes_along(old.line(k, y), old.line(2 + k, y), along_x);
+                let along_y = &mut row[(4 + k) * stride + LEFT..][..width];
                 if y > 0 && y + 1 < old.height {
-                    let lines = [y - 1, y, y + 1].map(|y| (old.line(k, y), old.line(4 + k, y)));
-                    slopes_across(lines, &mut row[(4 + k) * stride + LEFT..][..width]);
+                    slopes_across([y - 1, y, y + 1].map(|y| (old.line(k, y), old.line(4 + k, y))), along_y);
+                } else {
+                    along_y.copy_from_slice(old.line(4 + k, y));
                 }
             }
         }
@@ -116,6 +118,9 @@ pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
 
 /// Slopes between the sites of a row, of which the first and the last keep what they have.
 fn slopes_along<T: SimdReal>(flow: &[T], slope: &[T], out: &mut [T]) {
+    for end in [0, out.len() - 1] {
+        out[end] = slope[end];
+    }
     let inner = out.len().saturating_sub(2);
     let (before, here, after) = (&slope[..inner], &slope[1.min(slope.len())..], &slope[2.min(slope.len())..]);
     let quarter = T::from_f64(0.25);
