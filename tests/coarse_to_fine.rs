@@ -60,7 +60,10 @@ fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
             println!("{} from {number} frames: flow {flow:.4} px, Jacobian {jacobian:.5}", preset.name());
             let name = preset.name();
             assert!(flow < most_flow && jacobian < most_jacobian, "{name} from {number}: {flow} {jacobian}");
-            assert!(field.status.iter().all(|s| *s == Status::Ok));
+            // What leaves the frame may contradict.
+            let consistent = field.status.iter().filter(|s| **s == Status::Ok).count();
+            println!("  {consistent} of {} consistent", field.len());
+            assert!(field.status.iter().all(|s| s.is_valid()) && consistent > field.len() * 98 / 100);
         }
     }
 }
@@ -79,21 +82,37 @@ fn three_frames_tell_the_step_to_the_next_or_the_mean_of_both() {
     }
 }
 
+/// A disc of 40 px in the column `place` over a ground that moves by -0.5 px a frame, at time `t`.
+fn disc(t: f64, place: usize) -> Frame<f32> {
+    let behind = scene([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0]).frame(t);
+    let skin = AffineTexture::moving((SIZE, SIZE), [0.0; 6], 9).unwrap().frame(0.0);
+    Frame::from_fn(SIZE, SIZE, |x, y| {
+        let is_disc = (x as f64 - place as f64).hypot(y as f64 - 80.0) < 40.0;
+        (if is_disc { skin.get(x + 80 - place, y) } else { behind.get(x, y) }).round() as f32
+    })
+}
+
+#[test]
+fn what_goes_out_of_sight_is_told() {
+    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &[disc(0.0, 80), disc(1.0, 86)]);
+    let share = |keep: &dyn Fn(f64, f64) -> bool| {
+        let sites = (0..SIZE * SIZE).filter(|at| keep((at % SIZE) as f64 - 80.0, (at / SIZE) as f64 - 80.0));
+        let told: Vec<bool> = sites.map(|at| field.status[at] == Status::Inconsistent).collect();
+        told.iter().filter(|told| **told).count() as f64 / told.len() as f64
+    };
+    // The ground that the disc will cover, and what neither its old nor its new edge is near to.
+    let hidden = share(&|x, y| x.hypot(y) > 40.5 && (x - 6.0).hypot(y) < 39.5 && y.abs() < 20.0);
+    let seen = share(&|x, y| x.hypot(y) < 30.0 || (x.hypot(y) > 52.0 && x.abs().max(y.abs()) < 70.0));
+    println!("inconsistent: {hidden:.3} of what is covered, {seen:.4} of what stays in sight");
+    assert!(hidden > 0.6 && seen < 0.002, "{hidden} {seen}");
+    assert!(field.motion.iter().all(|plane| plane.is_finite()));
+}
+
 /// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a steady flow.
 #[test]
 fn things_that_accelerate_are_where_they_will_be() {
-    let ground = scene([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let skin = AffineTexture::moving((SIZE, SIZE), [0.0; 6], 9).unwrap().frame(0.0);
-    // 79, 80 and 83.
-    let place = |t: f64| (80.0 + 2.0 * t + t * t) as usize;
-    let frame = |t: f64| {
-        let behind = ground.frame(t);
-        Frame::<f32>::from_fn(SIZE, SIZE, |x, y| {
-            let is_disc = (x as f64 - place(t) as f64).hypot(y as f64 - 80.0) < 40.0;
-            (if is_disc { skin.get(x + 80 - place(t), y) } else { behind.get(x, y) }).round() as f32
-        })
-    };
-    let field = estimate(CoarseToFineOptions::default(), Common::default(), &[-1.0, 0.0, 1.0].map(frame));
+    let frames = [(-1.0, 79), (0.0, 80), (1.0, 83)].map(|(t, place)| disc(t, place));
+    let field = estimate(CoarseToFineOptions::default(), Common::default(), &frames);
     let mean = |keep: &dyn Fn(f64) -> bool| {
         let sites = (0..SIZE * SIZE).map(|at| (at, (at / SIZE) as f64 - 80.0, (at % SIZE) as f64 - 80.0));
         let inner = sites.filter(|&(_, y, x)| y.abs() < 56.0 && x.abs() < 56.0 && keep(x.hypot(y)));

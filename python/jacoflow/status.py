@@ -30,3 +30,6 @@ class Status(IntEnum):
     """A filter lost its positive-definite covariance and was restarted here."""
     PREDICTED = 7
     """No estimate at this time: what the estimates before say, with a covariance that grows until the next one."""
+    INCONSISTENT = 8
+    """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is seen is hidden in another frame (occlusion), has
+    changed, or moves otherwise; the covariance does not know. Only "coarse_to_fine" tells."""

@@ -21,11 +21,14 @@ pub enum Status {
     Repaired = 6,
     /// No estimate at this time: what the estimates before say, with a covariance that grows until the next one.
     Predicted = 7,
+    /// A full estimate that the frames contradict: along it brightness changes by far more than usual. What is seen is hidden in another frame (occlusion), has changed, or
+    /// moves otherwise; the covariance does not know.
+    Inconsistent = 8,
 }
 
 impl Status {
     /// Every status, by code.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Ok,
         Self::Border,
         Self::NonFinite,
@@ -34,6 +37,7 @@ impl Status {
         Self::MinNorm,
         Self::Repaired,
         Self::Predicted,
+        Self::Inconsistent,
     ];
 
     /// The word used in files and in Python.
@@ -47,6 +51,7 @@ impl Status {
             Self::MinNorm => "min_norm",
             Self::Repaired => "repaired",
             Self::Predicted => "predicted",
+            Self::Inconsistent => "inconsistent",
         }
     }
 
@@ -55,9 +60,9 @@ impl Status {
         Self::ALL.get(code as usize).copied()
     }
 
-    /// A unique, complete estimate.
+    /// A unique, complete estimate, for better or worse.
     pub fn is_valid(self) -> bool {
-        matches!(self, Self::Ok | Self::Repaired | Self::Predicted)
+        matches!(self, Self::Ok | Self::Repaired | Self::Predicted | Self::Inconsistent)
     }
 }
 

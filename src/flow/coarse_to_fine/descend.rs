@@ -5,7 +5,7 @@ use super::data::{DataOptions, DataTerm, MOTION};
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::Workspace;
-use super::options::Effort;
+use super::options::{Effort, Limits};
 use super::range::Range;
 use super::resample::{coarser, finer, rederive};
 use crate::simd::{Level, SimdReal};
@@ -46,10 +46,9 @@ impl Plan {
     pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let (levels, [finest, second]) = (workspace.pyramid.levels(), self.effort.ahead);
         let mut start = workspace.space.planes(motion.width, motion.height, MOTION);
-        let mut limits = vec![(0, self.effort.coupling); self.last];
-        limits.push((finest, self.effort.coupling));
+        let mut limits = vec![self.effort.up_to(finest); self.last + 1];
         if let Some(level) = levels.get(self.last + 1) {
-            limits.push((second, self.effort.coupling));
+            limits.push(self.effort.up_to(second));
             coarser(motion, sites(level.size), &mut start);
         } else {
             start.data_mut().copy_from_slice(motion.data());
@@ -63,21 +62,21 @@ impl Plan {
         workspace: &mut Workspace<T>,
         compared: Compared,
         mut motion: Planes<T>,
-        limits: &[(usize, Coupling)],
+        limits: &[Limits],
     ) -> Found<T> {
         let Workspace { pyramid, data, pool, scratch, space } = workspace;
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
         let mut step = Step { plan: self, compared, term, data, scratch, scale: None };
         let mut old = space.planes(0, 0, MOTION);
-        for (k, (level, (most, coupling))) in pyramid.levels().iter().zip(limits).enumerate().skip(self.last).rev() {
+        for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(self.last).rev() {
             if k + 1 < limits.len() {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
             }
-            for _ in 0..*most {
+            for _ in 0..limit.most {
                 std::mem::swap(&mut motion, &mut old);
                 rederive(&old, &mut motion);
-                if step.iterate(level, coupling, &mut motion) <= self.effort.settled {
+                if step.iterate(level, &limit.coupling, &mut motion) <= limit.settled {
                     break;
                 }
             }

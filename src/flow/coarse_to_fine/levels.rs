@@ -13,6 +13,10 @@ const CHUNK: usize = 1 << 16;
 
 /// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of the stencils.
 const REACH: usize = 3;
+/// So many of the 49 pixels within that reach are usable where one is used: all but what a straight edge at that distance takes, or scattered dead pixels.
+const MOST: usize = 40;
+/// So many of nine on levels that motion is only handed down from: else small areas between holes would not be seen there at all.
+const ROUGHLY: usize = 6;
 
 /// Which frames are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,7 +108,7 @@ impl<T: SimdReal> Pyramid<T> {
                 }
             }
             level.size = level.frames[0].size();
-            level.usable = masks.iter().map(|mask| mask.as_ref().map(|m| shrunk(m, REACH))).collect();
+            level.usable = masks.iter().map(|mask| mask.as_ref().map(|m| usable_around(m, k > last))).collect();
             if k >= last {
                 for (spline, frame) in level.splines.iter_mut().zip(&level.frames) {
                     spline.refill(simd, frame);
@@ -149,15 +153,23 @@ fn holes<T: SimdReal>(frame: &Frame<T>, range: Range, mask: Option<&Mask>) -> Op
     usable.data().contains(&false).then_some(usable)
 }
 
-/// The pixels of a mask that are `reach` px (in rows and columns) away from every unusable one.
-fn shrunk(mask: &Mask, reach: usize) -> Mask {
+/// The pixels that so much around them is usable of that what holes were filled with counts little: all of the three by three and most of what the splines and stencils
+/// read, or, where motion is only looked for roughly, most of the three by three.
+fn usable_around(mask: &Mask, roughly: bool) -> Mask {
+    let near = usable_counts(mask, 1);
+    if roughly {
+        return near.map(|&count| count >= ROUGHLY);
+    }
+    let far = usable_counts(mask, REACH);
+    Frame::from_fn(mask.width(), mask.height(), |x, y| near.get(x, y) == 9 && far.get(x, y) >= MOST)
+}
+
+/// How many pixels of the square that reaches `reach` px from each are usable, the border replicated.
+fn usable_counts(mask: &Mask, reach: usize) -> Frame<usize> {
     let (width, height) = mask.size();
-    let along = Frame::from_fn(width, height, |x, y| {
-        (x.saturating_sub(reach)..(x + reach + 1).min(width)).all(|x| mask.get(x, y))
-    });
-    Frame::from_fn(width, height, |x, y| {
-        (y.saturating_sub(reach)..(y + reach + 1).min(height)).all(|y| along.get(x, y))
-    })
+    let around = |at: usize, len: usize| (0..=2 * reach).map(move |k| (at + k).saturating_sub(reach).min(len - 1));
+    let along = Frame::from_fn(width, height, |x, y| around(x, width).filter(|&x| mask.get(x, y)).count());
+    Frame::from_fn(width, height, |x, y| around(y, height).map(|y| along.get(x, y)).sum())
 }
 
 #[cfg(test)]
@@ -187,9 +199,14 @@ mod tests {
         let pyramid = |frame: &Frame<f32>| pyramid(&[frame], Some(1));
         let filled = pyramid(&frame);
         let usable = filled.levels()[0].usable[0].as_ref().unwrap();
+        // A single pixel is filled well enough; what its value goes into directly is not used.
         let lost = usable.data().iter().filter(|&&u| !u).count();
-        assert_eq!(lost, (2 * REACH + 1) * (2 * REACH + 1));
-        assert!(!usable.get(10 - REACH, 8) && usable.get(10 - REACH - 1, 8));
+        assert_eq!(lost, 9);
+        assert!(!usable.get(9, 8) && usable.get(8, 8));
+        (0..16).for_each(|y| frame.row_mut(y)[..6].fill(f32::NAN));
+        let filled = pyramid(&frame);
+        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
+        assert!(!usable.get(7, 3) && usable.get(8, 3));
         assert!(pyramid(&Frame::filled(9, 9, 1.0)).levels()[0].usable[0].is_none());
     }
 }

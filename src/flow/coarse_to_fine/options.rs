@@ -88,22 +88,35 @@ const SMALL: usize = 2500;
 /// Iterations and sweeps there: what coarse levels miss is lost.
 const COARSE: (usize, usize) = (10, 10);
 
+/// When a level is done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Limits {
+    /// Most iterations.
+    pub most: usize,
+    /// An iteration that changes the flow by no more than this was the last, px of the level (root mean square).
+    pub settled: f64,
+    /// After each iteration.
+    pub coupling: Coupling,
+}
+
 impl Effort {
-    /// Most iterations on level `k` (0 being the frame itself) of `size` pixels, and how strongly and often sites are coupled there; on the coarsest
-    /// nothing is known yet.
-    pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> (usize, Coupling) {
+    /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is known yet.
+    pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> Limits {
         if is_coarsest || size.0 * size.1 <= SMALL {
-            return (COARSE.0, Coupling { sweeps: COARSE.1, ..self.coupling });
+            let coupling = Coupling { sweeps: COARSE.1, ..self.coupling };
+            return Limits { most: COARSE.0, settled: self.settled, coupling };
         }
         let [finest, second, others] = self.iterations;
-        (
-            match k.saturating_sub(self.last) {
-                0 => finest,
-                1 => second,
-                _ => others,
-            },
-            self.coupling,
-        )
+        self.up_to(match k.saturating_sub(self.last) {
+            0 => finest,
+            1 => second,
+            _ => others,
+        })
+    }
+
+    /// So many iterations at most.
+    pub fn up_to(&self, most: usize) -> Limits {
+        Limits { most, settled: self.settled, coupling: self.coupling }
     }
 }
 

@@ -1,5 +1,7 @@
 //! From the sites' motion to the field that was asked for.
 
+mod consistency;
+
 use super::covariance::{Energy, Spread, covariance};
 use super::data::{DataOptions, ERROR, MOTION};
 use super::grid::Planes;
@@ -15,6 +17,7 @@ use crate::flow::windowed::solve::ENTRIES;
 use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, Sites, Status};
+use consistency::Consistency;
 use rayon::prelude::*;
 
 /// Pixels between sites.
@@ -51,6 +54,7 @@ pub(super) fn fill<T: SimdReal>(
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
+        consistency: Consistency::of(estimate),
         covariance: field.covariance.is_some().then(|| covariance(estimate, noise(), frames.len() == 2)),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
@@ -96,6 +100,7 @@ struct Writer<'a, T: Clone> {
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
     observable: bool,
+    consistency: Consistency,
     covariance: Option<Spread<T>>,
 }
 
@@ -119,10 +124,10 @@ impl<T: SimdReal> Writer<'_, T> {
     fn close(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
         let status = self.status(pixel);
         band.status[at] = status;
-        if status != Status::Ok {
+        if !status.is_valid() {
             band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[at] = T::nan());
         }
-        self.diagnose(band, at, pixel, status == Status::Ok);
+        self.diagnose(band, at, pixel, status.is_valid());
     }
 
     /// Whether every pixel of row `y` has an estimate and nothing but that is wanted.
@@ -130,7 +135,8 @@ impl<T: SimdReal> Writer<'_, T> {
         let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none();
         // Without a short circuit, so that the compiler may use lanes.
         let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
-        bare && self.observable && self.mask.is_none() && finite()
+        let agrees = !self.consistency.has_contradiction(y / self.pitch);
+        bare && agrees && self.observable && self.mask.is_none() && finite()
     }
 
     /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
@@ -159,6 +165,8 @@ impl<T: SimdReal> Writer<'_, T> {
             Status::NonFinite
         } else if !self.observable {
             Status::Unobservable
+        } else if self.consistency.is_contradicted(x / self.pitch, y / self.pitch) {
+            Status::Inconsistent
         } else {
             Status::Ok
         }

@@ -207,7 +207,7 @@ fn regional_levels_are_power_means() {
             let at = |l: usize, k: usize| fitted.samples[l].at(k, i, j);
             (at(1, 0) - at(2, 0)).powi(2) + (at(1, 1) - at(2, 1)).powi(2)
         };
-        let want = mean(10.0, x, y, &|i, j| root(change(i, j)));
+        let want = mean(20.0, x, y, &|i, j| root(change(i, j)));
         assert!((means.at(Layout::change(1), x, y) - want).abs() < 1e-10);
         let want = mean(20.0, x, y, &|i, j| 1.0 / root(change(i, j)));
         assert!((means.at(layout.calm(1), x, y) - want).abs() < 1e-9);
