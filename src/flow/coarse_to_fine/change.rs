@@ -4,7 +4,7 @@
 //! go on as they are, as objects do, it is nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left is measured like motion itself
 //! and believed as far as noise does not explain it.
 
-use super::data::MOTION;
+use super::data::{MOTION, VALID};
 use super::descend::Plan;
 use super::grid::Planes;
 use super::levels::Compared;
@@ -30,6 +30,7 @@ pub(super) fn add_change<T: SimdReal>(
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
     add(&mut ahead, coupled, -1.0);
+    continue_beyond(data, &mut ahead);
     let steady = steady(space, motion);
     let share = share(&ahead, &steady);
     add(&mut ahead, &steady, -share);
@@ -48,6 +49,38 @@ fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     for (y, k) in (0..to.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
         to.line_mut(k, y).iter_mut().zip(more.line(k, y)).for_each(|(to, more)| *to += factor * *more);
     }
+}
+
+/// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of two estimates is one of extrapolations.
+const WHOLE: f64 = 0.95;
+
+/// Gives the flow of the sites whose windows are not whole that of the nearest in the row whose are, and rows without such the nearest row's.
+fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
+    let is_whole = |x: usize, y: usize| data.at(VALID, x, y).to_f64() >= WHOLE;
+    let known = |y: usize| -> Vec<usize> { (0..data.width).filter(|&x| is_whole(x, y)).collect() };
+    let rows: Vec<Vec<usize>> = (0..data.height).map(known).collect();
+    let filled: Vec<usize> = (0..data.height).filter(|&y| !rows[y].is_empty()).collect();
+    for (y, known) in rows.iter().enumerate().filter(|(_, known)| !known.is_empty() && known.len() < data.width) {
+        for k in 0..2 {
+            let line = flow.line_mut(k, y);
+            for x in 0..line.len() {
+                line[x] = line[nearest(known, x)];
+            }
+        }
+    }
+    for y in (0..data.height).filter(|&y| rows[y].is_empty() && !filled.is_empty()) {
+        for k in 0..2 {
+            let from = flow.line(k, nearest(&filled, y)).to_vec();
+            flow.line_mut(k, y).copy_from_slice(&from);
+        }
+    }
+}
+
+/// The nearest of some numbers that ascend.
+fn nearest(numbers: &[usize], to: usize) -> usize {
+    let after = numbers.partition_point(|&n| n < to).min(numbers.len() - 1);
+    let (before, after) = (numbers[after.saturating_sub(1)], numbers[after]);
+    if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
 }
 
 /// Half the acceleration of a steady flow, `M (u, v) / 2`, with its derivatives by differences of neighbouring sites.
@@ -135,6 +168,22 @@ mod tests {
         for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
             assert!(got.line(k, y).iter().zip(want.line(k, y)).all(|(a, b)| (a - b).abs() < 1e-15), "{k} {y}");
         }
+    }
+
+    #[test]
+    fn what_is_not_seen_goes_on_as_what_is() {
+        let mut data = Planes::<f64>::new(20, 15, VALID + 1);
+        (1..14).for_each(|y| data.line_mut(VALID, y)[2..18].fill(1.0));
+        let mut flow = filled(|_, x, y| x + 100.0 * y);
+        data.line_mut(VALID, 5)[7..10].fill(0.0);
+        continue_beyond(&data, &mut flow);
+        let at = |x: usize, y: usize| flow.at(1, x, y);
+        assert_eq!([at(0, 0), at(19, 14), at(3, 3)], [204.0, 2634.0, 606.0]);
+        assert_eq!([at(7, 5), at(9, 5)], [1012.0, 1020.0]);
+        let nothing = Planes::<f64>::new(20, 15, VALID + 1);
+        let before = flow.clone();
+        continue_beyond(&nothing, &mut flow);
+        assert_eq!(flow.data(), before.data());
     }
 
     #[test]
