@@ -51,7 +51,9 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, ca
     let (width, height) = evidence.size();
     let noise = noise::Noise::new(evidence, &estimate.data, energy, carried);
     let change = estimate.change.as_ref();
-    let change = change.map(|evidence| noise::Noise::new(evidence, &estimate.data, energy.times(AHEAD_ENERGY), true));
+    let change = change.map(|evidence| {
+        noise::Noise::new(evidence, &estimate.data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise)
+    });
     let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);

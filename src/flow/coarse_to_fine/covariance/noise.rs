@@ -103,6 +103,11 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
+    /// With an excess that is no less than that of the `other`, from the same frames: where nearly nothing is accepted, little is seen of it.
+    pub fn no_quieter_than(self, other: &Self) -> Self {
+        Self { excess: self.excess.max(other.excess), ..self }
+    }
+
     /// What is left at a place.
     pub fn at(&self, x: usize, y: usize) -> Left {
         let energy = match self.energy {
