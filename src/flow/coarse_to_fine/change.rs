@@ -4,8 +4,8 @@
 //! go on as they are, as objects do, it is nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left is measured like motion itself
 //! and believed as far as noise does not explain it.
 
-use super::data::{MOTION, VALID};
-use super::descend::Plan;
+use super::data::{MOTION, SEEN};
+use super::descend::{Found, Plan};
 use super::grid::Planes;
 use super::levels::Compared;
 use super::locking::Locking;
@@ -25,19 +25,19 @@ pub(super) fn add_change<T: SimdReal>(
     motion: &mut Planes<T>,
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
-    let (mut ahead, scale) = plan.ahead(workspace, coupled);
-    let Workspace { pyramid, data, space, .. } = workspace;
+    let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, coupled);
+    let Workspace { pyramid, space, .. } = workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
     add(&mut ahead, coupled, -1.0);
-    continue_beyond(data, &mut ahead);
+    continue_beyond(&data, &mut ahead);
     let steady = steady(space, motion);
     let share = share(&ahead, &steady);
     add(&mut ahead, &steady, -share);
-    let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, data);
+    let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, &data);
     add(motion, &change, 1.0);
     add(motion, &steady, share);
-    for planes in [ahead, change, steady] {
+    for planes in [ahead, change, steady, data] {
         space.keep(planes);
     }
     evidence
@@ -56,7 +56,7 @@ const WHOLE: f64 = 0.95;
 
 /// Gives the flow of the sites whose windows are not whole that of the nearest in the row whose are, and rows without such the nearest row's.
 fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
-    let is_whole = |x: usize, y: usize| data.at(VALID, x, y).to_f64() >= WHOLE;
+    let is_whole = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= WHOLE;
     let known = |y: usize| -> Vec<usize> { (0..data.width).filter(|&x| is_whole(x, y)).collect() };
     let rows: Vec<Vec<usize>> = (0..data.height).map(known).collect();
     let filled: Vec<usize> = (0..data.height).filter(|&y| !rows[y].is_empty()).collect();
@@ -172,15 +172,15 @@ mod tests {
 
     #[test]
     fn what_is_not_seen_goes_on_as_what_is() {
-        let mut data = Planes::<f64>::new(20, 15, VALID + 1);
-        (1..14).for_each(|y| data.line_mut(VALID, y)[2..18].fill(1.0));
+        let mut data = Planes::<f64>::new(20, 15, SEEN + 1);
+        (1..14).for_each(|y| data.line_mut(SEEN, y)[2..18].fill(1.0));
         let mut flow = filled(|_, x, y| x + 100.0 * y);
-        data.line_mut(VALID, 5)[7..10].fill(0.0);
+        data.line_mut(SEEN, 5)[7..10].fill(0.0);
         continue_beyond(&data, &mut flow);
         let at = |x: usize, y: usize| flow.at(1, x, y);
         assert_eq!([at(0, 0), at(19, 14), at(3, 3)], [204.0, 2634.0, 606.0]);
         assert_eq!([at(7, 5), at(9, 5)], [1012.0, 1020.0]);
-        let nothing = Planes::<f64>::new(20, 15, VALID + 1);
+        let nothing = Planes::<f64>::new(20, 15, SEEN + 1);
         let before = flow.clone();
         continue_beyond(&nothing, &mut flow);
         assert_eq!(flow.data(), before.data());

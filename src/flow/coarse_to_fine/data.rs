@@ -19,12 +19,14 @@ mod dense;
 mod moments;
 mod products;
 mod scratch;
+mod summary;
 #[cfg(test)]
 mod tests;
 mod warp;
 
 #[allow(unused_imports)] // for the solver
 pub(super) use moments::{COUNT, ERROR, VALID, normal, right};
+pub(super) use summary::{ENERGY, SEEN, SUMMARY, UU, UV, VV, summary};
 
 use super::grid::Planes;
 use crate::image::Spline;

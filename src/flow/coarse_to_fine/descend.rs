@@ -1,7 +1,7 @@
 //! From level to level: the iterations.
 
 use super::couple::{CoupleScratch, Coupling, couple};
-use super::data::{DataOptions, DataTerm, MOTION};
+use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::Workspace;
@@ -26,11 +26,19 @@ pub(super) struct Plan {
     pub last: usize,
 }
 
-/// The coupled motion on the finest level, and the standard deviation of the residual there.
-pub(super) type Found<T> = (Planes<T>, Option<T>);
+/// What there is on the finest level.
+#[derive(Debug)]
+pub(super) struct Found<T> {
+    /// The coupled motion.
+    pub motion: Planes<T>,
+    /// The summary of the last data term.
+    pub data: Planes<T>,
+    /// Standard deviation of the residual.
+    pub scale: Option<T>,
+}
 
 impl Plan {
-    /// The way down from the coarsest level of the filled pyramid, where nothing is known. The last data term stays in the workspace.
+    /// The way down from the coarsest level of the filled pyramid, where nothing is known.
     pub fn all<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> Found<T> {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
@@ -64,9 +72,11 @@ impl Plan {
         mut motion: Planes<T>,
         limits: &[Limits],
     ) -> Found<T> {
-        let Workspace { pyramid, data, pool, scratch, space } = workspace;
+        let Workspace { pyramid, pool, scratch, space } = workspace;
+        let (width, height) = sites(pyramid.levels()[self.last].size);
+        let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
-        let mut step = Step { plan: self, compared, term, data, scratch, scale: None };
+        let mut step = Step { plan: self, compared, term, data: &mut data, scratch, scale: None };
         let mut old = space.planes(0, 0, MOTION);
         for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(self.last).rev() {
             if k + 1 < limits.len() {
@@ -82,7 +92,9 @@ impl Plan {
             }
         }
         space.keep(old);
-        (motion, step.scale)
+        let scale = step.scale;
+        // The data term itself is not kept: what comes next needs the memory.
+        Found { motion, data: summary(space, &data), scale }
     }
 }
 

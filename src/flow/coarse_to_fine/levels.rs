@@ -35,8 +35,8 @@ pub(super) struct PyramidLevel<T> {
     pub splines: Vec<Spline<T>>,
     /// Pixels whose neighbourhood is usable, one a frame; `None`: all.
     pub usable: Vec<Option<Mask>>,
-    /// The frames themselves, which the next level is made of.
-    frames: Vec<Frame<T>>,
+    /// One of the frames, which its next level is made of.
+    picture: Frame<T>,
 }
 
 impl<T: SimdReal> PyramidLevel<T> {
@@ -68,7 +68,7 @@ impl<T: SimdReal> Pyramid<T> {
 
     /// Samples that there is memory for, about.
     pub fn samples(&self) -> usize {
-        self.levels.iter().map(|level| 2 * level.frames.iter().map(|f| f.data().len()).sum::<usize>()).sum()
+        self.levels.iter().map(|level| (1 + level.splines.len()) * level.picture.data().len()).sum()
     }
 
     /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px. Returns which is the finest that can be
@@ -85,33 +85,29 @@ impl<T: SimdReal> Pyramid<T> {
         self.count = count(size, most);
         let last = last.min(self.count - 1);
         self.levels.resize_with(self.levels.len().max(self.count), PyramidLevel::default);
-        let mut masks: Vec<Option<Mask>> = frames.iter().map(|frame| holes(frame, range, mask)).collect();
-        for k in 0..self.count {
-            let (before, rest) = self.levels.split_at_mut(k);
-            let level = &mut rest[0];
-            level.frames.resize_with(frames.len(), Frame::default);
+        for level in &mut self.levels {
             level.splines.resize_with(frames.len(), Spline::default);
-            match before.last() {
-                None => {
-                    for ((to, from), mask) in level.frames.iter_mut().zip(frames).zip(&masks) {
-                        scale(from, range, to);
-                        if mask.is_some() {
-                            *to = fill_holes(to, mask.as_ref()).into_owned();
-                        }
+            level.usable.clear();
+        }
+        // One frame after the other, so that there is one picture of each level at a time.
+        for (n, frame) in frames.iter().enumerate() {
+            let mut mask = holes(frame, range, mask);
+            for k in 0..self.count {
+                let (before, rest) = self.levels.split_at_mut(k);
+                let level = &mut rest[0];
+                if let Some(finer) = before.last() {
+                    halve_into(simd, &finer.picture, &mut level.picture);
+                    mask = mask.as_ref().map(halve_mask);
+                } else {
+                    scale(frame, range, &mut level.picture);
+                    if mask.is_some() {
+                        level.picture = fill_holes(&level.picture, mask.as_ref()).into_owned();
                     }
                 }
-                Some(finer) => {
-                    for (to, from) in level.frames.iter_mut().zip(&finer.frames) {
-                        halve_into(simd, from, to);
-                    }
-                    masks = masks.iter().map(|mask| mask.as_ref().map(halve_mask)).collect();
-                }
-            }
-            level.size = level.frames[0].size();
-            level.usable = masks.iter().map(|mask| mask.as_ref().map(|m| usable_around(m, k > last))).collect();
-            if k >= last {
-                for (spline, frame) in level.splines.iter_mut().zip(&level.frames) {
-                    spline.refill(simd, frame);
+                level.size = level.picture.size();
+                level.usable.push(mask.as_ref().map(|mask| usable_around(mask, k > last)));
+                if k >= last {
+                    level.splines[n].refill(simd, &level.picture);
                 }
             }
         }

@@ -44,7 +44,6 @@ impl<T: SimdReal> Space<T> {
 #[derive(Debug, Default)]
 pub(super) struct Workspace<T> {
     pub pyramid: Pyramid<T>,
-    pub data: Planes<T>,
     pub pool: Pool<T>,
     pub scratch: CoupleScratch<T>,
     pub space: Space<T>,
@@ -52,7 +51,7 @@ pub(super) struct Workspace<T> {
 
 impl<T: SimdReal> Workspace<T> {
     fn bytes(&self) -> usize {
-        (self.pyramid.samples() + self.data.room() + self.space.room()) * size_of::<T>()
+        (self.pyramid.samples() + self.space.room()) * size_of::<T>()
     }
 }
 

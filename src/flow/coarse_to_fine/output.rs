@@ -3,7 +3,7 @@
 mod consistency;
 
 use super::covariance::{Energy, Spread, covariance};
-use super::data::{DataOptions, ERROR, MOTION};
+use super::data::{DataOptions, ENERGY, MOTION, UU, UV, VV};
 use super::grid::Planes;
 use super::memory::Space;
 use super::reference::at_first_frame;
@@ -85,7 +85,7 @@ fn at_full_resolution<T: SimdReal>(
 /// Whether anything at all was seen: a constant image says nothing about motion.
 fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
     let (data, least) = (&estimate.data, 1e-9 * estimate.range.contrast.powi(2));
-    (0..data.height).any(|y| data.line(0, y).iter().chain(data.line(12, y)).any(|v| v.to_f64() > least))
+    (0..data.height).any(|y| data.line(UU, y).iter().chain(data.line(VV, y)).any(|v| v.to_f64() > least))
 }
 
 /// What the sites of the field are filled from.
@@ -143,14 +143,14 @@ impl<T: SimdReal> Writer<'_, T> {
     fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
         let (x, y) = (x / self.pitch, y / self.pitch);
         if let Some(residual) = &mut band.residual {
-            let energy = self.data.at(ERROR, x, y).to_f64().max(0.0);
+            let energy = self.data.at(ENERGY, x, y).to_f64().max(0.0);
             residual[at] = T::from_f64(if known { self.per_row * energy.sqrt() } else { f64::NAN });
         }
         if let Some(rank) = &mut band.rank {
             rank[at] = if known { MOTION as u8 } else { 0 };
         }
         if let Some(condition) = &mut band.condition {
-            let [uu, uv, vv] = [0, 6, 12].map(|k| self.data.at(k, x, y).to_f64());
+            let [uu, uv, vv] = [UU, UV, VV].map(|k| self.data.at(k, x, y).to_f64());
             let (middle, radius) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
             condition[at] =
                 T::from_f64(if known { ((middle + radius) / (middle - radius).max(0.0)).sqrt() } else { f64::NAN });

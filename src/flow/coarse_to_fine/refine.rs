@@ -93,8 +93,7 @@ impl Default for Options {
 #[cfg(test)]
 pub(super) const SIGMA: usize = 6;
 
-/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the last data term: planes 0, 6, 12 the
-/// windows' means of Puu, Puv, Pvv (grey^2/px^2) and 24 that of the residual energy (grey^2).
+/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the summary of the last data term.
 ///
 /// Eight planes: the motion, [`SIGMA`], the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
 /// Bit-identical for any number of threads. With them comes what the choice of windows rested on, if there was one.

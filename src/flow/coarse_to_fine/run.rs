@@ -1,8 +1,7 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
 use super::change::add_change;
-use super::data::COUNT;
-use super::descend::Plan;
+use super::descend::{Found, Plan};
 use super::grid::Planes;
 use super::levels::Compared;
 use super::locking::Locking;
@@ -62,14 +61,12 @@ impl CoarseToFine {
 /// From the filled pyramid to the motion; `changes`: of three frames, to the next and not the mean of both steps.
 fn estimate<T: SimdReal>(plan: &Plan, changes: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
     let (simd, last) = (plan.simd, plan.last);
-    let (mut coupled, scale) = plan.all(workspace);
-    let Workspace { pyramid, data, space, .. } = &mut *workspace;
-    let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, data);
+    let Found { motion: mut coupled, data, scale } = plan.all(workspace);
+    let Workspace { pyramid, space, .. } = &mut *workspace;
+    let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, &data);
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::All), &motion, scale);
     locking.correct(simd, &mut motion);
-    let data = std::mem::take(data);
     let change = changes.then(|| {
-        workspace.data = workspace.space.planes(data.width, data.height, COUNT);
         locking.correct(simd, &mut coupled);
         add_change(plan, workspace, &coupled, &mut motion)
     });
@@ -84,7 +81,7 @@ pub(super) struct Estimate<T> {
     pub level: usize,
     /// `u, v, u_x, v_x, u_y, v_y` on every second pixel: of a pair midway in time, of a triple at the middle frame.
     pub motion: Planes<T>,
-    /// The last data term.
+    /// The summary of the last data term.
     pub data: Planes<T>,
     /// How brightness was scaled.
     pub range: Range,
@@ -100,7 +97,6 @@ impl<T: SimdReal> Estimate<T> {
     /// Gives its memory back.
     fn keep(self, workspace: &mut Workspace<T>) {
         let evidence = self.evidence.into_iter().chain(self.change).flat_map(Evidence::into_planes);
-        let data = std::mem::replace(&mut workspace.data, self.data);
-        evidence.chain([self.motion, data]).for_each(|planes| workspace.space.keep(planes));
+        evidence.chain([self.motion, self.data]).for_each(|planes| workspace.space.keep(planes));
     }
 }

@@ -12,7 +12,7 @@
 //! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to eight times the variance, slopes across it twelve times. These are
 //! the factors of white noise drawn and smoothed, as functions of the distance over the window.
 
-use super::super::data::VALID;
+use super::super::data::SEEN;
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, PITCH, SPACING};
 use crate::simd::SimdReal;
@@ -162,7 +162,7 @@ fn excess<T: SimdReal>(evidence: &Evidence<T>, data: &Planes<T>) -> f64 {
         }
         let [a, b, c] = informed(evidence.information(x, y));
         let density = evidence.energy(x, y) * (a + c) / (a * c - b * b);
-        let valid = data.at(VALID, (SPACING * x).min(data.width - 1), (SPACING * y).min(data.height - 1)).to_f64();
+        let valid = data.at(SEEN, (SPACING * x).min(data.width - 1), (SPACING * y).min(data.height - 1)).to_f64();
         if valid > 0.5 && weights > COUNTS && density > 0.0 && changes > 0.0 {
             sum += (changes / (weights * density)).ln();
             count += 1.0;

@@ -1,6 +1,6 @@
 //! Where the frames do not agree with the motion that was found.
 
-use super::super::data::ERROR;
+use super::super::data::{ENERGY, UU, VV};
 use super::super::grid::Planes;
 use super::super::run::Estimate;
 use crate::simd::SimdReal;
@@ -23,8 +23,8 @@ pub(super) struct Consistency {
 impl Consistency {
     pub fn of<T: SimdReal>(estimate: &Estimate<T>) -> Self {
         let (data, contrast) = (&estimate.data, estimate.range.contrast);
-        let information = |x: usize, y: usize| data.at(0, x, y).to_f64() + data.at(12, x, y).to_f64();
-        let energy = |x: usize, y: usize| data.at(ERROR, x, y).to_f64();
+        let information = |x: usize, y: usize| data.at(UU, x, y).to_f64() + data.at(VV, x, y).to_f64();
+        let energy = |x: usize, y: usize| data.at(ENERGY, x, y).to_f64();
         let usual = usual(data, &information, &energy).max((LEAST * contrast).powi(2));
         let contradicted = Mask::from_fn(data.width, data.height, |x, y| {
             energy(x, y) > CONTRADICTION * usual && energy(x, y) > EXPLAINED * information(x, y)

@@ -6,6 +6,7 @@ use super::Options;
 use super::field::{Beyond, Field, RIM};
 use super::fit::{FIT, pick, smooth_row};
 use super::ladder::{Ladder, MAX_OCTAVE, Taps};
+use crate::flow::coarse_to_fine::data::{ENERGY, UU, UV, VV};
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
@@ -115,7 +116,7 @@ fn collect<'a, T: SimdReal>(
     let taps = |px: f64| Taps::gaussian(px / (ladder.pitch * f64::from(1 << octave as u32)), 1.0);
     let (mut items, mut targets) = (Vec::new(), Vec::new());
     if octave == 1 {
-        items.extend([Item::Data(0), Item::Data(6), Item::Data(12), Item::Energy(24)]);
+        items.extend([Item::Data(UU), Item::Data(UV), Item::Data(VV), Item::Energy(ENERGY)]);
         targets.extend((0..=Layout::ENERGY).map(|k| (k, taps(options.noise_region))));
     }
     let place: Vec<usize> = ladder.scales.iter().map(|s| s.octave.max(1)).collect();

@@ -3,6 +3,7 @@
 mod pieces;
 
 use super::*;
+use crate::flow::coarse_to_fine::data::{ENERGY, SEEN, SUMMARY, UU, VV};
 use crate::parallel::Threads;
 use std::f64::consts::PI;
 
@@ -39,8 +40,8 @@ pub(super) fn seven() -> Options {
 
 /// A data term with the same information everywhere, whose noise density is `density`.
 pub(super) fn evidence<T: SimdReal>(width: usize, height: usize, density: f64) -> Planes<T> {
-    let mut d = Planes::new(width, height, 26);
-    for (k, value) in [(0, 100.0), (12, 100.0), (24, density * 50.0), (25, 1.0)] {
+    let mut d = Planes::new(width, height, SUMMARY);
+    for (k, value) in [(UU, 100.0), (VV, 100.0), (ENERGY, density * 50.0), (SEEN, 1.0)] {
         for y in 0..height {
             d.line_mut(k, y).fill(T::from_f64(value));
         }

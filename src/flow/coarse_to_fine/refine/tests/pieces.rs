@@ -171,7 +171,7 @@ fn regional_levels_are_power_means() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let data = {
         let mut data = evidence::<f64>(WIDTH, HEIGHT, 1.0);
-        (0..HEIGHT).for_each(|y| (0..WIDTH).for_each(|x| data.line_mut(24, y)[x] = 1.0 + (x * y % 7) as f64));
+        (0..HEIGHT).for_each(|y| (0..WIDTH).for_each(|x| data.line_mut(ENERGY, y)[x] = 1.0 + (x * y % 7) as f64));
         data
     };
     let (ladder, grids) = finest(&motion);
@@ -201,7 +201,7 @@ fn regional_levels_are_power_means() {
     let root = |v: f64| (v + 1e-12).powf(0.25);
     let layout = Layout::new(&seven());
     for (x, y) in [(0, 0), (4, 3), (9, 6)] {
-        let want = mean(8.0, x, y, &|i, j| root(data.at(24, 2 * i, 2 * j)));
+        let want = mean(8.0, x, y, &|i, j| root(data.at(ENERGY, 2 * i, 2 * j)));
         assert!((means.at(Layout::ENERGY, x, y) - want).abs() < 1e-10);
         let change = |i: usize, j: usize| {
             let at = |l: usize, k: usize| fitted.samples[l].at(k, i, j);
