@@ -253,9 +253,11 @@ fn estimates_are_fused_over_time_on_request() {
     let read = |name: &str| read_npz::<f64>(place.path(name)).unwrap().field;
     assert_eq!(read("plain/000001.npz").motion[65], read("fused/000001.npz").motion[65]);
     let (plain, fused) = (read("plain/000007.npz"), read("fused/000007.npz"));
-    let middle = 5 * 12 + 6;
-    let deviation = |field: &jacoflow::types::FlowField<f64>| field.standard_deviation("u").unwrap()[middle];
-    assert!(deviation(&fused) < 0.8 * deviation(&plain), "{} {}", deviation(&fused), deviation(&plain));
+    let deviation = |field: &jacoflow::types::FlowField<f64>| {
+        let deviations = field.standard_deviation("u").unwrap();
+        deviations.iter().sum::<f64>() / deviations.len() as f64
+    };
+    assert!(deviation(&fused) < 0.9 * deviation(&plain), "{} {}", deviation(&fused), deviation(&plain));
     let rows = |more: &str| {
         let ended = place.good(&format!("measure s.npy --quantity curl --region 12,12,16,16 {more}"));
         ended.out.lines().last().unwrap().split(',').nth(6).unwrap().parse::<f64>().unwrap()

@@ -54,25 +54,30 @@ fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
 /// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of two estimates is one of extrapolations.
 const WHOLE: f64 = 0.95;
 
-/// Gives the flow of the sites whose windows are not whole that of the nearest in the row whose are, and rows without such the nearest row's.
+/// Gives the sites whose windows are not whole the flow of the nearest in their row and in their column whose are, by their nearness; in corners without such that of the
+/// nearest in the nearest row.
 fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
+    let (width, height) = (data.width, data.height);
     let is_whole = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= WHOLE;
-    let known = |y: usize| -> Vec<usize> { (0..data.width).filter(|&x| is_whole(x, y)).collect() };
-    let rows: Vec<Vec<usize>> = (0..data.height).map(known).collect();
-    let filled: Vec<usize> = (0..data.height).filter(|&y| !rows[y].is_empty()).collect();
-    for (y, known) in rows.iter().enumerate().filter(|(_, known)| !known.is_empty() && known.len() < data.width) {
-        for k in 0..2 {
-            let line = flow.line_mut(k, y);
-            for x in 0..line.len() {
-                line[x] = line[nearest(known, x)];
-            }
-        }
+    let rows: Vec<Vec<usize>> = (0..height).map(|y| (0..width).filter(|&x| is_whole(x, y)).collect()).collect();
+    let columns: Vec<Vec<usize>> = (0..width).map(|x| (0..height).filter(|&y| is_whole(x, y)).collect()).collect();
+    let filled: Vec<usize> = (0..height).filter(|&y| !rows[y].is_empty()).collect();
+    if filled.is_empty() {
+        return;
     }
-    for y in (0..data.height).filter(|&y| rows[y].is_empty() && !filled.is_empty()) {
-        for k in 0..2 {
-            let from = flow.line(k, nearest(&filled, y)).to_vec();
-            flow.line_mut(k, y).copy_from_slice(&from);
+    let known = flow.clone();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| !is_whole(x, y)) {
+        let beside = (!rows[y].is_empty()).then(|| (nearest(&rows[y], x), y));
+        let above = (!columns[x].is_empty()).then(|| (x, nearest(&columns[x], y)));
+        let row = nearest(&filled, y);
+        let aslant = (beside.is_none() && above.is_none()).then(|| (nearest(&rows[row], x), row));
+        let (mut sum, mut weights) = ([0.0; 2], 0.0);
+        for (i, j) in [beside, above, aslant].into_iter().flatten() {
+            let weight = 1.0 / (x.abs_diff(i) + y.abs_diff(j)).max(1) as f64;
+            weights += weight;
+            (0..2).for_each(|k| sum[k] += weight * known.at(k, i, j).to_f64());
         }
+        (0..2).for_each(|k| flow.line_mut(k, y)[x] = T::from_f64(sum[k] / weights));
     }
 }
 
@@ -179,7 +184,8 @@ mod tests {
         continue_beyond(&data, &mut flow);
         let at = |x: usize, y: usize| flow.at(1, x, y);
         assert_eq!([at(0, 0), at(19, 14), at(3, 3)], [204.0, 2634.0, 606.0]);
-        assert_eq!([at(7, 5), at(9, 5)], [1012.0, 1020.0]);
+        // From (6, 5) and (7, 6).
+        assert_eq!(at(7, 5), 0.5 * (1012.0 + 1214.0));
         let nothing = Planes::<f64>::new(20, 15, SEEN + 1);
         let before = flow.clone();
         continue_beyond(&nothing, &mut flow);

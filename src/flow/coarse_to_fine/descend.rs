@@ -50,16 +50,17 @@ impl Plan {
         self.descend(workspace, Compared::All, motion, &limits)
     }
 
-    /// The same for the step to the next frame alone, from one level above the finest down, where it is no other than `motion`.
+    /// The same for the step to the next frame alone, from two levels above the finest down, where it is no other than `motion`.
     pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
-        let (levels, [finest, second]) = (workspace.pyramid.levels(), self.effort.ahead);
+        let (levels, [finest, others @ ..]) = (workspace.pyramid.levels(), self.effort.ahead);
         let mut start = workspace.space.planes(motion.width, motion.height, MOTION);
+        start.data_mut().copy_from_slice(motion.data());
         let mut limits = vec![self.effort.up_to(finest); self.last + 1];
-        if let Some(level) = levels.get(self.last + 1) {
-            limits.push(self.effort.up_to(second));
-            coarser(motion, sites(level.size), &mut start);
-        } else {
-            start.data_mut().copy_from_slice(motion.data());
+        for (level, most) in levels[self.last + 1..].iter().zip(others) {
+            limits.push(self.effort.up_to(most));
+            let mut next = workspace.space.planes(0, 0, MOTION);
+            coarser(&start, sites(level.size), &mut next);
+            workspace.space.keep(std::mem::replace(&mut start, next));
         }
         self.descend(workspace, Compared::Ahead, start, &limits)
     }

@@ -46,21 +46,21 @@ impl Preset {
             Self::Fast => Effort {
                 last: 1,
                 iterations: [3, 4, 4],
-                ahead: [2, 2],
+                ahead: [2, 3, 4],
                 settled: 0.02,
                 coupling: Coupling { sweeps: 4, ..coupling },
             },
             Self::Balanced => Effort {
                 last: 0,
                 iterations: [3, 5, 5],
-                ahead: [2, 2],
+                ahead: [2, 3, 4],
                 settled: 0.013,
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
             },
             Self::Accurate => Effort {
                 last: 0,
                 iterations: [4, 6, 6],
-                ahead: [3, 3],
+                ahead: [3, 4, 5],
                 settled: 0.003,
                 coupling: Coupling { break_at: 0.2, ..coupling },
             },
@@ -75,8 +75,8 @@ pub(super) struct Effort {
     pub last: usize,
     /// Most iterations on that level, the next and every coarser one.
     pub iterations: [usize; 3],
-    /// The same for what a triple's next frame alone says, which begins on the second of these levels.
-    pub ahead: [usize; 2],
+    /// The same for what a triple's next frame alone says, which begins on the third of these levels.
+    pub ahead: [usize; 3],
     /// A level is done when an iteration has changed the flow by no more than this, px of the level (root mean square).
     pub settled: f64,
     /// After each iteration.

@@ -11,6 +11,27 @@ const MOST_SAMPLES: usize = 20_000;
 /// Scaled brightness beyond which a sample is no brightness but a mark for missing data.
 const NO_DATA: f64 = 1e6;
 
+/// Least deviation over what nearly all samples range over: a tenth of that of an even distribution.
+const SPOTS: f64 = 0.03;
+/// Shares of the samples that are left out at either end of that range.
+const ENDS: usize = 200;
+/// Deviation over mean that is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// What all but a few of the sorted `values` range over. Marks for missing data, which are the most extreme value and many times the same, are no values.
+fn nearly_all(values: &[f64]) -> f64 {
+    let (low, high) = (values[0], values[values.len() - 1]);
+    let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };
+    let end = if values.len() > 1 && values[values.len() - 2] == high {
+        values.partition_point(|v| *v < high)
+    } else {
+        values.len()
+    };
+    let inner = values.get(start..end).unwrap_or_default();
+    let cut = inner.len() / ENDS;
+    if inner.is_empty() { 0.0 } else { inner[inner.len() - 1 - cut] - inner[cut] }
+}
+
 /// How brightness is brought to a common range: `(brightness - mean) gain`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Range {
@@ -22,13 +43,16 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// That of the first frame's finite samples that may be used: of the middle nine tenths of them, since a single no-data value may be as large as 1e9.
-    pub fn of<T: SimdReal>(frame: &Frame<T>, mask: Option<&Mask>) -> Self {
-        let every = (frame.data().len() / MOST_SAMPLES).max(1);
+    /// That of the frames' finite samples that may be used: of the middle nine tenths of them, since a single no-data value may be as large as 1e9; but no less than a share
+    /// of what nearly all of them range over, since pictures may be dark but for a few spots.
+    pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
         let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
-        let places = (0..frame.data().len()).step_by(every).filter(|&at| allowed(at));
-        let mut values: Vec<f64> = places.map(|at| frame.data()[at].to_f64()).collect();
-        values.retain(|value| value.is_finite());
+        let mut values: Vec<f64> = Vec::new();
+        for frame in frames {
+            let every = (frames.len() * frame.data().len() / MOST_SAMPLES).max(1);
+            let places = (0..frame.data().len()).step_by(every).filter(|&at| allowed(at));
+            values.extend(places.map(|at| frame.data()[at].to_f64()).filter(|value| value.is_finite()));
+        }
         if values.is_empty() {
             return Self { mean: 0.0, gain: 1.0, contrast: 0.0 };
         }
@@ -39,8 +63,10 @@ impl Range {
         let deviation = |values: &[f64]| {
             (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
         };
-        // A picture that is dark but for a few spots has nothing in the middle.
-        let deviation = Some(deviation(middle)).filter(|&d| d > 0.0).unwrap_or_else(|| deviation(&values));
+        let usual = deviation(middle).max(SPOTS * nearly_all(&values));
+        // A picture with next to nothing in it has nothing else. Rounding is no contrast.
+        let deviation = Some(usual).filter(|&d| d > 0.0).unwrap_or_else(|| deviation(&values));
+        let deviation = if deviation > ROUNDING * mean.abs() { deviation } else { 0.0 };
         let gain = (CONTRAST / deviation).log2().round().exp2();
         let gain = if gain.is_finite() && gain > 0.0 { gain } else { 1.0 };
         Self { mean, gain, contrast: gain * deviation }

@@ -43,7 +43,7 @@ impl CoarseToFine {
     pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
         common.threads.install(|| {
             let simd = common.level();
-            let range = Range::of(frames[0], common.mask.as_ref());
+            let range = Range::of(frames, common.mask.as_ref());
             let mut workspace = self.memory.take::<T>();
             let effort = self.options.preset.effort();
             let levels = (self.options.levels, effort.last);

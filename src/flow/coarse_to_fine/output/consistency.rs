@@ -1,6 +1,6 @@
 //! Where the frames do not agree with the motion that was found.
 
-use super::super::data::{ENERGY, UU, VV};
+use super::super::data::{DataOptions, ENERGY, UU, VV};
 use super::super::grid::Planes;
 use super::super::run::Estimate;
 use crate::simd::SimdReal;
@@ -12,6 +12,10 @@ const CONTRADICTION: f64 = 10.0;
 const EXPLAINED: f64 = 0.003;
 /// Share of the brightness' standard deviation that is never a residual.
 const LEAST: f64 = 4e-3;
+
+/// Residual energy over information, px^2, beyond which frames have nothing to do with each other, however usual that is; and the share of the brightness' standard deviation
+/// that the residual then has at least, so that noise where there is no texture is no contradiction.
+const UNRELATED: (f64, f64) = (0.5, 0.15);
 
 /// The sites of the data whose residual, along the motion, stands out: what is seen in one frame is hidden in the other or has changed, or its motion was missed.
 #[derive(Debug)]
@@ -26,8 +30,12 @@ impl Consistency {
         let information = |x: usize, y: usize| data.at(UU, x, y).to_f64() + data.at(VV, x, y).to_f64();
         let energy = |x: usize, y: usize| data.at(ENERGY, x, y).to_f64();
         let usual = usual(data, &information, &energy).max((LEAST * contrast).powi(2));
+        let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
+        let least = rows * (UNRELATED.1 * contrast).powi(2);
         let contradicted = Mask::from_fn(data.width, data.height, |x, y| {
-            energy(x, y) > CONTRADICTION * usual && energy(x, y) > EXPLAINED * information(x, y)
+            let (energy, information) = (energy(x, y), information(x, y));
+            let stands_out = energy > CONTRADICTION * usual && energy > EXPLAINED * information;
+            stands_out || (energy > UNRELATED.0 * information && energy > least)
         });
         let rows = (0..data.height).map(|y| contradicted.row(y).contains(&true)).collect();
         Self { contradicted, rows }
