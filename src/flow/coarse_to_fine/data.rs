@@ -26,7 +26,9 @@ mod warp;
 
 #[allow(unused_imports)] // for the solver
 pub(super) use moments::{COUNT, ERROR, VALID, normal, right};
-pub(super) use summary::{ENERGY, SEEN, SUMMARY, UU, UV, VV, summary};
+#[cfg(test)]
+pub(super) use summary::SUMMARY;
+pub(super) use summary::{ENERGY, SEEN, UU, UV, VV, summary};
 
 use super::grid::Planes;
 use crate::image::Spline;
