@@ -41,8 +41,10 @@ pub(super) const PITCH: f64 = 2.0;
 pub(super) struct Options {
     /// Windows, growing; at least one.
     pub ladder: &'static [f64],
-    /// Change, over what noise explains, that the plain fits accept.
+    /// Change, over what noise explains, that the plain fits accept for the flow.
     pub kappa: f64,
+    /// The same for their slopes: the noise of slopes falls with the fourth power of the window, their bias grows no faster than the flow's.
+    pub kappa_slopes: f64,
     /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,
     /// The same for the change from the widest plain fit to nothing.
@@ -67,22 +69,23 @@ impl Options {
     /// For what one step of the motion differs by from another, which is small and smooth or nothing.
     pub fn for_changes() -> Self {
         let default = Self::default();
-        Self { kappa: 2.0 * default.kappa, kappa_edge: 2.0 * default.kappa_edge, may_vanish: true, ..default }
+        Self { kappa: 2.0 * default.kappa, kappa_slopes: 2.0 * default.kappa_slopes, kappa_edge: 2.0 * default.kappa_edge, may_vanish: true, ..default }
     }
 }
 
 impl Default for Options {
     fn default() -> Self {
         Self {
-            ladder: &[1.25, 1.9, 2.8, 4.2, 6.3, 9.5, 14.0, 21.0],
-            kappa: 10.0,
-            kappa_edge: 6.0,
+            ladder: match { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_W", 0.0)) } as i32 { 3 => &[0.8], 10 => &[10.5], 5 => &[4.8], 7 => &[7.0], 1 => &[1.6, 2.45, 3.6, 5.5, 8.2, 12.3, 18.5, 27.5], 2 => &[1.5, 2.2, 3.3, 4.8, 7.0, 10.5, 16.0, 24.0], _ => &[1.25, 1.9, 2.8, 4.2, 6.3, 9.5, 14.0, 21.0] },
+            kappa: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_K", 10.0)) },
+            kappa_slopes: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_KS", 10.0)) },
+            kappa_edge: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_KE", 6.0)) },
             kappa_nothing: 16.0,
-            region: 20.0,
-            calm_region: 20.0,
+            region: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_R", 20.0)) },
+            calm_region: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_R", 20.0)) },
             misfit_region: 14.0,
             noise_region: 8.0,
-            gate: 2.5,
+            gate: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| ev("JF_G", 2.5)) },
             step_gate: 6.0,
             may_vanish: false,
         }
@@ -226,3 +229,5 @@ fn mean_motion<T: SimdReal>(motion: &Planes<T>) -> [f64; 6] {
 
 #[cfg(test)]
 mod tests;
+
+pub(super) fn ev(n: &str, d: f64) -> f64 { std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }

@@ -99,16 +99,19 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>) -> V
         let windows = evidence.sigmas.iter().enumerate();
         let windows: Vec<usize> =
             windows.filter(|(_, s)| **s >= NARROWEST && suits(**s) == n).map(|(l, _)| l).collect();
-        let weight = |&(x, y): &(usize, usize)| windows.iter().map(|l| evidence.weight(*l, x, y)).sum::<f64>();
-        let weights: Vec<f64> = places.iter().map(weight).collect();
-        if weights.iter().all(|w| *w < 0.01) {
+        let weight = |&(x, y): &(usize, usize)| {
+            let all = windows.iter().map(|l| evidence.weights(*l, x, y));
+            all.fold([0.0; 2], |sum, [flow, slopes]| [sum[0] + flow, sum[1] + slopes])
+        };
+        let weights: Vec<[f64; 2]> = places.iter().map(weight).collect();
+        if weights.iter().flatten().all(|w| *w < 0.01) {
             continue;
         }
         let sigma = wide / (PITCH * SPACING as f64);
         let [once, twice] = [sigma, sigma * SQRT_2].map(|s| smoothed(&whole, (width, height), s));
         for (at, (lost, weight)) in lost.iter_mut().zip(weights).enumerate() {
             for k in 0..MOTION {
-                lost[k] += weight * (whole[at][k] - 2.0 * once[at][k] + twice[at][k]);
+                lost[k] += weight[usize::from(k >= 2)] * (whole[at][k] - 2.0 * once[at][k] + twice[at][k]);
             }
         }
     }

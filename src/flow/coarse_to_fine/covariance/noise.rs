@@ -49,6 +49,10 @@ impl Energy {
     }
 }
 
+/// `integral H^2` and `integral w_x^2 H^2`, over those of the Gaussian alone.
+const FLOW: f64 = 73.0 / 30.0;
+const SLOPE: f64 = 3511.0 / 900.0;
+
 /// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
 pub(super) struct Left {
     pub density: [f64; 3],
@@ -108,7 +112,11 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
-    /// What is left at a place.
+    /// `integral H^2` and `integral w_x^2 H^2`, over those of the Gaussian alone.
+const FLOW: f64 = 73.0 / 30.0;
+const SLOPE: f64 = 3511.0 / 900.0;
+
+/// What is left at a place.
     pub fn at(&self, x: usize, y: usize) -> Left {
         let energy = match self.energy {
             Energy::Known(energy) => energy,
@@ -117,15 +125,17 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         let inverse = inverse_without_noise(informed(self.evidence.information(x, y)), self.gradient * energy);
         let scale = self.excess * energy;
         let widest = self.evidence.sigmas.len() - 1;
-        let nothing = UNSEEN * (1.0 - (0..=widest).map(|l| self.evidence.weight(l, x, y)).sum::<f64>()).max(0.0);
+        let windows = 0..=widest;
+        let weights: Vec<[f64; 2]> = windows.map(|l| self.evidence.weights(l, x, y)).collect();
+        let nothing = [0, 1].map(|k| UNSEEN * (1.0 - weights.iter().map(|w| w[k]).sum::<f64>()).max(0.0));
         let mut left = Left { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
-            let weight = self.evidence.weight(l, x, y) + if l == widest { nothing } else { 0.0 };
-            let (flow, slope) = (11.0 / 6.0 / (4.0 * PI * sigma.powi(2)), 89.0 / 36.0 / (8.0 * PI * sigma.powi(4)));
+            let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
+            let (flow, slope) = (FLOW / (4.0 * PI * sigma.powi(2)), SLOPE / (8.0 * PI * sigma.powi(4)));
             let ([mean_x, across_x], [mean_y, across_y]) = (self.columns.factors[l][x], self.rows.factors[l][y]);
-            left.flow += weight * flow * mean_x * mean_y;
-            left.slopes[0] += weight * slope * across_x * mean_y;
-            left.slopes[1] += weight * slope * mean_x * across_y;
+            left.flow += weight[0] * flow * mean_x * mean_y;
+            left.slopes[0] += weight[1] * slope * across_x * mean_y;
+            left.slopes[1] += weight[1] * slope * mean_x * across_y;
         }
         left
     }
@@ -156,7 +166,7 @@ fn excess<T: SimdReal>(evidence: &Evidence<T>, data: &Planes<T>) -> f64 {
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let (mut weights, mut changes) = (0.0, 0.0);
         for l in 1..evidence.sigmas.len() {
-            let weight = evidence.weight(l, x, y);
+            let [weight, _] = evidence.weights(l, x, y);
             weights += weight;
             changes += weight * evidence.change(l - 1, x, y);
         }

@@ -4,7 +4,7 @@
 //! explains.
 
 use super::Options;
-use super::ladder::{Ladder, difference_variance};
+use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
 use super::region::Layout;
 use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
 use crate::flow::coarse_to_fine::memory::Space;
@@ -18,31 +18,72 @@ const QUIET: f64 = 1e-9;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
 const FLAT: f64 = 1e-6;
 
-/// Planes of the choice, for `windows` windows: weights (of sum 1, or less where the field vanishes) of the plain fits, of the edge fits, of the misfits; then the noise density and the mean sigma of
-/// either kind, px.
-pub(super) struct Choice<T> {
-    pub planes: Planes<T>,
+/// What windows are chosen for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    /// The flow of the plain fits.
+    Flow,
+    /// Their slopes.
+    Slopes,
+    /// The edge fits.
+    Edges,
+}
+
+impl Use {
+    const ALL: [Self; 3] = [Self::Flow, Self::Slopes, Self::Edges];
+
+    /// Change, over what noise explains, that is accepted.
+    fn kappa(self, options: &Options) -> f64 {
+        match self {
+            Self::Flow => options.kappa,
+            Self::Slopes => options.kappa_slopes,
+            Self::Edges => options.kappa_edge,
+        }
+    }
+}
+
+/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on coarser grids, for each grid, and the mean sigma, px; then the misfits times weights, and the noise density.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Order {
     pub windows: usize,
 }
 
-impl<T: SimdReal> Choice<T> {
-    pub fn edge(&self, l: usize) -> usize {
-        self.windows + l
+impl Order {
+    pub fn weight(self, of: Use, l: usize) -> usize {
+        of as usize * self.each() + l
     }
-    pub fn misfit(&self, l: usize) -> usize {
-        2 * self.windows + l
+    pub fn coarser(self, of: Use, octave: usize) -> usize {
+        self.weight(of, self.windows + octave)
     }
-    pub fn density(&self) -> usize {
-        3 * self.windows
+    pub fn sigma(self, of: Use) -> usize {
+        self.weight(of, self.windows + MAX_OCTAVE)
     }
-    pub fn sigma(&self, edge: bool) -> usize {
-        3 * self.windows + 1 + usize::from(edge)
+    pub fn misfit(self, l: usize) -> usize {
+        Use::ALL.len() * self.each() + l
     }
+    /// Planes of each use.
+    fn each(self) -> usize {
+        self.windows + MAX_OCTAVE + 1
+    }
+    pub fn density(self) -> usize {
+        self.misfit(self.windows)
+    }
+    fn count(self) -> usize {
+        self.density() + 1
+    }
+}
 
+/// Weights of the windows, of sum 1 (less where the field vanishes), and what came with them.
+pub(super) struct Choice<T> {
+    pub planes: Planes<T>,
+    pub order: Order,
+}
+
+impl<T: SimdReal> Choice<T> {
     /// Whether any site uses the edge fits of window `l`.
     pub fn wants_edges(&self, l: usize) -> bool {
-        let zero = T::from_f64(0.0);
-        (0..self.planes.height).any(|y| self.planes.line(self.edge(l), y).iter().any(|w| *w > zero))
+        let (zero, plane) = (T::from_f64(0.0), self.order.weight(Use::Edges, l));
+        (0..self.planes.height).any(|y| self.planes.line(plane, y).iter().any(|w| *w > zero))
     }
 }
 
@@ -54,25 +95,38 @@ pub(super) fn choose<T: SimdReal>(
     ladder: &Ladder<T>,
     means: &Planes<T>,
 ) -> Choice<T> {
-    let windows = ladder.scales.len();
+    let order = Order { windows: ladder.scales.len() };
     let sigmas: Vec<f64> = ladder.scales.iter().map(|s| s.sigma).collect();
     let wider = sigmas.iter().skip(1).copied().chain(options.may_vanish.then_some(f64::INFINITY));
     let noise: Vec<f64> = sigmas.iter().zip(wider).map(|(&s, wider)| difference_variance(s, wider)).collect();
-    let mut planes = space.planes(means.width, means.height, 3 * windows + 3);
+    let mut planes = space.planes(means.width, means.height, order.count());
     let len = planes.row_len();
+    let octaves = ladder.scales.iter().map(|s| s.octave).collect();
+    let climb = Climb { means, options, sigmas, octaves, noise, order };
     for_each_band(planes.data_mut(), len, |_, rows, out| {
         for (y, out) in rows.zip(out.chunks_exact_mut(len)) {
-            dispatch(simd, Weights { means, options, sigmas: &sigmas, noise: &noise, y, out });
+            dispatch(simd, Weights { climb: &climb, y, out });
         }
     });
-    Choice { planes, windows }
+    Choice { planes, order }
 }
 
-struct Weights<'a, T> {
+/// The climb from narrow windows to wide ones.
+struct Climb<'a, T> {
     means: &'a Planes<T>,
     options: &'a Options,
-    sigmas: &'a [f64],
-    noise: &'a [f64],
+    /// Standard deviations of the windows, px.
+    sigmas: Vec<f64>,
+    /// The grids they are computed on.
+    octaves: Vec<usize>,
+    /// Variance of the step from each to the next, for noise of unit density.
+    noise: Vec<f64>,
+    order: Order,
+}
+
+/// Weights along a row.
+struct Weights<'a, T> {
+    climb: &'a Climb<'a, T>,
     y: usize,
     out: &'a mut [T],
 }
@@ -81,54 +135,69 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { means, options, sigmas, noise, y, out } = self;
-        let (row, stride, windows) = (means.row(y), means.stride(), sigmas.len());
-        let layout = Layout::new(options);
+        let Self { climb, y, out } = self;
+        let (means, order, stride) = (climb.means, climb.order, climb.means.stride());
+        let layout = Layout::new(climb.options);
         for x in (0..means.padded()).step_by(V::LANES) {
-            let means = &row[LEFT + x..];
+            let means = &means.row(y)[LEFT + x..];
             let out = &mut out[LEFT + x..];
             let density = density::<V>(means, stride);
-            let mut sum = [V::zero(); 2];
-            for (kind, sum) in sum.iter_mut().enumerate() {
-                let kappa = if kind == 0 { options.kappa } else { options.kappa_edge };
-                let (mut accepted, mut sigma) = (V::constant(1.0), V::zero());
-                for l in 0..windows {
-                    let mut next = V::zero();
-                    if l < layout.steps {
-                        let change = if kind == 0 {
-                            power4(V::load(&means[Layout::change(l) * stride..]))
-                        } else {
-                            V::constant(1.0) / power4(V::load(&means[layout.calm(l) * stride..]))
-                        };
-                        let kappa = if l + 1 < windows { kappa } else { options.kappa_nothing };
-                        let ratio = change / (density * V::constant(noise[l] * kappa));
-                        next = accepted / (V::constant(1.0) + power4(ratio));
-                    }
-                    let weight = (accepted - next - V::constant(NONE)).max(V::zero());
-                    accepted = next;
-                    sigma = weight.mul_add(V::constant(sigmas[l]), sigma);
-                    *sum = *sum + weight;
-                    weight.store(&mut out[(kind * windows + l) * stride..]);
-                }
-                // What goes on beyond the widest window is nothing at all.
-                *sum = *sum + accepted;
-                (sigma / *sum).store(&mut out[(3 * windows + 1 + kind) * stride..]);
+            density.store(&mut out[order.density() * stride..]);
+            for of in Use::ALL {
+                climb.weights::<V>(of, density, means, out);
             }
-            density.store(&mut out[3 * windows * stride..]);
-            for l in 0..windows {
-                let weight = &mut out[l * stride..];
-                let plain = V::load(weight) / sum[0];
-                plain.store(weight);
-                let weight = &mut out[(windows + l) * stride..];
-                (V::load(weight) / sum[1]).store(weight);
-                let misfit = plain * power4(V::load(&means[layout.misfit(l) * stride..]));
-                misfit.store(&mut out[(2 * windows + l) * stride..]);
+            for l in 0..order.windows {
+                let weight = V::load(&out[order.weight(Use::Flow, l) * stride..]);
+                let misfit = weight * power4(V::load(&means[layout.misfit(l) * stride..]));
+                misfit.store(&mut out[order.misfit(l) * stride..]);
             }
         }
         // The last site goes on, for those finer ones that lie beyond it.
         for line in out.chunks_exact_mut(stride) {
             let end = LEFT + means.width;
             line[end] = line[end - 1];
+        }
+    }
+}
+
+impl<T: SimdReal> Climb<'_, T> {
+    /// The weights of one use at some sites.
+    #[inline(always)]
+    fn weights<V: Lanes<Scalar = T>>(&self, of: Use, density: V, means: &[T], out: &mut [T]) {
+        let (stride, windows) = (self.means.stride(), self.order.windows);
+        let layout = Layout::new(self.options);
+        let (mut accepted, mut sigma, mut sum) = (V::constant(1.0), V::zero(), V::zero());
+        for l in 0..windows {
+            let mut next = V::zero();
+            if l < layout.steps {
+                let change = match of {
+                    Use::Edges => V::constant(1.0) / power4(V::load(&means[layout.calm(l) * stride..])),
+                    Use::Flow | Use::Slopes => power4(V::load(&means[Layout::change(l) * stride..])),
+                };
+                let kappa = if l + 1 < windows { of.kappa(self.options) } else { self.options.kappa_nothing };
+                let ratio = change / (density * V::constant(self.noise[l] * kappa));
+                next = accepted / (V::constant(1.0) + power4(ratio));
+            }
+            let weight = (accepted - next - V::constant(NONE)).max(V::zero());
+            accepted = next;
+            sigma = weight.mul_add(V::constant(self.sigmas[l]), sigma);
+            sum = sum + weight;
+            weight.store(&mut out[self.order.weight(of, l) * stride..]);
+        }
+        // What goes on beyond the widest window is nothing at all.
+        let whole = V::constant(1.0) / (sum + accepted);
+        (sigma * whole).store(&mut out[self.order.sigma(of) * stride..]);
+        let mut coarser = [V::zero(); MAX_OCTAVE];
+        for l in 0..windows {
+            let line = &mut out[self.order.weight(of, l) * stride..];
+            let weight = V::load(line) * whole;
+            weight.store(line);
+            for sum in &mut coarser[..self.octaves[l]] {
+                *sum = *sum + weight;
+            }
+        }
+        for (octave, sum) in coarser.into_iter().enumerate() {
+            sum.store(&mut out[self.order.coarser(of, octave) * stride..]);
         }
     }
 }

@@ -21,9 +21,9 @@ const WIDER: usize = 2;
 
 /// The windows whose edge fits are used at any site.
 pub(super) fn wanted<T: SimdReal>(choice: &Choice<T>) -> Vec<usize> {
-    let flow: Vec<bool> = (0..choice.windows).map(|l| choice.wants_edges(l)).collect();
-    let slopes = |l: usize| (l >= WIDER && flow[l - WIDER]) || (l + 1 == choice.windows && flow.contains(&true));
-    (0..choice.windows).filter(|&l| flow[l] || slopes(l)).collect()
+    let flow: Vec<bool> = (0..choice.order.windows).map(|l| choice.wants_edges(l)).collect();
+    let slopes = |l: usize| (l >= WIDER && flow[l - WIDER]) || (l + 1 == choice.order.windows && flow.contains(&true));
+    (0..choice.order.windows).filter(|&l| flow[l] || slopes(l)).collect()
 }
 
 /// One of the windows around a site.

@@ -1,6 +1,6 @@
 //! What the choice of windows rested on, kept for the covariance.
 
-use super::choose::Choice;
+use super::choose::{Choice, Order, Use};
 use super::ladder::{MAX_OCTAVE, difference_variance};
 use super::region::Layout;
 use crate::flow::coarse_to_fine::grid::Planes;
@@ -14,13 +14,14 @@ pub(in crate::flow::coarse_to_fine) const SPACING: usize = 1 << MAX_OCTAVE;
 pub(in crate::flow::coarse_to_fine) struct Evidence<T> {
     means: Planes<T>,
     choice: Planes<T>,
+    order: Order,
     /// Standard deviations of the windows, px.
     pub sigmas: &'static [f64],
 }
 
 impl<T: SimdReal> Evidence<T> {
     pub(super) fn new(means: Planes<T>, choice: Choice<T>, sigmas: &'static [f64]) -> Self {
-        Self { means, choice: choice.planes, sigmas }
+        Self { means, choice: choice.planes, order: choice.order, sigmas }
     }
 
     /// The memory.
@@ -43,9 +44,9 @@ impl<T: SimdReal> Evidence<T> {
         self.means.at(Layout::ENERGY, x, y).to_f64().powi(4)
     }
 
-    /// Weight of the window `l`; they sum to 1.
-    pub fn weight(&self, l: usize, x: usize, y: usize) -> f64 {
-        self.choice.at(l, x, y).to_f64()
+    /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field vanishes.
+    pub fn weights(&self, l: usize, x: usize, y: usize) -> [f64; 2] {
+        [Use::Flow, Use::Slopes].map(|of| self.choice.at(self.order.weight(of, l), x, y).to_f64())
     }
 
     /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit density: a density, px^4.

@@ -1,7 +1,7 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
 use super::field::{Beyond, Field, RIM};
-use super::ladder::{Scale, Taps};
+use super::ladder::{Scale, TERMS, Taps};
 use crate::flow::coarse_to_fine::grid::LEFT;
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::flow::windowed::window::filter;
@@ -175,7 +175,7 @@ pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
 /// The twiced flow at every `step`-th site.
 struct Samples<'a, T> {
     fits: &'a Field<T>,
-    taps: &'a Taps<T>,
+    again: &'a [Taps<T>; 2],
     step: usize,
     rows: Range<usize>,
     out: &'a mut [T],
@@ -187,16 +187,20 @@ impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { fits, taps, step, rows, out, stride, width } = self;
-        let mut buffer = vec![T::from_f64(0.0); 2 * fits.stride()];
+        let Self { fits, again, step, rows, out, stride, width } = self;
+        let mut buffers = [0; 2].map(|_| vec![T::from_f64(0.0); 2 * fits.stride()]);
+        let [first, second, third] = TERMS.map(T::from_f64);
         for (y, out) in rows.zip(out.chunks_exact_mut(2 * stride)) {
             for k in 0..2 {
-                smooth_row::<V>(fits, k, step * y, taps, &mut buffer);
-                let again = &mut buffer[fits.stride()..];
-                for (a, once) in again.iter_mut().zip(&fits.line(k, (step * y) as isize)[LEFT..]) {
-                    *a = *once + *once - *a;
+                for (buffer, taps) in buffers.iter_mut().zip(again) {
+                    smooth_row::<V>(fits, k, step * y, taps, buffer);
                 }
-                pick(again, step, &mut out[k * stride + LEFT..][..width]);
+                let [twice, thrice] = buffers.each_mut().map(|b| &mut b[fits.stride()..]);
+                let once = &fits.line(k, (step * y) as isize)[LEFT..];
+                for ((a, b), once) in thrice.iter_mut().zip(&*twice).zip(once) {
+                    *a = first * *once + second * *b + third * *a;
+                }
+                pick(thrice, step, &mut out[k * stride + LEFT..][..width]);
             }
         }
     }
@@ -212,9 +216,9 @@ pub(super) fn samples<T: SimdReal>(
 ) -> Field<T> {
     let (width, height) = (fits.width.div_ceil(step), fits.height.div_ceil(step));
     let mut out = Field::make(space, width, height, 2);
-    let (len, stride, taps) = (out.row_len(), out.stride(), &scale.second);
+    let (len, stride, again) = (out.row_len(), out.stride(), &scale.again);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
-        dispatch(simd, Samples { fits, taps, step, rows, out, stride, width });
+        dispatch(simd, Samples { fits, again, step, rows, out, stride, width });
     });
     out
 }

@@ -7,10 +7,15 @@ use std::f64::consts::PI;
 
 /// Each coarser grid takes every second site.
 pub(super) const MAX_OCTAVE: usize = 2;
+/// Steps towards a variance: enough for single precision's last bits.
+const VARIANCE_STEPS: usize = 12;
 /// The widest window of a grid, sites: beyond it, the next grid is fine enough.
 const WIDEST: f64 = 2.9;
 /// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a thousand times.
 const BEFORE_HALVING: f64 = 1.5;
+
+/// A window is smoothed once, twice and three times, `3 G - 3 G^2 + G^3 = 1 - (1 - G)^3`.
+pub(super) const TERMS: [f64; 3] = [3.0, -3.0, 1.0];
 
 /// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a weighted straight line.
 #[derive(Debug, Clone)]
@@ -24,21 +29,45 @@ pub(super) struct Taps<T> {
 impl<T: SimdReal> Taps<T> {
     /// A Gaussian of `sigma` sites, `pitch` px apart, cut off at 3 sigma and at the rim.
     pub fn gaussian(sigma: f64, pitch: f64) -> Self {
+        Self::cut_off(sigma, ((3.0 * sigma + 0.5) as usize).clamp(1, RIM), pitch)
+    }
+
+    /// A Gaussian that has this variance, px^2, after it was cut off.
+    fn of_variance(variance: f64, pitch: f64) -> Self {
+        let mut sigma = variance.sqrt() / pitch;
         let radius = ((3.0 * sigma + 0.5) as usize).clamp(1, RIM);
+        // The variance grows with that of the Gaussian, and nearly as fast.
+        for _ in 0..VARIANCE_STEPS {
+            sigma *= (variance / Self::cut_off(sigma, radius, pitch).variance).sqrt();
+        }
+        Self::cut_off(sigma, radius, pitch)
+    }
+
+    fn cut_off(sigma: f64, radius: usize, pitch: f64) -> Self {
         let g = weights(sigma, radius);
-        let second = 2.0 * g.iter().enumerate().map(|(k, g)| (k * k) as f64 * g).sum::<f64>();
-        let taps = g
-            .iter()
-            .enumerate()
-            .map(|(k, &g)| [T::from_f64(g), T::from_f64(k as f64 * g / (second * pitch)), T::from_f64(0.0)])
-            .collect();
-        Self { taps, variance: second * pitch * pitch }
+        let variance = 2.0 * moment(&g, 2);
+        // Cut off, a Gaussian loses more of its fourth moment than of its second: one that is somewhat wider is made up for it.
+        let mut slope = sigma;
+        for _ in 0..VARIANCE_STEPS {
+            let h = weights(slope, radius);
+            slope *= (3.0 * variance * moment(&h, 2) / moment(&h, 4)).sqrt();
+        }
+        let h = weights(slope, radius);
+        let lever = 2.0 * moment(&h, 2) * pitch;
+        let taps = g.iter().zip(&h).enumerate();
+        let taps = taps.map(|(k, (&g, &h))| [g, k as f64 * h / lever, 0.0].map(T::from_f64));
+        Self { taps: taps.collect(), variance: variance * pitch * pitch }
     }
 
     #[cfg(test)]
     pub fn radius(&self) -> usize {
         self.taps.len() - 1
     }
+}
+
+/// Sum of weights times a power of the distance, on one side.
+fn moment(weights: &[f64], power: i32) -> f64 {
+    weights.iter().enumerate().map(|(k, g)| (k as f64).powi(power) * g).sum()
 }
 
 /// One window of the ladder.
@@ -50,8 +79,8 @@ pub(super) struct Scale<T> {
     pub octave: usize,
     /// What is left of the window after the smoothing that came with the grid.
     pub first: Taps<T>,
-    /// The whole window, for the second pass of twicing: fits are as good as smooth.
-    pub second: Taps<T>,
+    /// The whole window, and the one of twice its variance: what smoothing once and twice more leaves of the fits.
+    pub again: [Taps<T>; 2],
     /// Variance of the whole window as it comes out, px^2.
     pub variance: f64,
 }
@@ -78,7 +107,8 @@ impl<T: SimdReal> Ladder<T> {
             }
             let first = Taps::gaussian((whole * whole - smoothed).sqrt(), distance);
             let variance = first.variance + smoothed * distance * distance;
-            Scale { sigma, octave, first, second: Taps::gaussian(whole, distance), variance }
+            let again = [1.0, 2.0].map(|times| Taps::of_variance(times * variance, distance));
+Scale { sigma, octave, first, again, variance }
         });
         Self { scales: scales.collect(), halving: halving.clone(), pitch }
     }
@@ -94,7 +124,8 @@ impl<T: SimdReal> Ladder<T> {
 /// Twicing makes `H = 2 G - G^2` of the transfer function `G = exp(-sigma^2 w^2 / 2)`; the result is `integral (H_a - H_b)^2 w dw / (2 pi)`, each
 /// term of which is a Gaussian.
 pub(super) fn difference_variance(a: f64, b: f64) -> f64 {
-    let terms = [(2.0, a * a), (-1.0, 2.0 * a * a), (-2.0, b * b), (1.0, 2.0 * b * b)];
+    let window = |sign: f64, s: f64| TERMS.into_iter().enumerate().map(move |(n, c)| (sign * c, (n + 1) as f64 * s * s));
+    let terms: Vec<_> = window(1.0, a).chain(window(-1.0, b)).collect();
     terms.iter().flat_map(|(c, s)| terms.iter().map(move |(d, t)| c * d / (2.0 * PI * (s + t)))).sum()
 }
 
@@ -108,7 +139,7 @@ mod tests {
         assert_eq!(ladder.scales.iter().map(|s| s.octave).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2]);
         for s in &ladder.scales {
             let pitch = 2.0 * f64::from(1 << s.octave as u32);
-            for taps in [&s.first, &s.second] {
+            for taps in [&s.first, &s.again[0], &s.again[1]] {
                 let slope: f64 = taps.taps.iter().enumerate().map(|(k, t)| 2.0 * t[1] * k as f64 * pitch).sum();
                 assert!((slope - 1.0).abs() < 1e-13 && taps.radius() <= RIM);
             }

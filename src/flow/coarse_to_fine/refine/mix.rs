@@ -1,12 +1,12 @@
 //! The windows' fits, mixed: twiced plain fits where the flow is smooth, and across motion boundaries fits from windows that keep to one side.
 
 use super::Options;
-use super::choose::Choice;
+use super::choose::{Choice, Use};
 use super::edges::{self, Edges, Site};
 use super::field::{Beyond, Field};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
-use super::ladder::Scale;
+use super::ladder::{Scale, TERMS};
 use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
@@ -17,6 +17,10 @@ use std::ops::Range;
 const SHUT: f64 = 0.2;
 /// Lines of weights before those of the edges' windows.
 const FIRST_EDGE: usize = 3;
+/// Least weight of the narrowest window of a coarse grid: interpolation to finer grids wants values everywhere.
+const LEAST_WEIGHT: f64 = 1e-3;
+/// What plain fits are used for.
+const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
@@ -28,7 +32,7 @@ pub(super) struct Plain<'a, T> {
     pub choice: &'a Choice<T>,
     pub octave: usize,
     pub rungs: Rungs<'a, T>,
-    /// Planes of [`FIT`]: the sums over coarser windows of weight times fit, and of weighted relative misfit.
+    /// Planes of [`FIT`]: the mean twiced fit of coarser grids' windows, and their mean relative misfit.
     pub coarser: Option<&'a Field<T>>,
     /// The flow on this grid.
     pub grid: &'a Field<T>,
@@ -39,49 +43,118 @@ struct Scratch<T> {
     down: Vec<T>,
     again: Vec<T>,
     weight: Vec<T>,
+    total: Vec<T>,
     misfit: Vec<T>,
 }
 
 impl<T: SimdReal> Scratch<T> {
     fn new(stride: usize) -> Self {
         let lines = |n: usize| vec![T::from_f64(0.0); n * stride];
-        Self { down: lines(4), again: lines(6), weight: lines(2), misfit: lines(2) }
+        Self { down: lines(4), again: lines(12), weight: lines(4), total: lines(4), misfit: lines(2) }
     }
 }
 
 impl<T: SimdReal> Plain<'_, T> {
-    /// Planes of [`FIT`] along row `y`: sum of weight times twiced fit, and the mean relative misfit.
+    /// Planes of [`FIT`] along row `y`: the mean fit, and the mean relative misfit. On the finest grid the weights sum to 1, or to less where the field vanishes.
     #[inline(always)]
     fn row<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
-        let Self { choice, octave, rungs, coarser, grid } = self;
-        let (width, stride) = (grid.width, grid.stride());
-        for (k, line) in out.chunks_exact_mut(stride).take(FIT).enumerate() {
-            match coarser {
-                Some(coarser) => grow_row::<V>(coarser, k, y, width, &mut scratch.down, &mut line[LEFT..]),
-                None => line.fill(T::from_f64(0.0)),
-            }
-        }
-        for (l, scale, fits) in rungs {
-            widen::<V>(choice, *l, *octave, y, &mut scratch.down, &mut scratch.weight);
-            if !any(&scratch.weight[..width]) {
+        let stride = self.grid.stride();
+        self.from_coarser::<V>(y, scratch, out);
+        for (n, (l, scale, fits)) in self.rungs.iter().enumerate() {
+            let least = if n == 0 && self.octave > 0 { LEAST_WEIGHT } else { 0.0 };
+            if !self.weigh::<V>(*l, y, least, scratch) {
                 continue;
             }
-            widen::<V>(choice, choice.misfit(*l), *octave, y, &mut scratch.down, &mut scratch.misfit);
-            fit_row::<V>(fits, &scale.second, y, &mut scratch.down, &mut scratch.again);
+            for (taps, lines) in scale.again.iter().zip(scratch.again.chunks_exact_mut(6 * stride)) {
+                fit_row::<V>(fits, taps, y, &mut scratch.down, lines);
+            }
             let once = &fits.data()[fits.start(0, y as isize)..][..FIT * stride];
-            for x in (0..fits.padded()).step_by(V::LANES) {
-                let weight = V::load(&scratch.weight[x..]);
-                for k in 0..FIT - 1 {
-                    let at = k * stride + LEFT + x;
-                    let (first, second) = (V::load(&once[at..]), V::load(&scratch.again[at..]));
-                    (first + first - second).mul_add(weight, V::load(&out[at..])).store(&mut out[at..]);
-                }
-                let at = (FIT - 1) * stride + LEFT + x;
-                let misfit = V::load(&once[at..]).max(V::constant(LEAST));
-                misfit.mul_add(V::load(&scratch.misfit[x..]), V::load(&out[at..])).store(&mut out[at..]);
+            scratch.add::<V>(once, fits.padded(), stride, out);
+        }
+        if self.octave > 0 {
+            scratch.divide::<V>(self.grid.padded(), stride, out);
+        }
+    }
+
+    /// What coarser grids have, with the weight of all their windows.
+    #[inline(always)]
+    fn from_coarser<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
+        let Self { choice, octave, coarser, grid, .. } = self;
+        let (width, stride) = (grid.width, grid.stride());
+        let Some(coarser) = coarser else {
+            out.fill(T::from_f64(0.0));
+            scratch.total.fill(T::from_f64(0.0));
+            return;
+        };
+        for (of, total) in PLAIN.into_iter().zip(scratch.total.chunks_exact_mut(2 * stride)) {
+            widen::<V>(choice, choice.order.coarser(of, *octave), *octave, y, &mut scratch.down, total);
+        }
+        for (k, line) in out.chunks_exact_mut(stride).take(FIT).enumerate() {
+            grow_row::<V>(coarser, k, y, width, &mut scratch.down, &mut line[LEFT..]);
+            let total = &scratch.total[2 * stride * use_of(k)..];
+            for x in (0..grid.padded()).step_by(V::LANES) {
+                let line = &mut line[LEFT + x..];
+                (V::load(line) * V::load(&total[x..])).store(line);
             }
         }
     }
+
+    /// Weights of the window `l` along row `y`; false if there are none.
+    #[inline(always)]
+    fn weigh<V: Lanes<Scalar = T>>(&self, l: usize, y: usize, least: f64, scratch: &mut Scratch<T>) -> bool {
+        let Self { choice, octave, grid, .. } = self;
+        let (width, stride) = (grid.width, grid.stride());
+        for (of, weight) in PLAIN.into_iter().zip(scratch.weight.chunks_exact_mut(2 * stride)) {
+            widen::<V>(choice, choice.order.weight(of, l), *octave, y, &mut scratch.down, weight);
+            for x in (0..grid.padded()).step_by(V::LANES) {
+                V::load(&weight[x..]).max(V::constant(least)).store(&mut weight[x..]);
+            }
+        }
+        widen::<V>(choice, choice.order.misfit(l), *octave, y, &mut scratch.down, &mut scratch.misfit);
+        scratch.weight.chunks_exact(2 * stride).any(|weight| any(&weight[..width]))
+    }
+}
+
+impl<T: SimdReal> Scratch<T> {
+    /// Adds weights times `1 - (1 - K)^3` of the window that is at hand.
+    #[inline(always)]
+    fn add<V: Lanes<Scalar = T>>(&mut self, once: &[T], padded: usize, stride: usize, out: &mut [T]) {
+        let terms = TERMS.map(V::constant);
+        for x in (0..padded).step_by(V::LANES) {
+            let weights = [0, 1].map(|n| V::load(&self.weight[2 * stride * n + x..]));
+            for k in 0..FIT - 1 {
+                let at = k * stride + LEFT + x;
+                let [twice, thrice] = [at, at + 6 * stride].map(|at| V::load(&self.again[at..]));
+                let value = thrice.mul_add(terms[2], twice.mul_add(terms[1], V::load(&once[at..]) * terms[0]));
+                value.mul_add(weights[use_of(k)], V::load(&out[at..])).store(&mut out[at..]);
+            }
+            let at = (FIT - 1) * stride + LEFT + x;
+            let misfit = V::load(&once[at..]).max(V::constant(LEAST));
+            misfit.mul_add(V::load(&self.misfit[x..]), V::load(&out[at..])).store(&mut out[at..]);
+            for (n, weight) in weights.into_iter().enumerate() {
+                let total = &mut self.total[2 * stride * n + x..];
+                (V::load(total) + weight).store(total);
+            }
+        }
+    }
+
+    /// Makes means of the sums.
+    #[inline(always)]
+    fn divide<V: Lanes<Scalar = T>>(&self, padded: usize, stride: usize, out: &mut [T]) {
+        for x in (0..padded).step_by(V::LANES) {
+            let whole = [0, 1].map(|n| V::constant(1.0) / V::load(&self.total[2 * stride * n + x..]));
+            for k in 0..FIT {
+                let line = &mut out[k * stride + LEFT + x..];
+                (V::load(line) * whole[use_of(k)]).store(line);
+            }
+        }
+    }
+}
+
+/// Which of the weights goes with the plane `k` of [`FIT`].
+#[inline(always)]
+fn use_of(k: usize) -> usize {
+    usize::from((2..FIT - 1).contains(&k))
 }
 
 #[inline(always)]
@@ -148,8 +221,9 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
         let mut weights = vec![T::from_f64(0.0); 2 * stride * (job.edges.len() + FIRST_EDGE)];
         for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
             job.plain.row::<V>(y, &mut scratch, &mut row);
-            let planes = [choice.density(), choice.sigma(false), choice.sigma(true)];
-            let planes = planes.into_iter().chain(job.edges.iter().map(|edge| choice.edge(edge.place)));
+            let order = choice.order;
+            let planes = [order.density(), order.sigma(Use::Flow), order.sigma(Use::Edges)];
+            let planes = planes.into_iter().chain(job.edges.iter().map(|edge| order.weight(Use::Edges, edge.place)));
             for (k, line) in planes.zip(weights.chunks_exact_mut(2 * stride)) {
                 widen::<V>(choice, k, 0, y, &mut scratch.down, line);
             }
