@@ -99,7 +99,7 @@ pub(super) struct DataOptions {
 
 impl Default for DataOptions {
     fn default() -> Self {
-        Self { gradient: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| super::refine::ev("JF_GW", 4.0)) }, sigma: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| super::refine::ev("JF_DS", 1.2)) }, robust: { static E: std::sync::OnceLock<f64> = std::sync::OnceLock::new(); *E.get_or_init(|| super::refine::ev("JF_RB", 3.0)) } }
+        Self { gradient: 5.0, sigma: 1.2, robust: 3.0 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
 use super::field::{Beyond, Field, RIM};
-use super::ladder::{Scale, TERMS, Taps};
+use super::ladder::{AGAIN, Scale, TERMS, Taps};
 use crate::flow::coarse_to_fine::grid::LEFT;
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::flow::windowed::window::filter;
@@ -172,10 +172,10 @@ pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
     }
 }
 
-/// The twiced flow at every `step`-th site.
+/// u and v, smoothed repeatedly, at every `step`-th site.
 struct Samples<'a, T> {
     fits: &'a Field<T>,
-    again: &'a [Taps<T>; 2],
+    again: &'a [Taps<T>; AGAIN],
     step: usize,
     rows: Range<usize>,
     out: &'a mut [T],
@@ -188,25 +188,23 @@ impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
         let Self { fits, again, step, rows, out, stride, width } = self;
-        let mut buffers = [0; 2].map(|_| vec![T::from_f64(0.0); 2 * fits.stride()]);
-        let [first, second, third] = TERMS.map(T::from_f64);
+        let (line, [first, further @ ..]) = (fits.stride(), TERMS.map(T::from_f64));
+        let (mut sum, mut buffer) = (vec![first; line], vec![first; 2 * line]);
         for (y, out) in rows.zip(out.chunks_exact_mut(2 * stride)) {
             for k in 0..2 {
-                for (buffer, taps) in buffers.iter_mut().zip(again) {
-                    smooth_row::<V>(fits, k, step * y, taps, buffer);
-                }
-                let [twice, thrice] = buffers.each_mut().map(|b| &mut b[fits.stride()..]);
                 let once = &fits.line(k, (step * y) as isize)[LEFT..];
-                for ((a, b), once) in thrice.iter_mut().zip(&*twice).zip(once) {
-                    *a = first * *once + second * *b + third * *a;
+                sum.iter_mut().zip(once).for_each(|(s, once)| *s = first * *once);
+                for (taps, factor) in again.iter().zip(further) {
+                    smooth_row::<V>(fits, k, step * y, taps, &mut buffer);
+                    sum.iter_mut().zip(&buffer[line..]).for_each(|(s, b)| *s += factor * *b);
                 }
-                pick(thrice, step, &mut out[k * stride + LEFT..][..width]);
+                pick(&sum, step, &mut out[k * stride + LEFT..][..width]);
             }
         }
     }
 }
 
-/// u and v of the twiced fit (`2 K - K K`) at every `step`-th site.
+/// u and v of `1 - (1 - K)^4` at every `step`-th site.
 pub(super) fn samples<T: SimdReal>(
     simd: Level,
     space: &Space<T>,

@@ -14,8 +14,10 @@ const WIDEST: f64 = 2.9;
 /// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a thousand times.
 const BEFORE_HALVING: f64 = 1.5;
 
-/// A window is smoothed once, twice and three times, `3 G - 3 G^2 + G^3 = 1 - (1 - G)^3`.
-pub(super) const TERMS: [f64; 3] = [3.0, -3.0, 1.0];
+/// Factors of what is smoothed once, twice, ...: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
+pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+/// Passes after the first.
+pub(super) const AGAIN: usize = TERMS.len() - 1;
 
 /// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a weighted straight line.
 #[derive(Debug, Clone)]
@@ -79,8 +81,8 @@ pub(super) struct Scale<T> {
     pub octave: usize,
     /// What is left of the window after the smoothing that came with the grid.
     pub first: Taps<T>,
-    /// The whole window, and the one of twice its variance: what smoothing once and twice more leaves of the fits.
-    pub again: [Taps<T>; 2],
+    /// Windows of one, two, ... times its variance: smoothing once, twice, ... more.
+    pub again: [Taps<T>; AGAIN],
     /// Variance of the whole window as it comes out, px^2.
     pub variance: f64,
 }
@@ -107,7 +109,7 @@ impl<T: SimdReal> Ladder<T> {
             }
             let first = Taps::gaussian((whole * whole - smoothed).sqrt(), distance);
             let variance = first.variance + smoothed * distance * distance;
-            let again = [1.0, 2.0].map(|times| Taps::of_variance(times * variance, distance));
+            let again = std::array::from_fn(|n| (n + 1) as f64).map(|times| Taps::of_variance(times * variance, distance));
 Scale { sigma, octave, first, again, variance }
         });
         Self { scales: scales.collect(), halving: halving.clone(), pitch }
@@ -119,12 +121,11 @@ Scale { sigma, octave, first, again, variance }
     }
 }
 
-/// Variance of the difference between the twiced fits of two windows, for white noise of unit density (per px^2); the second may be infinite.
+/// Variance of the difference between the estimates of two windows, for white noise of unit density (per px^2); the second may be infinite.
 ///
-/// Twicing makes `H = 2 G - G^2` of the transfer function `G = exp(-sigma^2 w^2 / 2)`; the result is `integral (H_a - H_b)^2 w dw / (2 pi)`, each
-/// term of which is a Gaussian.
+/// With the transfer functions `H = 1 - (1 - G)^4`, `G = exp(-sigma^2 w^2 / 2)`, it is `integral (H_a - H_b)^2 w dw / (2 pi)`, each term of which is a Gaussian.
 pub(super) fn difference_variance(a: f64, b: f64) -> f64 {
-    let window = |sign: f64, s: f64| TERMS.into_iter().enumerate().map(move |(n, c)| (sign * c, (n + 1) as f64 * s * s));
+    let window = |sign: f64, s: f64| TERMS.into_iter().zip(1..).map(move |(c, n)| (sign * c, f64::from(n) * s * s));
     let terms: Vec<_> = window(1.0, a).chain(window(-1.0, b)).collect();
     terms.iter().flat_map(|(c, s)| terms.iter().map(move |(d, t)| c * d / (2.0 * PI * (s + t)))).sum()
 }
@@ -139,7 +140,7 @@ mod tests {
         assert_eq!(ladder.scales.iter().map(|s| s.octave).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 2, 2]);
         for s in &ladder.scales {
             let pitch = 2.0 * f64::from(1 << s.octave as u32);
-            for taps in [&s.first, &s.again[0], &s.again[1]] {
+            for taps in s.again.iter().chain([&s.first]) {
                 let slope: f64 = taps.taps.iter().enumerate().map(|(k, t)| 2.0 * t[1] * k as f64 * pitch).sum();
                 assert!((slope - 1.0).abs() < 1e-13 && taps.radius() <= RIM);
             }
@@ -152,7 +153,7 @@ mod tests {
     fn variance_of_differences_is_the_integral() {
         let h = |s: f64, w: f64| {
             let g = (-0.5 * (s * w).powi(2)).exp();
-            2.0 * g - g * g
+            1.0 - (1.0 - g).powi(4)
         };
         for (a, b) in [(1.5, 2.5), (13.0, 18.0)] {
             let n = 40_000;

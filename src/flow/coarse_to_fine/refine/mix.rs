@@ -1,4 +1,4 @@
-//! The windows' fits, mixed: twiced plain fits where the flow is smooth, and across motion boundaries fits from windows that keep to one side.
+//! The windows' fits, mixed: plain fits where the flow is smooth, and across motion boundaries fits from windows that keep to one side.
 
 use super::Options;
 use super::choose::{Choice, Use};
@@ -6,7 +6,7 @@ use super::edges::{self, Edges, Site};
 use super::field::{Beyond, Field};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
-use super::ladder::{Scale, TERMS};
+use super::ladder::{AGAIN, Scale, TERMS};
 use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
@@ -32,7 +32,7 @@ pub(super) struct Plain<'a, T> {
     pub choice: &'a Choice<T>,
     pub octave: usize,
     pub rungs: Rungs<'a, T>,
-    /// Planes of [`FIT`]: the mean twiced fit of coarser grids' windows, and their mean relative misfit.
+    /// Planes of [`FIT`]: the mean fit of coarser grids' windows, and their mean relative misfit.
     pub coarser: Option<&'a Field<T>>,
     /// The flow on this grid.
     pub grid: &'a Field<T>,
@@ -50,7 +50,7 @@ struct Scratch<T> {
 impl<T: SimdReal> Scratch<T> {
     fn new(stride: usize) -> Self {
         let lines = |n: usize| vec![T::from_f64(0.0); n * stride];
-        Self { down: lines(4), again: lines(12), weight: lines(4), total: lines(4), misfit: lines(2) }
+        Self { down: lines(4), again: lines(6 * AGAIN), weight: lines(4), total: lines(4), misfit: lines(2) }
     }
 }
 
@@ -116,7 +116,7 @@ impl<T: SimdReal> Plain<'_, T> {
 }
 
 impl<T: SimdReal> Scratch<T> {
-    /// Adds weights times `1 - (1 - K)^3` of the window that is at hand.
+    /// Adds weights times `1 - (1 - K)^4` of the window that is at hand.
     #[inline(always)]
     fn add<V: Lanes<Scalar = T>>(&mut self, once: &[T], padded: usize, stride: usize, out: &mut [T]) {
         let terms = TERMS.map(V::constant);
@@ -124,8 +124,10 @@ impl<T: SimdReal> Scratch<T> {
             let weights = [0, 1].map(|n| V::load(&self.weight[2 * stride * n + x..]));
             for k in 0..FIT - 1 {
                 let at = k * stride + LEFT + x;
-                let [twice, thrice] = [at, at + 6 * stride].map(|at| V::load(&self.again[at..]));
-                let value = thrice.mul_add(terms[2], twice.mul_add(terms[1], V::load(&once[at..]) * terms[0]));
+                let mut value = V::load(&once[at..]) * terms[0];
+                for n in 0..AGAIN {
+                    value = V::load(&self.again[at + 6 * n * stride..]).mul_add(terms[n + 1], value);
+                }
                 value.mul_add(weights[use_of(k)], V::load(&out[at..])).store(&mut out[at..]);
             }
             let at = (FIT - 1) * stride + LEFT + x;

@@ -66,7 +66,7 @@ struct Features<'a, T> {
 pub(super) struct Fitted<T> {
     /// Planes of [`FIT`].
     pub fits: Vec<Field<T>>,
-    /// The twiced flow on the window's own grid or, from the finest, at every second site.
+    /// The smoothed flow on the window's own grid or, from the finest, at every second site.
     pub samples: Vec<Field<T>>,
 }
 
