@@ -32,6 +32,7 @@ pub(super) use evidence::{Evidence, SPACING};
 use field::Field;
 use fit::{FIT, FLOW};
 use ladder::Ladder;
+pub(super) use ladder::TERMS;
 use region::Fitted;
 
 /// Distance of the sites, px.

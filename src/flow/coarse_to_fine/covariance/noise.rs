@@ -1,20 +1,21 @@
 //! What windows leave of the noise of the flow.
 //!
-//! White noise of density `D` (variance times area) leaves in twiced Gaussian means and slopes of standard deviation `s` (transfer function `H = 2 G - G^2`) the
-//! covariances
+//! White noise of density `D` (variance times area) leaves in the windows' means and slopes (standard deviation `s`, transfer function `H = 1 - (1 - G)^4`) the covariances
 //!
-//! `C(u, v) = D integral H^2 / (2 pi)^2 = 11/6 D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2 H^2 / (2 pi)^2 = 89/36 D / (8 pi s^4)`.
+//! `C(u, v) = D integral H^2 / (2 pi)^2 = F D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2 H^2 / (2 pi)^2 = S D / (8 pi s^4)`,
+//!
+//! where `H = sum c_n G^n` gives `F = sum c_m c_n 2 / (m + n)` and `S = sum c_m c_n (2 / (m + n))^2`.
 //!
 //! Its shape is that of `e P^-1`, `P` being the information and `e` the residual energy around a place. Its size is not: errors of brightness go into two orders of
 //! derivatives, texture has its own spectrum, and coupling takes away the finest part. So the size is taken from the flow: between two windows that were both accepted the
 //! flow changes by noise, over that of white noise of unit density. The geometric mean of this excess over the frame is well determined, a single place's is not.
 //!
-//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to eight times the variance, slopes across it twelve times. These are
+//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to fifteen times the variance, slopes across it twenty-four times. These are
 //! the factors of white noise drawn and smoothed, as functions of the distance over the window.
 
 use super::super::data::SEEN;
 use super::super::grid::Planes;
-use super::super::refine::{Evidence, PITCH, SPACING};
+use super::super::refine::{Evidence, PITCH, SPACING, TERMS};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 
@@ -49,9 +50,11 @@ impl Energy {
     }
 }
 
-/// `integral H^2` and `integral w_x^2 H^2`, over those of the Gaussian alone.
-const FLOW: f64 = 73.0 / 30.0;
-const SLOPE: f64 = 3511.0 / 900.0;
+/// `sum c_m c_n (2 / (m + n))^power` of the windows: their noise over that of a Gaussian alone, of the flow and of its slopes for powers 1 and 2.
+fn of_white_noise(power: i32) -> f64 {
+    let terms = || TERMS.into_iter().zip(1..);
+    terms().flat_map(|(c, m)| terms().map(move |(d, n)| c * d * (2.0 / f64::from(m + n)).powi(power))).sum()
+}
 
 /// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
 pub(super) struct Left {
@@ -76,7 +79,7 @@ impl Edges {
         let factor = |sigma: f64, n: usize| {
             let at = (PITCH * (SPACING * n) as f64).min(last);
             let t = at.min(last - at) / sigma;
-            [1.0 + 7.0 * (-2.2 * t - 1.2 * t * t).exp(), 1.0 + 11.4 * (-(t / 0.82).powi(2)).exp()]
+            [1.0 + 14.0 * (-2.1 * t - 3.6 * t * t).exp(), 1.0 + 22.7 * (-(t / 0.74).powi(2)).exp()]
         };
         Self { factors: sigmas.iter().map(|&s| (0..places).map(|n| factor(s, n)).collect()).collect() }
     }
@@ -124,6 +127,7 @@ const SLOPE: f64 = 3511.0 / 900.0;
         };
         let inverse = inverse_without_noise(informed(self.evidence.information(x, y)), self.gradient * energy);
         let scale = self.excess * energy;
+        let (flow_share, slope_share) = (of_white_noise(1), of_white_noise(2));
         let widest = self.evidence.sigmas.len() - 1;
         let windows = 0..=widest;
         let weights: Vec<[f64; 2]> = windows.map(|l| self.evidence.weights(l, x, y)).collect();
@@ -131,7 +135,7 @@ const SLOPE: f64 = 3511.0 / 900.0;
         let mut left = Left { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
             let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
-            let (flow, slope) = (FLOW / (4.0 * PI * sigma.powi(2)), SLOPE / (8.0 * PI * sigma.powi(4)));
+            let (flow, slope) = (flow_share / (4.0 * PI * sigma.powi(2)), slope_share / (8.0 * PI * sigma.powi(4)));
             let ([mean_x, across_x], [mean_y, across_y]) = (self.columns.factors[l][x], self.rows.factors[l][y]);
             left.flow += weight[0] * flow * mean_x * mean_y;
             left.slopes[0] += weight[1] * slope * across_x * mean_y;
