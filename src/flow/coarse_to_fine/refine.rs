@@ -71,7 +71,13 @@ impl Options {
     /// For what one step of the motion differs by from another, which is small and smooth or nothing.
     pub fn for_changes() -> Self {
         let default = Self::default();
-        Self { kappa: 2.0 * default.kappa, kappa_slopes: 2.0 * default.kappa_slopes, kappa_edge: 2.0 * default.kappa_edge, may_vanish: true, ..default }
+        Self {
+            kappa: 2.0 * default.kappa,
+            kappa_slopes: 2.0 * default.kappa_slopes,
+            kappa_edge: 2.0 * default.kappa_edge,
+            may_vanish: true,
+            ..default
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What smoothing takes away from bent flow.
 //!
-//! Motion that is smoothed once more, twiced as the windows are, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
+//! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
 //! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance.
 //!
 //! Twice. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so

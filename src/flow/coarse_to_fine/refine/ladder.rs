@@ -109,8 +109,9 @@ impl<T: SimdReal> Ladder<T> {
             }
             let first = Taps::gaussian((whole * whole - smoothed).sqrt(), distance);
             let variance = first.variance + smoothed * distance * distance;
-            let again = std::array::from_fn(|n| (n + 1) as f64).map(|times| Taps::of_variance(times * variance, distance));
-Scale { sigma, octave, first, again, variance }
+            let again =
+                std::array::from_fn(|n| (n + 1) as f64).map(|times| Taps::of_variance(times * variance, distance));
+            Scale { sigma, octave, first, again, variance }
         });
         Self { scales: scales.collect(), halving: halving.clone(), pitch }
     }

@@ -1,6 +1,7 @@
 //! Each piece against the plainest form of its definition, in double precision.
 
 use super::*;
+use crate::flow::coarse_to_fine::refine::choose::Use;
 use crate::flow::coarse_to_fine::refine::ladder::{Scale, Taps, difference_variance};
 use crate::flow::coarse_to_fine::refine::region::Layout;
 
@@ -53,8 +54,30 @@ fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
     (ladder, grids)
 }
 
+/// Means and slopes with the taps of both axes.
+fn filtered(taps: &[[f64; 3]], z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> [f64; 3] {
+    let radius = taps.len() as isize - 1;
+    let tap = |k: isize| taps[k.unsigned_abs()].map(|t| if k < 0 { -t } else { t });
+    let mut sums = [0.0; 3];
+    for (i, j) in (-radius..=radius).flat_map(|j| (-radius..=radius).map(move |i| (i, j))) {
+        let value = beyond(z, x + i, y + j);
+        sums[0] += value * tap(i)[0].abs() * tap(j)[0].abs();
+        sums[1] += value * tap(i)[1] * tap(j)[0].abs();
+        sums[2] += value * tap(i)[0].abs() * tap(j)[1];
+    }
+    sums
+}
+
+fn mean_square(taps: &[[f64; 3]], z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> f64 {
+    let radius = taps.len() as isize - 1;
+    let sites = (-radius..=radius).flat_map(|j| (-radius..=radius).map(move |i| (i, j)));
+    let terms =
+        sites.map(|(i, j)| taps[i.unsigned_abs()][0] * taps[j.unsigned_abs()][0] * beyond(z, x + i, y + j).powi(2));
+    terms.sum()
+}
+
 #[test]
-fn fits_are_least_squares_and_samples_are_twiced() {
+fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[..3] {
@@ -64,15 +87,23 @@ fn fits_are_least_squares_and_samples_are_twiced() {
             let mut misfit = 0.0;
             for k in 0..2 {
                 let z = |x: isize, y: isize| motion.at(k, x as usize, y as usize);
-                let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
-                misfit += want[3];
-                for (n, want) in want[..3].iter().enumerate() {
-                    assert!((fits.at(k + 2 * n, x, y) - want).abs() < 1e-12, "{} {x} {y} {n}", scale.sigma);
+                let got = [0, 2, 4].map(|n| fits.at(k + n, x, y));
+                for (got, want) in got.iter().zip(filtered(&scale.first.taps, &z, x as isize, y as isize)) {
+                    assert!((got - want).abs() < 1e-12, "{} {x} {y}", scale.sigma);
                 }
+                // As good as a least-squares fit in the same window: slopes differ by how the Gaussian is cut off.
+                let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
+                assert!((got[0] - want[0]).abs() < 1e-12);
+                assert!((got[1] - want[1]).abs() < 0.01 && (got[2] - want[2]).abs() < 0.01, "{got:?} {want:?}");
+                misfit += mean_square(&scale.first.taps, &z, x as isize, y as isize)
+                    - got[0] * got[0]
+                    - scale.variance * (got[1] * got[1] + got[2] * got[2]);
                 let once = |x: isize, y: isize| fits.at(k, x as usize, y as usize);
-                let again = least_squares(&once, scale.sigma / PITCH, x as isize & !1, y as isize & !1);
-                let twiced = 2.0 * fits.at(k, x & !1, y & !1) - again[0];
-                assert!((samples.at(k, x / 2, y / 2) - twiced).abs() < 1e-12);
+                let (x, y) = (x & !1, y & !1);
+                let again = scale.again.iter().zip(&TERMS[1..]);
+                let again = again.map(|(taps, c)| c * filtered(&taps.taps, &once, x as isize, y as isize)[0]);
+                let want = TERMS[0] * fits.at(k, x, y) + again.sum::<f64>();
+                assert!((samples.at(k, x / 2, y / 2) - want).abs() < 1e-12);
             }
             assert!((fits.at(6, x, y) - misfit.max(fit::LEAST)).abs() < 1e-12, "{} {x} {y}", scale.sigma);
         }
@@ -130,11 +161,11 @@ fn choices_follow_the_formulas() {
         (0..7).for_each(|l| means.line_mut(layout.misfit(l), 0)[x] = 2.0 + l as f64);
     }
     let choice = choose::choose(Level::detect(), &Space::default(), &options, &ladder, &means);
+    let order = choice.order;
     let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
     for x in 0..9 {
-        assert!((choice.planes.at(choice.density(), x, 0) / a - 1.0).abs() < 1e-12);
-        for edge in [false, true] {
-            let (kappa, root) = if edge { (6.0, 1.0 / 1.2) } else { (7.0, 1.0) };
+        assert!((choice.planes.at(order.density(), x, 0) / a - 1.0).abs() < 1e-12);
+        for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, 11.0, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
             let (mut accepted, mut weights) = (1.0, Vec::new());
             for l in 0..7 {
                 let next = if l == 6 {
@@ -148,21 +179,26 @@ fn choices_follow_the_formulas() {
                 accepted = next;
             }
             let sum: f64 = weights.iter().sum();
-            let mut sigma = 0.0;
+            let (mut sigma, mut coarser) = (0.0, [0.0; 2]);
             for (l, weight) in weights.iter().enumerate() {
-                let k = if edge { choice.edge(l) } else { l };
-                assert!((choice.planes.at(k, x, 0) - weight / sum).abs() < 1e-12, "{x} {l}");
-                if !edge {
+                assert!((choice.planes.at(order.weight(of, l), x, 0) - weight / sum).abs() < 1e-12, "{x} {l}");
+                if of == Use::Flow {
                     let misfit = weight / sum * (2.0 + l as f64).powi(4);
-                    assert!((choice.planes.at(choice.misfit(l), x, 0) - misfit).abs() < 1e-9);
+                    assert!((choice.planes.at(order.misfit(l), x, 0) - misfit).abs() < 1e-9);
                 }
                 sigma += weight / sum * options.ladder[l];
+                coarser[..ladder.scales[l].octave].iter_mut().for_each(|c| *c += weight / sum);
             }
-            assert!((choice.planes.at(choice.sigma(edge), x, 0) - sigma).abs() < 1e-12);
+            assert!((choice.planes.at(order.sigma(of), x, 0) - sigma).abs() < 1e-12);
+            for (octave, want) in coarser.into_iter().enumerate() {
+                assert!((choice.planes.at(order.coarser(of, octave), x, 0) - want).abs() < 1e-12);
+            }
         }
     }
     // The ladder was climbed to different heights.
-    assert!(choice.planes.at(choice.sigma(false), 0, 0) > 10.0 && choice.planes.at(choice.sigma(false), 8, 0) < 2.5);
+    assert!(
+        choice.planes.at(order.sigma(Use::Flow), 0, 0) > 10.0 && choice.planes.at(order.sigma(Use::Flow), 8, 0) < 2.5
+    );
 }
 
 #[test]
