@@ -3,11 +3,11 @@
 //! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
 //! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance.
 //!
-//! Twice. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so
-//! the motion loses, with the weights of the windows, to Gaussians one and a half times as wide.
+//! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so
+//! the motion loses `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
 use super::super::grid::Planes;
-use super::super::refine::{Evidence, PITCH, SPACING};
+use super::super::refine::{Evidence, PITCH, SPACING, TERMS};
 use super::Entries;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
@@ -16,10 +16,12 @@ use std::f64::consts::SQRT_2;
 
 /// Standard deviation of the first Gaussian, px: about twice that of the windows that bent flow is given.
 const SIGMA: f64 = 6.0;
-/// Standard deviations of the others, px.
-const WIDE: [f64; 3] = [8.0, 16.0, 32.0];
+/// Standard deviations of the others over those of the windows.
+const WIDER: f64 = 1.25;
 /// The narrowest window that has one of its own, px.
 const NARROWEST: f64 = 3.5;
+/// Places that one thread smooths at a time.
+const PIECE: usize = 1024;
 /// Planes of the motion.
 const MOTION: usize = 6;
 /// The motion or what it loses, at one place.
@@ -88,31 +90,26 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     rows.concat()
 }
 
-/// The sum over the windows of weight times `(1 - G)^2` of the motion, G being the one of [`WIDE`] that suits the window. The motion there is smooth enough to be smoothed from place to place.
+/// The sum over the windows of weight times `(1 - G)^4` of the motion, G being [`WIDER`] than the window. The motion there is smooth enough to be smoothed from place to place.
 fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>) -> Vec<Loss> {
     let (width, height) = evidence.size();
     let places: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
     let whole: Vec<Loss> = places.iter().map(|&at| motion_at(motion, at)).collect();
     let mut lost = vec![[0.0; MOTION]; whole.len()];
-    let suits = |sigma: f64| WIDE.iter().position(|wide| *wide >= 1.1 * sigma).unwrap_or(WIDE.len() - 1);
-    for (n, wide) in WIDE.iter().enumerate() {
-        let windows = evidence.sigmas.iter().enumerate();
-        let windows: Vec<usize> =
-            windows.filter(|(_, s)| **s >= NARROWEST && suits(**s) == n).map(|(l, _)| l).collect();
-        let weight = |&(x, y): &(usize, usize)| {
-            let all = windows.iter().map(|l| evidence.weights(*l, x, y));
-            all.fold([0.0; 2], |sum, [flow, slopes]| [sum[0] + flow, sum[1] + slopes])
-        };
-        let weights: Vec<[f64; 2]> = places.iter().map(weight).collect();
+    for (l, sigma) in evidence.sigmas.iter().enumerate().filter(|(_, s)| **s >= NARROWEST) {
+        let weights: Vec<[f64; 2]> = places.iter().map(|&(x, y)| evidence.weights(l, x, y)).collect();
         if weights.iter().flatten().all(|w| *w < 0.01) {
             continue;
         }
-        let sigma = wide / (PITCH * SPACING as f64);
-        let [once, twice] = [sigma, sigma * SQRT_2].map(|s| smoothed(&whole, (width, height), s));
-        for (at, (lost, weight)) in lost.iter_mut().zip(weights).enumerate() {
-            for k in 0..MOTION {
-                lost[k] += weight[usize::from(k >= 2)] * (whole[at][k] - 2.0 * once[at][k] + twice[at][k]);
+        let mut left = whole.clone();
+        for _ in TERMS {
+            let smooth = smoothed(&left, (width, height), WIDER * sigma / (PITCH * SPACING as f64));
+            for (left, smooth) in left.iter_mut().zip(smooth) {
+                (0..MOTION).for_each(|k| left[k] -= smooth[k]);
             }
+        }
+        for ((lost, weight), left) in lost.iter_mut().zip(weights).zip(left) {
+            (0..MOTION).for_each(|k| lost[k] += weight[usize::from(k >= 2)] * left[k]);
         }
     }
     lost
@@ -129,8 +126,9 @@ fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec
         }
         sum
     };
-    let rows: Vec<Loss> = (0..values.len()).map(|n| mean(values, &along[n % width], n - n % width, 1)).collect();
-    (0..values.len()).map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
+    let every = || (0..values.len()).into_par_iter().with_min_len(PIECE);
+    let rows: Vec<Loss> = every().map(|n| mean(values, &along[n % width], n - n % width, 1)).collect();
+    every().map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
 }
 
 /// Sites and their weights.

@@ -23,11 +23,11 @@ pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.1;
+const FLOW_NOISE: f64 = 1.4;
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.52;
+const SLOPE_NOISE: f64 = 0.6;
 /// Errors over what bent motion loses, in the flow and in the slopes.
-const BENDING: bending::Shares = bending::Shares { fixed: [0.32, 0.45], chosen: [0.1, 0.52] };
+const BENDING: bending::Shares = bending::Shares { fixed: [0.33, 0.63], chosen: [0.14, 0.74] };
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.
