@@ -26,10 +26,18 @@ WARM_UP = 64
 
 
 def frames(width: int, height: int) -> np.ndarray:
-    """Three 8-bit frames of a smooth motion."""
-    scene = jacoflow.scenes.Scene("waves", width=width, height=height, seed=1, speed=2.0, wavelength=256.0)
+    """Three 8-bit frames of one moving surface that passes in front of another: motion boundaries take the most memory."""
     camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
-    return np.stack([camera.apply_u8(scene.frame(t - 1.0), index=t) for t in range(3)])
+    surfaces = [
+        jacoflow.scenes.Scene("waves", width=width, height=height, seed=seed, speed=2.0, wavelength=256.0) for seed in (1, 2)
+    ]
+    pictures = []
+    for t in range(3):
+        behind, before = (surface.frame(t - 1.0) for surface in surfaces)
+        edge = width // 2 + 4 * t
+        behind[:, edge:] = before[:, edge:]
+        pictures.append(camera.apply_u8(behind, index=t))
+    return np.stack(pictures)
 
 
 def highest() -> float:

@@ -21,23 +21,25 @@ const ROUNDS: usize = 4;
 pub(super) fn add_change<T: SimdReal>(
     plan: &Plan,
     workspace: &mut Workspace<T>,
-    coupled: &Planes<T>,
+    coupled: Planes<T>,
     motion: &mut Planes<T>,
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
-    let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, coupled);
+    let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
     let Workspace { pyramid, space, .. } = workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
-    add(&mut ahead, coupled, -1.0);
+    add(&mut ahead, &coupled, -1.0);
+    space.keep(coupled);
     continue_beyond(&data, &mut ahead);
     let steady = steady(space, motion);
     let share = share(&ahead, &steady);
     add(&mut ahead, &steady, -share);
+    add(motion, &steady, share);
+    space.keep(steady);
     let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, &data);
     add(motion, &change, 1.0);
-    add(motion, &steady, share);
-    for planes in [ahead, change, steady, data] {
+    for planes in [ahead, change, data] {
         space.keep(planes);
     }
     evidence

@@ -18,6 +18,7 @@ mod choose;
 mod edges;
 mod evidence;
 mod field;
+mod finish;
 mod fit;
 mod grow;
 mod ladder;
@@ -116,60 +117,52 @@ pub(super) fn refine<T: SimdReal>(
     data: &Planes<T>,
 ) -> (Planes<T>, Option<Evidence<T>>) {
     if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
-        return (Planes::new(motion.width, motion.height, mix::RESULT), None);
+        return (Planes::new(motion.width, motion.height, finish::RESULT), None);
     }
     let ladder = Ladder::new(options.ladder, PITCH);
     let base = mean_motion(motion);
     let grids = grids(simd, space, &ladder, motion, &base);
-    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
+    let mut fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
     let samples = ladder.scales.iter().zip(&fits);
     let samples = samples.map(|(s, f)| fit::samples(simd, space, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
-    let fitted = Fitted { fits, samples };
+    let fitted = Fitted { fits: &fits, samples };
     let means = region::regional_means(simd, space, options, &ladder, &fitted, data);
+    Field::keep(space, fitted.samples);
     let choice = choose::choose(simd, space, options, &ladder, &means);
 
-    let mut coarser: Option<Field<T>> = None;
-    for octave in (1..grids.len()).rev() {
-        let plain = plain(&ladder, &fitted, &choice, &grids[octave], octave, coarser.as_ref());
-        let complete = mix::collapse(simd, space, &plain);
-        Field::keep(space, coarser.replace(complete));
-    }
-
-    let wanted = edges::wanted(&choice);
-    let mut grown: Vec<Option<Field<T>>> = Vec::new();
-    for &l in &wanted {
-        let mut finer: Option<Field<T>> = None;
-        for octave in (0..ladder.scales[l].octave).rev() {
-            let next = grow::grow(simd, space, finer.as_ref().unwrap_or(&fitted.fits[l]), FIT, &grids[octave]);
-            Field::keep(space, finer.replace(next));
-        }
-        grown.push(finer);
-    }
-    let edges = wanted.iter().zip(&grown);
-    let edges = edges.map(|(&l, g)| {
-        let fits = g.as_ref().unwrap_or(&fitted.fits[l]);
-        edges::Edges::new(l, ladder.scales[l].sigma, PITCH, fits)
+    let plain_on = |octave: usize, coarser: Option<&Field<T>>| {
+        let rungs = ladder.scales.iter().zip(&fits).enumerate();
+        let rungs = rungs.filter(|(_, (s, _))| s.octave == octave).map(|(l, (s, f))| (l, s, f)).collect();
+        mix::mix(simd, space, &mix::Plain { choice: &choice, octave, rungs, coarser, grid: &grids[octave] })
+    };
+    let coarsest = grids.len() - 1;
+    let plain = (0..coarsest).rev().fold(plain_on(coarsest, None), |coarser, octave| {
+        let plain = plain_on(octave, Some(&coarser));
+        Field::keep(space, [coarser]);
+        plain
     });
-    let edges = edges.collect();
-    let plain = plain(&ladder, &fitted, &choice, &grids[0], 0, coarser.as_ref());
-    let out = mix::finish(simd, space, &mix::Final { plain, edges, options, base, pitch: PITCH });
-    Field::keep(space, coarser);
-    Field::keep(space, grown.into_iter().flatten().chain(fitted.fits).chain(fitted.samples).chain(grids));
-    (out, Some(Evidence::new(means, choice, options.ladder)))
-}
+    let last = finish::Last { choice: &choice, grid: &grids[0], plain: &plain, options };
 
-/// The windows of the grid `octave`, to complete what coarser grids have.
-fn plain<'a, T: SimdReal>(
-    ladder: &'a Ladder<T>,
-    fitted: &'a Fitted<T>,
-    choice: &'a Choice<T>,
-    grid: &'a Field<T>,
-    octave: usize,
-    coarser: Option<&'a Field<T>>,
-) -> mix::Plain<'a, T> {
-    let rungs = ladder.scales.iter().zip(&fitted.fits).enumerate();
-    let rungs = rungs.filter(|(_, (s, _))| s.octave == octave).map(|(l, (s, f))| (l, s, f)).collect();
-    mix::Plain { choice, octave, rungs, coarser, grid }
+    // One window after the other: each has planes of its own on the finest grid.
+    let wanted = edges::wanted(&choice);
+    let sums = (!wanted.is_empty()).then(|| {
+        let mut sums = finish::no_sums(space, &grids[0]);
+        for wanted in &wanted {
+            let scale = &ladder.scales[wanted.place];
+            for octave in (0..scale.octave).rev() {
+                let finer = grow::grow(simd, space, &fits[wanted.place], FIT, &grids[octave]);
+                Field::keep(space, [std::mem::replace(&mut fits[wanted.place], finer)]);
+            }
+            let edges = edges::Edges::new(wanted, scale.sigma, PITCH, &fits[wanted.place]);
+            finish::add(simd, &last, &edges, &mut sums);
+            Field::keep(space, fits[wanted.place].take());
+        }
+        sums
+    });
+    let out = finish::finish(simd, space, &last, sums.as_ref(), (&base, PITCH));
+    sums.into_iter().for_each(|sums| space.keep(sums));
+    Field::keep(space, fits.into_iter().chain(grids).chain([plain]));
+    (out, Some(Evidence::new(means, choice, options.ladder)))
 }
 
 /// The flow on every grid of the ladder, finest first, less the `base` motion.

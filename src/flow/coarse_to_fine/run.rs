@@ -66,12 +66,14 @@ fn estimate<T: SimdReal>(plan: &Plan, changes: bool, workspace: &mut Workspace<T
     let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, &data);
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::All), &motion, scale);
     locking.correct(simd, &mut motion);
-    let change = changes.then(|| {
+    let mut change = None;
+    if changes {
         locking.correct(simd, &mut coupled);
-        add_change(plan, workspace, &coupled, &mut motion)
-    });
-    workspace.space.keep(coupled);
-    Estimate { level: last, motion, data, range: plan.range, evidence, change: change.flatten(), locking }
+        change = add_change(plan, workspace, coupled, &mut motion);
+    } else {
+        workspace.space.keep(coupled);
+    }
+    Estimate { level: last, motion, data, range: plan.range, evidence, change, locking }
 }
 
 /// The motion on the sites of the finest level worked on, and what it rests on.

@@ -5,10 +5,12 @@
 //!
 //! Slopes are taken from the best of windows some steps wider: where the flow jumps, what windows make of the jump has a slope that no motion has, and reaches as far as they do.
 
-use super::choose::Choice;
+use super::choose::{Choice, Use};
 use super::field::{Field, RIM};
+use super::finish::chunk_of;
 use super::fit::FIT;
-use super::mix::{any, chunk_of};
+use super::grow::widen;
+use super::mix::any;
 use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT};
 use crate::simd::{Lanes, SimdReal};
 
@@ -19,11 +21,21 @@ const SOFT: f64 = 1e-4;
 /// Steps of the ladder from the windows that tell the flow to those that tell its slopes.
 const WIDER: usize = 2;
 
-/// The windows whose edge fits are used at any site.
-pub(super) fn wanted<T: SimdReal>(choice: &Choice<T>) -> Vec<usize> {
-    let flow: Vec<bool> = (0..choice.order.windows).map(|l| choice.wants_edges(l)).collect();
-    let slopes = |l: usize| (l >= WIDER && flow[l - WIDER]) || (l + 1 == choice.order.windows && flow.contains(&true));
-    (0..choice.order.windows).filter(|&l| flow[l] || slopes(l)).collect()
+/// A window whose edge fits are used at any site.
+pub(super) struct Wanted {
+    /// Which one of the ladder.
+    pub place: usize,
+    /// The narrower ones that it tells the slopes for.
+    slopes_of: Vec<usize>,
+}
+
+/// The windows whose edge fits are used at any site, for the flow or for slopes; what would need a window wider than the widest has that one.
+pub(super) fn wanted<T: SimdReal>(choice: &Choice<T>) -> Vec<Wanted> {
+    let windows = choice.order.windows;
+    let flow: Vec<bool> = (0..windows).map(|l| choice.wants_edges(l)).collect();
+    let slopes_of = |l: usize| (0..windows).filter(|&m| flow[m] && (m + WIDER).min(windows - 1) == l).collect();
+    let all = (0..windows).map(|place| Wanted { place, slopes_of: slopes_of(place) });
+    all.filter(|wanted| flow[wanted.place] || !wanted.slopes_of.is_empty()).collect()
 }
 
 /// One of the windows around a site.
@@ -37,16 +49,23 @@ struct Aside<T> {
 
 /// Edge fits of one window of the ladder.
 pub(super) struct Edges<'a, T> {
-    /// Which window of the ladder.
-    pub place: usize,
+    wanted: &'a Wanted,
     /// Single fits at the finest sites.
     fits: &'a Field<T>,
     windows: [Aside<T>; 9],
 }
 
+/// Lines of weights: of the flow, then of the slopes; and two to make them in.
+pub(super) struct Lines<T> {
+    flow: Vec<T>,
+    slopes: Vec<T>,
+    one: Vec<T>,
+    down: Vec<T>,
+}
+
 impl<'a, T: SimdReal> Edges<'a, T> {
-    /// For the window `place` of the ladder, of `sigma` px, on sites `pitch` px apart.
-    pub fn new(place: usize, sigma: f64, pitch: f64, fits: &'a Field<T>) -> Self {
+    /// For a window of `sigma` px, on sites `pitch` px apart.
+    pub fn new(wanted: &'a Wanted, sigma: f64, pitch: f64, fits: &'a Field<T>) -> Self {
         let aside = (ASIDE * sigma / pitch).min(RIM as f64);
         let (a, d) = (aside.round() as isize, (aside / std::f64::consts::SQRT_2).round() as isize);
         let around = [(0, 0), (a, 0), (-a, 0), (0, a), (0, -a), (d, d), (d, -d), (-d, d), (-d, -d)];
@@ -55,7 +74,7 @@ impl<'a, T: SimdReal> Edges<'a, T> {
             dx: T::from_f64(dx as f64 * pitch),
             dy: T::from_f64(dy as f64 * pitch),
         });
-        Self { place, fits, windows }
+        Self { wanted, fits, windows }
     }
 }
 
@@ -69,42 +88,41 @@ pub(super) struct Site<'a, T> {
     pub steps: &'a [T; CHUNK],
 }
 
-/// Adds what window `n` of `edges` has to say; `lines(n)`: the weights of the windows.
-#[inline(always)]
-pub(super) fn add<'a, V: Lanes<Scalar = T>, T: SimdReal>(
-    edges: &[Edges<'_, T>],
-    n: usize,
-    lines: impl Fn(usize) -> &'a [T; CHUNK],
-    site: &Site<'_, T>,
-    sums: &mut [[T; CHUNK]; 6],
-) {
-    // Windows are wanted together with those that are WIDER steps wider, so what these stand for is in the list.
-    let place = edges[n].place;
-    let is_last = n + 1 == edges.len();
-    let mut slopes = [T::from_f64(0.0); CHUNK];
-    for (m, narrow) in edges.iter().enumerate() {
-        if narrow.place + WIDER == place || (is_last && narrow.place + WIDER > place) {
-            slopes.iter_mut().zip(lines(m)).for_each(|(sum, weight)| *sum += *weight);
+impl<T: SimdReal> Edges<'_, T> {
+    /// Memory for weights.
+    pub fn lines(&self, stride: usize) -> Lines<T> {
+        let line = |n: usize| vec![T::from_f64(0.0); n * stride];
+        Lines { flow: line(2), slopes: line(2), one: line(2), down: line(1) }
+    }
+
+    /// The weights along row `y`.
+    #[inline(always)]
+    pub fn widen<V: Lanes<Scalar = T>>(&self, choice: &Choice<T>, y: usize, lines: &mut Lines<T>) {
+        let plane = |l: usize| choice.order.weight(Use::Edges, l);
+        widen::<V>(choice, plane(self.wanted.place), 0, y, &mut lines.down, &mut lines.flow);
+        lines.slopes.fill(T::from_f64(0.0));
+        for &narrow in &self.wanted.slopes_of {
+            widen::<V>(choice, plane(narrow), 0, y, &mut lines.down, &mut lines.one);
+            lines.slopes.iter_mut().zip(&lines.one).for_each(|(sum, weight)| *sum += *weight);
         }
     }
-    let flow = lines(n);
-    for ((slope, flow), step) in slopes.iter_mut().zip(flow).zip(site.steps) {
-        *slope = *flow + (*slope - *flow) * *step;
-    }
-    if any(flow) || any(&slopes) {
-        edges[n].add::<V>(site, [flow, &slopes], sums);
-    }
-}
 
-impl<T: SimdReal> Edges<'_, T> {
+    /// Adds what this window has to say at [`CHUNK`] sites to a row of sums.
+    #[inline(always)]
+    pub fn add<V: Lanes<Scalar = T>>(&self, site: &Site<'_, T>, lines: &Lines<T>, sums: &mut [T]) {
+        let flow = chunk_of(&lines.flow[site.x..]);
+        let mut slopes = *chunk_of(&lines.slopes[site.x..]);
+        for ((slope, flow), step) in slopes.iter_mut().zip(flow).zip(site.steps) {
+            *slope = *flow + (*slope - *flow) * *step;
+        }
+        if any(flow) || any(&slopes) {
+            self.add_fits::<V>(site, [flow, &slopes], &mut sums[LEFT + site.x..]);
+        }
+    }
+
     /// Adds weight times fit; the weights are those of the flow and of the slopes.
     #[inline(always)]
-    fn add<V: Lanes<Scalar = T>>(
-        &self,
-        site: &Site<'_, T>,
-        [flow, slopes]: [&[T; CHUNK]; 2],
-        sums: &mut [[T; CHUNK]; 6],
-    ) {
+    fn add_fits<V: Lanes<Scalar = T>>(&self, site: &Site<'_, T>, [flow, slopes]: [&[T; CHUNK]; 2], sums: &mut [T]) {
         let fits = self.fits;
         let at = fits.start(0, site.y as isize) + LEFT + site.x;
         // Cut to a known length here, so that the loop below has nothing to check.
@@ -136,7 +154,8 @@ impl<T: SimdReal> Edges<'_, T> {
             }
             let shares = [V::load(&flow[i..]) / total[0], V::load(&slopes[i..]) / total[1]];
             for k in 0..6 {
-                sum[k].mul_add(shares[usize::from(k >= 2)], V::load(&sums[k][i..])).store(&mut sums[k][i..]);
+                let line = &mut sums[k * fits.stride() + i..];
+                sum[k].mul_add(shares[usize::from(k >= 2)], V::load(line)).store(line);
             }
         }
     }

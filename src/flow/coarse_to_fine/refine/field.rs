@@ -30,6 +30,12 @@ impl<T: SimdReal> Field<T> {
         Self { planes: space.planes(width, height + 2 * RIM, count), width, height }
     }
 
+    /// The field itself; nothing is left.
+    pub fn take(&mut self) -> Option<Self> {
+        let planes = std::mem::take(&mut self.planes);
+        (planes.room() > 0).then_some(Self { planes, width: self.width, height: self.height })
+    }
+
     /// Gives the memory of fields back.
     pub fn keep(space: &Space<T>, fields: impl IntoIterator<Item = Self>) {
         fields.into_iter().for_each(|field| space.keep(field.planes));

@@ -1,28 +1,20 @@
-//! The windows' fits, mixed: plain fits where the flow is smooth, and across motion boundaries fits from windows that keep to one side.
+//! The windows' fits, mixed where the flow is smooth: grid by grid, the coarsest first.
 
-use super::Options;
 use super::choose::{Choice, Use};
-use super::edges::{self, Edges, Site};
 use super::field::{Beyond, Field};
 use super::fit::{FIT, LEAST, fit_row};
 use super::grow::{grow_row, widen};
 use super::ladder::{AGAIN, Scale, TERMS};
-use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
+use crate::flow::coarse_to_fine::grid::LEFT;
 use crate::flow::coarse_to_fine::memory::Space;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Shares of the edge fits below this count as none, so that calm places can pass them by.
-const SHUT: f64 = 0.2;
-/// Lines of weights before those of the edges' windows.
-const FIRST_EDGE: usize = 3;
 /// Least weight of the narrowest window of a coarse grid: interpolation to finer grids wants values everywhere.
 const LEAST_WEIGHT: f64 = 1e-3;
 /// What plain fits are used for.
 const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];
-/// Planes of the result: the motion, the window's sigma, the noise density.
-pub(super) const RESULT: usize = 8;
 
 /// The windows of one grid: place on the ladder, window, single fits.
 pub(super) type Rungs<'a, T> = Vec<(usize, &'a Scale<T>, &'a Field<T>)>;
@@ -168,13 +160,13 @@ pub(super) fn any<T: SimdReal>(weights: &[T]) -> bool {
     most > T::from_f64(0.0)
 }
 
-struct Collapse<'a, T> {
+struct Mix<'a, T> {
     plain: &'a Plain<'a, T>,
     rows: Range<usize>,
     out: &'a mut [T],
 }
 
-impl<T: SimdReal> Kernel<T> for Collapse<'_, T> {
+impl<T: SimdReal> Kernel<T> for Mix<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
@@ -185,121 +177,12 @@ impl<T: SimdReal> Kernel<T> for Collapse<'_, T> {
     }
 }
 
-/// The plain estimate of a coarse grid.
-pub(super) fn collapse<T: SimdReal>(simd: Level, space: &Space<T>, plain: &Plain<'_, T>) -> Field<T> {
+/// The plain estimate of a grid, in planes of [`FIT`].
+pub(super) fn mix<T: SimdReal>(simd: Level, space: &Space<T>, plain: &Plain<'_, T>) -> Field<T> {
     let mut out = Field::make(space, plain.grid.width, plain.grid.height, FIT);
     let len = out.row_len();
-    for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Collapse { plain, rows, out }));
+    for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Mix { plain, rows, out }));
     out.extend(0..2, Beyond::Odd, 2);
     out.extend(2..FIT, Beyond::Even, 2);
-    out
-}
-
-/// What the last step needs beside the plain estimate.
-pub(super) struct Final<'a, T> {
-    pub plain: Plain<'a, T>,
-    /// The windows whose edge fits are wanted.
-    pub edges: Vec<Edges<'a, T>>,
-    pub options: &'a Options,
-    /// Added to the result: u, v, then the slopes, about site (0, 0).
-    pub base: [f64; 6],
-    pub pitch: f64,
-}
-
-struct Finish<'a, T> {
-    job: &'a Final<'a, T>,
-    rows: Range<usize>,
-    out: &'a mut [T],
-}
-
-impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { job, rows, out } = self;
-        let (stride, choice) = (job.plain.grid.stride(), job.plain.choice);
-        let mut scratch = Scratch::new(stride);
-        let mut row = vec![T::from_f64(0.0); FIT * stride];
-        let mut weights = vec![T::from_f64(0.0); 2 * stride * (job.edges.len() + FIRST_EDGE)];
-        for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
-            job.plain.row::<V>(y, &mut scratch, &mut row);
-            let order = choice.order;
-            let planes = [order.density(), order.sigma(Use::Flow), order.sigma(Use::Edges)];
-            let planes = planes.into_iter().chain(job.edges.iter().map(|edge| order.weight(Use::Edges, edge.place)));
-            for (k, line) in planes.zip(weights.chunks_exact_mut(2 * stride)) {
-                widen::<V>(choice, k, 0, y, &mut scratch.down, line);
-            }
-            let mut x = 0;
-            while x < job.plain.grid.width {
-                job.chunk::<V>(x, y, &row, &weights, out);
-                x += CHUNK;
-            }
-        }
-    }
-}
-
-impl<T: SimdReal> Final<'_, T> {
-    /// The result at [`CHUNK`] sites from `x` on.
-    #[inline(always)]
-    fn chunk<V: Lanes<Scalar = T>>(&self, x: usize, y: usize, plain: &[T], weights: &[T], out: &mut [T]) {
-        let stride = self.plain.grid.stride();
-        let cube = V::constant(self.options.gate.powi(3));
-        let sixth = V::constant(self.options.step_gate.powi(6));
-        let (mut gates, mut steps) = ([T::from_f64(0.0); CHUNK], [T::from_f64(0.0); CHUNK]);
-        for i in (0..CHUNK).step_by(V::LANES) {
-            let misfit = V::load(&plain[(FIT - 1) * stride + LEFT + x + i..]).max(V::zero());
-            let third = misfit * misfit * misfit;
-            let gate = third / (third + cube);
-            ((gate - V::constant(SHUT)).max(V::zero()) * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates[i..]);
-            (third * third / third.mul_add(third, sixth)).store(&mut steps[i..]);
-        }
-        let mut sums = [[T::from_f64(0.0); CHUNK]; 6];
-        if any(&gates) {
-            let own = [0, 1].map(|k| chunk_of(&self.plain.grid.line(k, y as isize)[LEFT + x..]));
-            let site = Site { x, y, own, steps: &steps };
-            let lines = |n: usize| chunk_of(&weights[2 * stride * (FIRST_EDGE + n) + x..]);
-            for n in 0..self.edges.len() {
-                edges::add::<V, T>(&self.edges, n, lines, &site, &mut sums);
-            }
-        }
-        let slope = [self.base[2], self.base[3], self.base[4], self.base[5]].map(|b| b * self.pitch);
-        for i in (0..CHUNK).step_by(V::LANES) {
-            let at = LEFT + x + i;
-            let gate = V::load(&gates[i..]);
-            for (k, sum) in sums.iter().enumerate() {
-                let value = V::load(&plain[k * stride + at..]);
-                let mut value = (V::load(&sum[i..]) - value).mul_add(gate, value);
-                if k < 2 {
-                    let here = self.base[k] + slope[k] * (x + i) as f64 + slope[2 + k] * y as f64;
-                    value = value + V::constant(slope[k]).mul_add(V::load(&ramp::<T>()[..]), V::constant(here));
-                } else {
-                    value = value + V::constant(self.base[k]);
-                }
-                value.store(&mut out[k * stride + at..]);
-            }
-            let line = |n: usize| &weights[2 * n * stride + x + i..];
-            let (narrow, wide) = (V::load(line(1)), V::load(line(2)));
-            (wide - narrow).mul_add(gate, narrow).store(&mut out[6 * stride + at..]);
-            V::load(line(0)).store(&mut out[7 * stride + at..]);
-        }
-    }
-}
-
-#[inline(always)]
-pub(super) fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
-    values.first_chunk().expect("rows end with a rim")
-}
-
-/// 0, 1, 2, ...
-#[inline(always)]
-fn ramp<T: SimdReal>() -> [T; CHUNK] {
-    std::array::from_fn(|i| T::from_f64(i as f64))
-}
-
-/// The refined motion, with the window's sigma and the noise density: planes of [`RESULT`].
-pub(super) fn finish<T: SimdReal>(simd: Level, space: &Space<T>, job: &Final<'_, T>) -> Planes<T> {
-    let mut out = space.planes(job.plain.grid.width, job.plain.grid.height, RESULT);
-    let len = out.row_len();
-    for_each_band(out.data_mut(), len, |_, rows, out| dispatch(simd, Finish { job, rows, out }));
     out
 }

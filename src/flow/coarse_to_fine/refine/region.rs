@@ -63,9 +63,9 @@ struct Features<'a, T> {
 }
 
 /// Fields of every window of a ladder, finest first.
-pub(super) struct Fitted<T> {
+pub(super) struct Fitted<'a, T> {
     /// Planes of [`FIT`].
-    pub fits: Vec<Field<T>>,
+    pub fits: &'a [Field<T>],
     /// The smoothed flow on the window's own grid or, from the finest, at every second site.
     pub samples: Vec<Field<T>>,
 }
@@ -76,7 +76,7 @@ pub(super) fn regional_means<T: SimdReal>(
     space: &Space<T>,
     options: &Options,
     ladder: &Ladder<T>,
-    fitted: &Fitted<T>,
+    fitted: &Fitted<'_, T>,
     data: &Planes<T>,
 ) -> Planes<T> {
     let layout = Layout::new(options);
@@ -109,7 +109,7 @@ pub(super) fn regional_means<T: SimdReal>(
 fn collect<'a, T: SimdReal>(
     options: &Options,
     ladder: &Ladder<T>,
-    fitted: &'a Fitted<T>,
+    fitted: &'a Fitted<'_, T>,
     octave: usize,
 ) -> Features<'a, T> {
     let layout = Layout::new(options);

@@ -215,7 +215,7 @@ fn regional_levels_are_power_means() {
     let samples = ladder.scales.iter().zip(&fits);
     let samples =
         samples.map(|(s, f)| fit::samples(level, &Space::default(), f, s, if s.octave == 0 { 2 } else { 1 })).collect();
-    let fitted = Fitted { fits, samples };
+    let fitted = Fitted { fits: &fits, samples };
     let means = region::regional_means(level, &Space::default(), &options, &ladder, &fitted, &data);
     let (half_width, half_height) = (WIDTH.div_ceil(2), HEIGHT.div_ceil(2));
     let mean = |sigma: f64, x: usize, y: usize, f: &dyn Fn(usize, usize) -> f64| {

@@ -1,0 +1,178 @@
+//! The last step: across motion boundaries, fits from windows that keep to one side take over.
+
+use super::Options;
+use super::choose::{Choice, Use};
+use super::edges::{Edges, Site};
+use super::field::Field;
+use super::fit::FIT;
+use super::grow::widen;
+use super::mix::any;
+use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
+use crate::flow::coarse_to_fine::memory::Space;
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use std::ops::Range;
+
+/// Shares of the edge fits below this count as none, so that calm places can pass them by.
+const SHUT: f64 = 0.2;
+/// Planes of the sums over edge fits: the motion.
+const SUMS: usize = 6;
+/// Planes of the result: the motion, the window's sigma, the noise density.
+pub(super) const RESULT: usize = 8;
+
+/// What the last step rests on.
+pub(super) struct Last<'a, T> {
+    pub choice: &'a Choice<T>,
+    /// The flow on the finest grid.
+    pub grid: &'a Field<T>,
+    /// The plain estimate on the finest grid.
+    pub plain: &'a Field<T>,
+    pub options: &'a Options,
+}
+
+/// How far edge fits count at [`CHUNK`] sites, and how far slopes are those of wider ones.
+struct Gates<T> {
+    shares: [T; CHUNK],
+    steps: [T; CHUNK],
+}
+
+impl<T: SimdReal> Last<'_, T> {
+    /// From the relative misfit of the plain fits.
+    #[inline(always)]
+    fn gates<V: Lanes<Scalar = T>>(&self, x: usize, y: usize) -> Gates<T> {
+        let cube = V::constant(self.options.gate.powi(3));
+        let sixth = V::constant(self.options.step_gate.powi(6));
+        let misfits = &self.plain.line(FIT - 1, y as isize)[LEFT + x..];
+        let mut gates = Gates { shares: [T::from_f64(0.0); CHUNK], steps: [T::from_f64(0.0); CHUNK] };
+        for i in (0..CHUNK).step_by(V::LANES) {
+            let misfit = V::load(&misfits[i..]).max(V::zero());
+            let third = misfit * misfit * misfit;
+            let share = ((third / (third + cube)) - V::constant(SHUT)).max(V::zero());
+            (share * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates.shares[i..]);
+            (third * third / third.mul_add(third, sixth)).store(&mut gates.steps[i..]);
+        }
+        gates
+    }
+}
+
+/// Edge fits of one window, added along some rows.
+struct Add<'a, T> {
+    last: &'a Last<'a, T>,
+    edges: &'a Edges<'a, T>,
+    rows: Range<usize>,
+    sums: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Add<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { last, edges, rows, sums } = self;
+        let stride = last.grid.stride();
+        let mut lines = edges.lines(stride);
+        for (y, sums) in rows.zip(sums.chunks_exact_mut(SUMS * stride)) {
+            edges.widen::<V>(last.choice, y, &mut lines);
+            for x in (0..last.grid.width).step_by(CHUNK) {
+                let gates = last.gates::<V>(x, y);
+                if any(&gates.shares) {
+                    let own = [0, 1].map(|k| chunk_of(&last.grid.line(k, y as isize)[LEFT + x..]));
+                    edges.add::<V>(&Site { x, y, own, steps: &gates.steps }, &lines, sums);
+                }
+            }
+        }
+    }
+}
+
+/// The sums over edge fits, before the first of them is added.
+pub(super) fn no_sums<T: SimdReal>(space: &Space<T>, grid: &Field<T>) -> Planes<T> {
+    let mut sums = space.planes(grid.width, grid.height, SUMS);
+    sums.data_mut().fill(T::from_f64(0.0));
+    sums
+}
+
+/// Adds the edge fits of one window.
+pub(super) fn add<T: SimdReal>(simd: Level, last: &Last<'_, T>, edges: &Edges<'_, T>, sums: &mut Planes<T>) {
+    let len = sums.row_len();
+    for_each_band(sums.data_mut(), len, |_, rows, sums| dispatch(simd, Add { last, edges, rows, sums }));
+}
+
+/// Everything together.
+struct Finish<'a, T> {
+    last: &'a Last<'a, T>,
+    sums: Option<&'a Planes<T>>,
+    base: &'a [f64; 6],
+    pitch: f64,
+    rows: Range<usize>,
+    out: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { last, sums, base, pitch, rows, out } = self;
+        let (stride, order) = (last.grid.stride(), last.choice.order);
+        let slope = [base[2], base[3], base[4], base[5]].map(|b| b * pitch);
+        let mut lines = [0; 3].map(|_| vec![T::from_f64(0.0); 2 * stride]);
+        let mut down = vec![T::from_f64(0.0); stride];
+        for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
+            let planes = [order.density(), order.sigma(Use::Flow), order.sigma(Use::Edges)];
+            for (plane, line) in planes.into_iter().zip(&mut lines) {
+                widen::<V>(last.choice, plane, 0, y, &mut down, line);
+            }
+            let sums = sums.map(|sums| sums.row(y));
+            for x in (0..last.grid.width).step_by(CHUNK) {
+                let mut shares = [T::from_f64(0.0); CHUNK];
+                if sums.is_some() {
+                    shares = last.gates::<V>(x, y).shares;
+                }
+                for i in (0..CHUNK).step_by(V::LANES) {
+                    let at = LEFT + x + i;
+                    let share = V::load(&shares[i..]);
+                    for (k, base) in base.iter().enumerate() {
+                        let mut value = V::load(&last.plain.line(k, y as isize)[at..]);
+                        if let Some(sums) = sums {
+                            value = (V::load(&sums[k * stride + at..]) - value).mul_add(share, value);
+                        }
+                        let mut here = V::constant(*base);
+                        if k < 2 {
+                            let first = *base + slope[k] * (x + i) as f64 + slope[2 + k] * y as f64;
+                            here = V::constant(slope[k]).mul_add(V::load(&ramp::<T>()[..]), V::constant(first));
+                        }
+                        (value + here).store(&mut out[k * stride + at..]);
+                    }
+                    let [density, narrow, wide] = [0, 1, 2].map(|n: usize| V::load(&lines[n][x + i..]));
+                    (wide - narrow).mul_add(share, narrow).store(&mut out[6 * stride + at..]);
+                    density.store(&mut out[7 * stride + at..]);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
+    values.first_chunk().expect("rows end with a rim")
+}
+
+/// 0, 1, 2, ...
+#[inline(always)]
+fn ramp<T: SimdReal>() -> [T; CHUNK] {
+    std::array::from_fn(|i| T::from_f64(i as f64))
+}
+
+/// The refined motion, with the window's sigma and the noise density: planes of [`RESULT`]. `base` (u, v, then the slopes, about site (0, 0)) is added; sites are `pitch` px apart.
+pub(super) fn finish<T: SimdReal>(
+    simd: Level,
+    space: &Space<T>,
+    last: &Last<'_, T>,
+    sums: Option<&Planes<T>>,
+    (base, pitch): (&[f64; 6], f64),
+) -> Planes<T> {
+    let mut out = space.planes(last.grid.width, last.grid.height, RESULT);
+    let len = out.row_len();
+    for_each_band(out.data_mut(), len, |_, rows, out| {
+        dispatch(simd, Finish { last, sums, base, pitch, rows, out });
+    });
+    out
+}
