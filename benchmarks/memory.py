@@ -42,8 +42,12 @@ def frames(width: int, height: int) -> np.ndarray:
 
 def highest() -> float:
     """The most memory that this process has held so far, bytes."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak * (1.0 if sys.platform == "darwin" else 1024.0)
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024.0
+    except (OSError, StopIteration):
+        # May be that of the process that started this one.
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
 
 
 def measure(file: str, preset: str, count: int, covariance: bool) -> float:

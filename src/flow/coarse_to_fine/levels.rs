@@ -68,7 +68,7 @@ impl<T: SimdReal> Pyramid<T> {
 
     /// Samples that there is memory for, about.
     pub fn samples(&self) -> usize {
-        self.levels.iter().map(|level| (1 + level.splines.len()) * level.picture.data().len()).sum()
+        self.levels.iter().map(|level| (1 + level.splines.len()) * level.size.0 * level.size.1).sum()
     }
 
     /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px. Returns which is the finest that can be
@@ -110,6 +110,10 @@ impl<T: SimdReal> Pyramid<T> {
                     level.splines[n].refill(simd, &level.picture);
                 }
             }
+        }
+        // The largest is a whole plane, and of no more use.
+        if let Some(finest) = self.levels.first_mut() {
+            finest.picture = Frame::default();
         }
         last
     }

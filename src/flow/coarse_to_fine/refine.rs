@@ -39,6 +39,9 @@ use region::Fitted;
 /// Distance of the sites, px.
 pub(super) const PITCH: f64 = 2.0;
 
+/// The first windows of the ladder are too narrow for changes.
+const CHANGES: usize = 2;
+
 /// How motion is refined. Lengths are standard deviations of Gaussians, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Options {
@@ -71,13 +74,14 @@ pub(super) struct Options {
 impl Options {
     /// For what one step of the motion differs by from another, which is small and smooth or nothing.
     pub fn for_changes() -> Self {
-        let default = Self::default();
+        let Self { ladder, kappa, kappa_slopes, kappa_edge, .. } = Self::default();
         Self {
-            kappa: 2.0 * default.kappa,
-            kappa_slopes: 2.0 * default.kappa_slopes,
-            kappa_edge: 2.0 * default.kappa_edge,
+            ladder: ladder.get(CHANGES..).unwrap_or(ladder),
+            kappa: 2.0 * kappa,
+            kappa_slopes: 2.0 * kappa_slopes,
+            kappa_edge: 2.0 * kappa_edge,
             may_vanish: true,
-            ..default
+            ..Self::default()
         }
     }
 }
