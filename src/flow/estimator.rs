@@ -103,7 +103,7 @@ impl Estimator {
     /// `points` when those do not fit the frames.
     pub fn estimate<T: SimdReal>(&self, frames: &[&Frame<T>], first_index: usize) -> Result<FlowField<T>> {
         self.check(frames)?;
-        let mut field = FlowField::empty(self.layout(frames[0].size(), first_index), self.common.covariance)?;
+        let mut field = FlowField::unwritten(self.layout(frames[0].size(), first_index), self.common.covariance)?;
         self.fill(frames, &mut field)?;
         Ok(field)
     }
@@ -130,7 +130,7 @@ impl Estimator {
         if fits {
             field.layout = layout;
         } else {
-            *field = FlowField::empty(layout, self.common.covariance)?;
+            *field = FlowField::unwritten(layout, self.common.covariance)?;
         }
         self.fill(frames, field)
     }

@@ -61,13 +61,22 @@ impl<T: Real> FlowField<T> {
     /// # Errors
     /// As [`Sites::shape`].
     pub fn empty(layout: FieldLayout, covariance: bool) -> Result<Self> {
+        Self::of(layout, covariance, T::nan())
+    }
+
+    /// The same of zeros, for an estimator that writes every site: memory that is not written yet need not be there yet.
+    pub(crate) fn unwritten(layout: FieldLayout, covariance: bool) -> Result<Self> {
+        Self::of(layout, covariance, T::from_f64(0.0))
+    }
+
+    fn of(layout: FieldLayout, covariance: bool, value: T) -> Result<Self> {
         let (width, height) = layout.sites.shape(layout.frame_size)?;
         let (n, p) = (width * height, layout.parameters.len());
         Ok(Self {
             width,
             height,
-            motion: vec![T::nan(); p * n],
-            covariance: covariance.then(|| vec![T::nan(); p * (p + 1) / 2 * n]),
+            motion: vec![value; p * n],
+            covariance: covariance.then(|| vec![value; p * (p + 1) / 2 * n]),
             systematic: None,
             status: vec![Status::Border; n],
             residual: None,

@@ -50,6 +50,13 @@ pub(super) struct Workspace<T> {
 }
 
 impl<T: SimdReal> Workspace<T> {
+    /// Lets go of what is free, where there is much: results need memory of their own.
+    pub fn trim(&self) {
+        if self.bytes() > LIMIT {
+            lock(&self.space.free).clear();
+        }
+    }
+
     fn bytes(&self) -> usize {
         (self.pyramid.samples() + self.space.room()) * size_of::<T>()
     }

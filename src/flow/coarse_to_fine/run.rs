@@ -51,6 +51,7 @@ impl CoarseToFine {
             let plan = Plan { simd, effort, range, last };
             let changes = frames.len() == 3 && !self.options.central;
             let estimate = estimate(&plan, changes, &mut workspace);
+            workspace.trim();
             output::fill(&estimate, &workspace.space, frames, common, field);
             estimate.keep(&mut workspace);
             self.memory.give(workspace);
