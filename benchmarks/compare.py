@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow filter accuracy controlled coverage` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow memory filter accuracy controlled coverage` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "filter", "controlled", "coverage", "accuracy")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy")
 
 
 def main() -> None:
@@ -59,6 +59,12 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
 
         sizes = flow_speed.SIZES[:1] if quick else flow_speed.SIZES
         return {f"Flow per second, {width} x {height}": flow_speed.speed(rounds, width, height) for width, height in sizes}
+    if name == "memory":
+        import memory
+
+        width, height = (640, 480) if quick else (1920, 1080)
+        title = f"Peak of resident memory, planes of one 4-byte number per pixel, {width} x {height}"
+        return {title: list(memory.rows(width, height))}
     if name == "filter":
         import filter_speed
 

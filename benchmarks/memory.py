@@ -60,7 +60,7 @@ def measure(file: str, preset: str, count: int, covariance: bool) -> float:
     return (highest() - before) / (4.0 * given[0].size)
 
 
-def rows(width: int = 1920, height: int = 1080) -> Iterator[dict[str, object]]:
+def rows(width: int, height: int) -> Iterator[dict[str, object]]:
     """One row a preset and number of frames: planes without and with covariance, the result's among them."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frames.npy"

@@ -28,7 +28,6 @@ mod region;
 use super::grid::{LEFT, Planes};
 use super::memory::Space;
 use crate::simd::{Level, SimdReal};
-use choose::Choice;
 pub(super) use evidence::{Evidence, SPACING};
 use field::Field;
 use fit::{FIT, FLOW};
@@ -164,7 +163,9 @@ pub(super) fn refine<T: SimdReal>(
         sums
     });
     let out = finish::finish(simd, space, &last, sums.as_ref(), (&base, PITCH));
-    sums.into_iter().for_each(|sums| space.keep(sums));
+    if let Some(sums) = sums {
+        space.keep(sums);
+    }
     Field::keep(space, fits.into_iter().chain(grids).chain([plain]));
     (out, Some(Evidence::new(means, choice, options.ladder)))
 }

@@ -116,9 +116,6 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     }
 
     /// `integral H^2` and `integral w_x^2 H^2`, over those of the Gaussian alone.
-    const FLOW: f64 = 73.0 / 30.0;
-    const SLOPE: f64 = 3511.0 / 900.0;
-
     /// What is left at a place.
     pub fn at(&self, x: usize, y: usize) -> Left {
         let energy = match self.energy {

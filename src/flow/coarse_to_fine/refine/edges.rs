@@ -78,6 +78,14 @@ impl<'a, T: SimdReal> Edges<'a, T> {
     }
 }
 
+impl<T: SimdReal> Lines<T> {
+    /// For grids of so many samples from a plane's row to the next plane's.
+    pub fn new(stride: usize) -> Self {
+        let line = |n: usize| vec![T::from_f64(0.0); n * stride];
+        Self { flow: line(2), slopes: line(2), one: line(2), down: line(1) }
+    }
+}
+
 /// [`CHUNK`] sites of a row.
 pub(super) struct Site<'a, T> {
     pub x: usize,
@@ -89,12 +97,6 @@ pub(super) struct Site<'a, T> {
 }
 
 impl<T: SimdReal> Edges<'_, T> {
-    /// Memory for weights.
-    pub fn lines(&self, stride: usize) -> Lines<T> {
-        let line = |n: usize| vec![T::from_f64(0.0); n * stride];
-        Lines { flow: line(2), slopes: line(2), one: line(2), down: line(1) }
-    }
-
     /// The weights along row `y`.
     #[inline(always)]
     pub fn widen<V: Lanes<Scalar = T>>(&self, choice: &Choice<T>, y: usize, lines: &mut Lines<T>) {

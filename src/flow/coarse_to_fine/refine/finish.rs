@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::choose::{Choice, Use};
-use super::edges::{Edges, Site};
+use super::edges::{Edges, Lines, Site};
 use super::field::Field;
 use super::fit::FIT;
 use super::grow::widen;
@@ -69,7 +69,7 @@ impl<T: SimdReal> Kernel<T> for Add<'_, T> {
     fn run<V: Lanes<Scalar = T>>(self) {
         let Self { last, edges, rows, sums } = self;
         let stride = last.grid.stride();
-        let mut lines = edges.lines(stride);
+        let mut lines = Lines::new(stride);
         for (y, sums) in rows.zip(sums.chunks_exact_mut(SUMS * stride)) {
             edges.widen::<V>(last.choice, y, &mut lines);
             for x in (0..last.grid.width).step_by(CHUNK) {

@@ -51,7 +51,7 @@ impl<T: SimdReal> Plain<'_, T> {
     #[inline(always)]
     fn row<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
         let stride = self.grid.stride();
-        self.from_coarser::<V>(y, scratch, out);
+        self.take_coarser::<V>(y, scratch, out);
         for (n, (l, scale, fits)) in self.rungs.iter().enumerate() {
             let least = if n == 0 && self.octave > 0 { LEAST_WEIGHT } else { 0.0 };
             if !self.weigh::<V>(*l, y, least, scratch) {
@@ -70,7 +70,7 @@ impl<T: SimdReal> Plain<'_, T> {
 
     /// What coarser grids have, with the weight of all their windows.
     #[inline(always)]
-    fn from_coarser<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
+    fn take_coarser<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
         let Self { choice, octave, coarser, grid, .. } = self;
         let (width, stride) = (grid.width, grid.stride());
         let Some(coarser) = coarser else {
