@@ -54,7 +54,7 @@ impl Preset {
                 last: 0,
                 iterations: [3, 5, 5],
                 ahead: [2, 3, 4],
-                settled: 0.013,
+                settled: 0.023,
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
             },
             Self::Accurate => Effort {

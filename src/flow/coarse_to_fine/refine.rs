@@ -147,10 +147,9 @@ pub(super) fn refine<T: SimdReal>(
     let last = finish::Last { choice: &choice, grid: &grids[0], plain: &plain, options };
 
     // One window after the other: each has planes of its own on the finest grid.
-    let wanted = edges::wanted(&choice);
-    let sums = (!wanted.is_empty()).then(|| {
+    let sums = last.is_broken().then(|| {
         let mut sums = finish::no_sums(space, &grids[0]);
-        for wanted in &wanted {
+        for wanted in &edges::wanted(&choice) {
             let scale = &ladder.scales[wanted.place];
             for octave in (0..scale.octave).rev() {
                 let finer = grow::grow(simd, space, &fits[wanted.place], FIT, &grids[octave]);

@@ -23,11 +23,11 @@ pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.4;
+const FLOW_NOISE: f64 = 1.3;
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.6;
+const SLOPE_NOISE: f64 = 0.57;
 /// Errors over what bent motion loses, in the flow and in the slopes.
-const BENDING: bending::Shares = bending::Shares { fixed: [0.33, 0.63], chosen: [0.14, 0.74] };
+const BENDING: bending::Shares = bending::Shares { fixed: [0.33, 0.63], chosen: [0.14, 0.71] };
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.

@@ -37,6 +37,14 @@ struct Gates<T> {
 }
 
 impl<T: SimdReal> Last<'_, T> {
+    /// Whether edge fits count anywhere.
+    pub fn is_broken(&self) -> bool {
+        // The relative misfit whose share is [`SHUT`].
+        let least = T::from_f64(self.options.gate * (SHUT / (1.0 - SHUT)).cbrt());
+        let misfits = |y: usize| &self.plain.line(FIT - 1, y as isize)[LEFT..LEFT + self.grid.width];
+        (0..self.grid.height).any(|y| misfits(y).iter().fold(false, |found, misfit| found | (*misfit > least)))
+    }
+
     /// From the relative misfit of the plain fits.
     #[inline(always)]
     fn gates<V: Lanes<Scalar = T>>(&self, x: usize, y: usize) -> Gates<T> {
