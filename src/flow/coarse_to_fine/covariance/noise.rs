@@ -66,7 +66,7 @@ pub(super) struct Left {
 /// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
 const UNSEEN: f64 = 0.5;
 
-/// Shares of one window, and of the frame's edges.
+/// What the frame's edges add to the noise that windows leave.
 struct Edges {
     /// For each window and each place along an axis: the factor of means and of slopes along the edge, and that of slopes across it.
     factors: Vec<Vec<[f64; 2]>>,
@@ -115,7 +115,6 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
-    /// `integral H^2` and `integral w_x^2 H^2`, over those of the Gaussian alone.
     /// What is left at a place.
     pub fn at(&self, x: usize, y: usize) -> Left {
         let energy = match self.energy {

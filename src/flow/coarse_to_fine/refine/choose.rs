@@ -42,7 +42,7 @@ impl Use {
     }
 }
 
-/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on coarser grids, for each grid, and the mean sigma, px; then the misfits times weights, and the noise density.
+/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on coarser grids, for each grid, and the mean sigma, px; then the weights of the flow over the windows' regional misfits, and the noise density.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Order {
     pub windows: usize,

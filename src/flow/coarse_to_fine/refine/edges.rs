@@ -14,7 +14,7 @@ use super::mix::any;
 use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT};
 use crate::simd::{Lanes, SimdReal};
 
-/// Distance of the eight windows from the site, in units of sigma.
+/// Distance of the eight windows from the site, in units of sigma; never beyond the rim.
 const ASIDE: f64 = 1.5;
 /// Variance added to what a window is judged by, px^2.
 const SOFT: f64 = 1e-4;
