@@ -15,6 +15,8 @@ use std::ops::Range;
 
 /// Shares of the edge fits below this count as none, so that calm places can pass them by.
 const SHUT: f64 = 0.2;
+/// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for single precision.
+const WHOLE: f64 = 1e5;
 /// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
 /// Planes of the result: the motion, the window's sigma, the noise density.
@@ -42,7 +44,7 @@ impl<T: SimdReal> Last<'_, T> {
         // The relative misfit whose share is [`SHUT`].
         let least = T::from_f64(self.options.gate * (SHUT / (1.0 - SHUT)).cbrt());
         let misfits = |y: usize| &self.plain.line(FIT - 1, y as isize)[LEFT..LEFT + self.grid.width];
-        (0..self.grid.height).any(|y| misfits(y).iter().fold(false, |found, misfit| found | (*misfit > least)))
+        (0..self.grid.height).any(|y| misfits(y).iter().any(|misfit| *misfit > least))
     }
 
     /// From the relative misfit of the plain fits.
@@ -53,7 +55,7 @@ impl<T: SimdReal> Last<'_, T> {
         let misfits = &self.plain.line(FIT - 1, y as isize)[LEFT + x..];
         let mut gates = Gates { shares: [T::from_f64(0.0); CHUNK], steps: [T::from_f64(0.0); CHUNK] };
         for i in (0..CHUNK).step_by(V::LANES) {
-            let misfit = V::load(&misfits[i..]).max(V::zero());
+            let misfit = V::load(&misfits[i..]).max(V::zero()).min(V::constant(WHOLE));
             let third = misfit * misfit * misfit;
             let share = ((third / (third + cube)) - V::constant(SHUT)).max(V::zero());
             (share * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates.shares[i..]);
