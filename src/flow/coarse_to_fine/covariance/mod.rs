@@ -23,7 +23,7 @@ pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.4;
+const FLOW_NOISE: f64 = 1.37;
 /// The same for the slopes.
 const SLOPE_NOISE: f64 = 0.57;
 /// Errors over what bent motion loses, in the flow and in the slopes.
