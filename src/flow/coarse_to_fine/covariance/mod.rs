@@ -27,7 +27,7 @@ const FLOW_NOISE: f64 = 1.37;
 /// The same for the slopes.
 const SLOPE_NOISE: f64 = 0.57;
 /// Errors over what bent motion loses, in the flow and in the slopes.
-const BENDING: bending::Shares = bending::Shares { fixed: [0.33, 0.63], chosen: [0.14, 0.71] };
+const BENDING: bending::Shares = bending::Shares { fixed: [0.36, 0.63], chosen: [0.14, 0.71] };
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.
