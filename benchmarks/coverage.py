@@ -1,6 +1,6 @@
 """How often 95 % intervals hold the truth: u, v, divergence and curl of the coarse-to-fine estimate on made scenes and on recordings.
 
-    python benchmarks/coverage.py [--held-out] [--seeds 1 2] [--frames 2 3] [--preset balanced] [--data FOLDER]
+    python benchmarks/coverage.py [--held-out] [--border] [--seeds 1 2] [--frames 2 3] [--preset balanced] [--data FOLDER]
 
 The scenes `FITTED` are those that the covariance's constants were fitted on; `HELD_OUT` differ in seed, size, texture, motion and noise, and were not.
 """
@@ -125,13 +125,13 @@ def held(found: jacoflow.FlowField, flow: Array, jacobian: Array, where: NDArray
     return shares
 
 
-def scene_rows(plan: Plan, seeds: list[int], count: int, preset: str) -> Iterator[Row]:
-    """One row a family: shares over all its noise levels and seeds, then the worst and the best of its single scenes."""
+def scene_rows(plan: Plan, seeds: list[int], count: int, preset: str, border: bool = False) -> Iterator[Row]:
+    """One row a family: shares over all its noise levels and seeds, then the worst and the best of its single scenes; `border`: of the margin alone."""
     for family in plan.families:
         shares = []
         for noise, seed in itertools.product(plan.noises, seeds):
             frames, truth = family.frames(plan.size, noise, seed, count)
-            where = inside(truth.flow.shape[:2], MARGIN)
+            where = inside(truth.flow.shape[:2], MARGIN) ^ border
             shares.append(held(estimate(frames, preset), truth.flow, truth.jacobian, where))
         row: Row = {"scene": family.name, "frames": count}
         for name in QUANTITIES:
@@ -149,11 +149,11 @@ def summary(rows: list[Row], title: str) -> Row:
     return {"scene": title, **means, "as_asked": f"{good} of {values.size} within {ASKED[0]:g}-{ASKED[1]:g}, all {values.min():.2f}-{values.max():.2f}"}
 
 
-def table(plan: Plan, seeds: list[int], frames: list[int], preset: str = "balanced") -> list[Row]:
+def table(plan: Plan, seeds: list[int], frames: list[int], preset: str = "balanced", border: bool = False) -> list[Row]:
     """All families, and the mean."""
     rows: list[Row] = []
     for count in frames:
-        own = list(scene_rows(plan, seeds, count, preset))
+        own = list(scene_rows(plan, seeds, count, preset, border))
         rows += [summary(own, f"all, {count} frames"), *own]
     return rows
 
@@ -191,6 +191,7 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--held-out", action="store_true", help="the scenes that the constants were not fitted on")
+    parser.add_argument("--border", action="store_true", help=f"only the outermost {MARGIN} px, which the other tables leave out")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--frames", type=int, nargs="+", default=[2, 3])
     parser.add_argument("--preset", default="balanced")
@@ -199,7 +200,7 @@ def main() -> None:
     if options.data is not None:
         rows = recordings(options.data, options.preset)
     else:
-        rows = table(HELD_OUT if options.held_out else FITTED, options.seeds, options.frames, options.preset)
+        rows = table(HELD_OUT if options.held_out else FITTED, options.seeds, options.frames, options.preset, options.border)
     print("\n".join(compare.table_lines(rows)))
 
 

@@ -143,7 +143,7 @@ impl Default for CoarseToFineOptions {
 }
 
 /// Smallest width and height of a pyramid level, px.
-pub const LEAST_SIDE: usize = 12;
+pub const LEAST_SIDE: usize = 8;
 /// Most pyramid levels.
 const MOST_LEVELS: usize = 12;
 

@@ -83,13 +83,14 @@ fn solve<V: Lanes>(motion: &[V; MOTION], [a, b]: [V; 2]) -> [V; 2] {
     [V::select(open, x, a), V::select(open, y, b)]
 }
 
-/// Where a coordinate lies among `count` sites: the site before it, the distance from there (px), and the next site's share. Beyond the last site its own
+/// Where a coordinate lies among `count` sites: the site before it, the lever of that site's slope (px), and the next site's share. Beyond the last site its own
 /// model goes on.
 #[inline(always)]
 fn split<V: Lanes>(at: V, count: usize) -> (V, V, V) {
     let site = (at * V::constant(1.0 / STEP)).max(V::zero()).min(V::constant(count as f64 - 1.0));
     let first = site.floor().min(V::constant(count.saturating_sub(2) as f64));
-    (first, first.neg_mul_add(V::constant(STEP), at), site - first)
+    let (share, beyond) = (site - first, site.neg_mul_add(V::constant(STEP), at));
+    (first, share.mul_add(V::constant(0.5 * STEP), beyond), share)
 }
 
 /// As [`motion_at`](super::resample::motion_at), a place a lane.
@@ -101,7 +102,7 @@ fn blend<V: Lanes>(motion: &Planes<V::Scalar>, x: V, y: V) -> [V; MOTION] {
     let starts = starts(column, row, len);
     // A single row or column has no other; its share is zero.
     let below = if motion.height > 1 { len } else { 0 };
-    let (one, step) = (V::constant(1.0), V::constant(STEP));
+    let (one, half) = (V::constant(1.0), V::constant(0.5 * STEP));
     let mut sum = [V::zero(); MOTION];
     for corner in 0..4 {
         let (right, down) = (corner % 2, corner / 2);
@@ -109,8 +110,8 @@ fn blend<V: Lanes>(motion: &Planes<V::Scalar>, x: V, y: V) -> [V; MOTION] {
         for (k, m) in m.iter_mut().enumerate() {
             *m = gather(motion.data(), &starts, k * stride + LEFT + right + down * below);
         }
-        let (dx, weight_x) = if right == 0 { (dx, one - share_x) } else { (dx - step, share_x) };
-        let (dy, weight_y) = if down == 0 { (dy, one - share_y) } else { (dy - step, share_y) };
+        let (dx, weight_x) = if right == 0 { (dx, one - share_x) } else { (dx - half, share_x) };
+        let (dy, weight_y) = if down == 0 { (dy, one - share_y) } else { (dy - half, share_y) };
         let weight = weight_x * weight_y;
         m[0] = m[2].mul_add(dx, m[4].mul_add(dy, m[0]));
         m[1] = m[3].mul_add(dx, m[5].mul_add(dy, m[1]));

@@ -28,7 +28,7 @@ mod region;
 use super::grid::{LEFT, Planes};
 use super::memory::Space;
 use crate::simd::{Level, SimdReal};
-pub(super) use evidence::{Evidence, SPACING};
+pub(super) use evidence::{Evidence, SPACING, places};
 use field::Field;
 use fit::{FIT, FLOW};
 use ladder::Ladder;
@@ -110,7 +110,7 @@ pub(super) const SIGMA: usize = 6;
 
 /// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the summary of the last data term.
 ///
-/// Eight planes: the motion, [`SIGMA`], the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
+/// Eight planes: the motion, the mean sigma, the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
 /// Bit-identical for any number of threads. With them comes what the choice of windows rested on, if there was one.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
@@ -166,7 +166,7 @@ pub(super) fn refine<T: SimdReal>(
         space.keep(sums);
     }
     Field::keep(space, fits.into_iter().chain(grids).chain([plain]));
-    (out, Some(Evidence::new(means, choice, options.ladder)))
+    (out, Some(Evidence::new(means, choice, ((motion.width, motion.height), options.ladder))))
 }
 
 /// The flow on every grid of the ladder, finest first, less the `base` motion.

@@ -9,26 +9,27 @@ use rayon::prelude::*;
 /// Rows of one task.
 const ROWS: usize = 32;
 
-/// The affine motions of the sites around a place, each carried there, blended by their distance.
+/// The affine motions of the sites around a place, each carried there with half its lever, blended by their distance: exact where slopes turn evenly.
 ///
 /// `(x, y)`: in px of the level whose sites are `step` px apart; beyond the last site its own model goes on.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
     let split = |at: f64, count: usize| {
-        let at = (at / step).clamp(0.0, (count - 1) as f64);
-        let first = (at as usize).min(count.saturating_sub(2));
-        (first, at - first as f64)
+        let site = (at / step).clamp(0.0, (count - 1) as f64);
+        let first = (site as usize).min(count.saturating_sub(2));
+        let share = site - first as f64;
+        (first, share, 0.5 * share * step + (at - site * step))
     };
-    let ((i, fx), (j, fy)) = (split(x, motion.width), split(y, motion.height));
+    let ((i, fx, lever_x), (j, fy, lever_y)) = (split(x, motion.width), split(y, motion.height));
     let stride = motion.stride();
     let mut blend = [0.0; MOTION];
-    for (row, weight_y) in [(j, 1.0 - fy), (j + 1, fy)] {
+    for (row, weight_y, dy) in [(j, 1.0 - fy, lever_y), (j + 1, fy, lever_y - 0.5 * step)] {
         if weight_y == 0.0 {
             continue;
         }
-        let (values, dy) = (&motion.row(row)[LEFT..], y - row as f64 * step);
-        for (column, weight_x) in [(i, 1.0 - fx), (i + 1, fx)] {
+        let values = &motion.row(row)[LEFT..];
+        for (column, weight_x, dx) in [(i, 1.0 - fx, lever_x), (i + 1, fx, lever_x - 0.5 * step)] {
             let m: [f64; MOTION] = std::array::from_fn(|k| values[k * stride + column].to_f64());
-            let (weight, dx) = (weight_x * weight_y, x - column as f64 * step);
+            let weight = weight_x * weight_y;
             blend[0] += weight * (m[0] + m[2] * dx + m[4] * dy);
             blend[1] += weight * (m[1] + m[3] * dx + m[5] * dy);
             for k in 2..MOTION {

@@ -25,23 +25,23 @@ impl<T: SimdReal> RowReader<T> {
         &self.pixels[k * self.width..(k + 1) * self.width]
     }
 
-    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites their models, carried to the pixel, are averaged.
+    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites parabolas that have their values and the turn of their slopes.
     #[inline(always)]
     pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
         self.read(motion, y);
-        let (half, one) = (T::from_f64(0.5), T::from_f64(1.0));
+        let quarter = T::from_f64(0.25);
         let n = motion.width;
         if y % 2 == 1 {
-            // What the slopes along y add: half their difference between the rows, all of it beyond the last.
+            // What the slopes along y add: a quarter of their difference between the rows; beyond the last all of it.
             let (above, below) = (y / 2, y / 2 + 1);
             for c in 0..2 {
                 let (first, flow) = (motion.line(4 + c, above), &mut self.sites[c * n..(c + 1) * n]);
                 if below < motion.height {
                     for ((out, &a), &b) in flow.iter_mut().zip(first).zip(motion.line(4 + c, below)) {
-                        *out += half * (a - b);
+                        *out += quarter * (a - b);
                     }
                 } else {
-                    flow.iter_mut().zip(first).for_each(|(out, &a)| *out += one * a);
+                    flow.iter_mut().zip(first).for_each(|(out, &a)| *out += a);
                 }
             }
         }
@@ -66,10 +66,10 @@ impl<T: SimdReal> RowReader<T> {
     }
 }
 
-/// Pixels of a row from its sites; with the slopes of the sites' models, between two sites both are carried to the middle.
+/// Pixels of a row from its sites; with their slopes those of the parabola that has the values of both and turns as they say.
 #[inline(always)]
 fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
-    let half = T::from_f64(0.5);
+    let (half, quarter) = (T::from_f64(0.5), T::from_f64(0.25));
     let last = sites.len() - 1;
     let (inner, rim) = pixels.split_at_mut((2 * last).min(pixels.len()));
     let (here, next) = (&sites[..last], &sites[1..]);
@@ -82,7 +82,7 @@ fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
         Some(slopes) => {
             let slopes = slopes[..last].iter().zip(&slopes[1..]);
             for (((pair, &a), &b), (&p, &q)) in inner.chunks_exact_mut(2).zip(here).zip(next).zip(slopes) {
-                (pair[0], pair[1]) = (a, half * ((a + b) + (p - q)));
+                (pair[0], pair[1]) = (a, half * (a + b) + quarter * (p - q));
             }
         }
     }

@@ -90,7 +90,7 @@ macro_rules! define_estimate {
         /// Parameters
         /// ----------
         /// frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
-        ///     Oldest first, one size, at least 3 x 3 px.
+        ///     Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than 5 px wide or high).
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
         ///     "coarse_to_fine" (default): the transported equations with a pyramid, warping and robust coupling of neighbours, for motions of many pixels, edges and
         ///     untextured areas; its deviations hold on made scenes and are too small on many recordings (docs/theory.md). "windowed": least squares of the same equations in one

@@ -6,6 +6,7 @@
 use super::super::grid::Planes;
 use super::super::refine::{PITCH, SPACING};
 use super::Entries;
+use super::spread::Places;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
@@ -15,27 +16,25 @@ type Square = [[f64; 6]; 6];
 pub(super) fn to_first_frame<T: SimdReal>(
     places: &[Entries],
     motion: &Planes<T>,
-    size: (usize, usize),
+    axes: (Places, Places),
 ) -> Vec<Entries> {
+    let last = (motion.width - 1, motion.height - 1);
     (0..places.len())
         .map(|n| {
-            let (x, y) = (n % size.0, n / size.0);
+            let (x, y) = (n % axes.0.count, n / axes.0.count);
             let m = super::bending::motion_at(motion, (x, y));
+            let place = |n: usize, last: usize| (SPACING * n).min(last) as f64 / SPACING as f64;
             let half_way = 0.5 / (PITCH * SPACING as f64);
-            let there = blend(places, size, x as f64 + half_way * m[0], y as f64 + half_way * m[1]);
+            let there = blend(places, axes, place(x, last.0) + half_way * m[0], place(y, last.1) + half_way * m[1]);
             folded(&m).map_or(there, |inverse| transformed(&there, &inverse))
         })
         .collect()
 }
 
 /// Linear between the places, constant beyond.
-fn blend(places: &[Entries], (width, height): (usize, usize), x: f64, y: f64) -> Entries {
-    let split = |at: f64, count: usize| {
-        let at = at.clamp(0.0, (count - 1) as f64);
-        (at as usize, (at as usize + 1).min(count - 1), at.fract())
-    };
-    let ((left, right, fx), (above, below, fy)) = (split(x, width), split(y, height));
-    let at = |x: usize, y: usize| &places[y * width + x];
+fn blend(places: &[Entries], (along, across): (Places, Places), x: f64, y: f64) -> Entries {
+    let ((left, right, fx), (above, below, fy)) = (along.around(x), across.around(y));
+    let at = |x: usize, y: usize| &places[y * along.count + x];
     let (a, b, c, d) = (at(left, above), at(right, above), at(left, below), at(right, below));
     std::array::from_fn(|k| (1.0 - fy) * ((1.0 - fx) * a[k] + fx * b[k]) + fy * ((1.0 - fx) * c[k] + fx * d[k]))
 }

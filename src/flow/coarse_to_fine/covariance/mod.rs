@@ -5,6 +5,7 @@
 //! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is read from how much the flow changes from window to window.
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
+//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame it is that of seen sites, continued; the field itself tells how fast it departs from that.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
 //! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
 //!
@@ -12,7 +13,9 @@
 
 mod bending;
 mod carry;
+mod extrapolation;
 mod noise;
+mod seen;
 mod spread;
 
 use super::locking::Locking;
@@ -23,11 +26,11 @@ pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.37;
+const FLOW_NOISE: f64 = 1.15;
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.57;
+const SLOPE_NOISE: f64 = 0.55;
 /// Errors over what bent motion loses, in the flow and in the slopes.
-const BENDING: bending::Shares = bending::Shares { fixed: [0.36, 0.63], chosen: [0.14, 0.71] };
+const BENDING: bending::Shares = bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] };
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.
@@ -49,11 +52,14 @@ type Entries = [f64; ENTRIES];
 pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, carried: bool) -> Spread<T> {
     let Some(evidence) = &estimate.evidence else { return Spread::default() };
     let (width, height) = evidence.size();
-    let noise = noise::Noise::new(evidence, &estimate.data, energy, carried);
+    let axes = (spread::Places::of(estimate.motion.width), spread::Places::of(estimate.motion.height));
+    let seen = seen::Seen::new(&estimate.data, (width, height));
+    let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, &seen);
+    let data = (&estimate.data, &seen);
+    let noise = noise::Noise::new(evidence, data, energy, carried);
     let change = estimate.change.as_ref();
-    let change = change.map(|evidence| {
-        noise::Noise::new(evidence, &estimate.data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise)
-    });
+    let change = change
+        .map(|evidence| noise::Noise::new(evidence, data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise));
     let mut places = bending::bending(&estimate.motion, evidence, BENDING);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
@@ -62,15 +68,16 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, ca
         if let Some(change) = &change {
             add_noise(place, &change.at(at.0, at.1), CHANGE);
         }
+        extrapolation.add(place, seen.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
         add_locking(place, &motion, &estimate.locking);
         if !carried {
             add_acceleration(place, &motion);
         }
     }
     if carried {
-        places = carry::to_first_frame(&places, &estimate.motion, (width, height));
+        places = carry::to_first_frame(&places, &estimate.motion, axes);
     }
-    Spread::new(&places, (width, height), estimate.level)
+    Spread::new(&places, axes, estimate.level)
 }
 
 /// Adds noise of the density times its share in the flow and in the derivatives along x and y.

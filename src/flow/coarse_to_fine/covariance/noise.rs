@@ -11,11 +11,13 @@
 //! flow changes by noise, over that of white noise of unit density. The geometric mean of this excess over the frame is well determined, a single place's is not.
 //!
 //! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to fifteen times the variance, slopes across it twenty-four times. These are
-//! the factors of white noise drawn and smoothed, as functions of the distance over the window.
+//! the factors of white noise drawn and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge has been continued with slopes as noisy as those of the
+//! data's windows.
 
 use super::super::data::SEEN;
 use super::super::grid::Planes;
-use super::super::refine::{Evidence, PITCH, SPACING, TERMS};
+use super::super::refine::{Evidence, SPACING, TERMS};
+use super::seen::{Edge, Seen};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 
@@ -26,6 +28,12 @@ const EXCESS: [f64; 2] = [0.5, 50.0];
 const PAIR_GRADIENT: f64 = 52.25 / 8.25 * 0.25 * HIDDEN;
 const TRIPLE_GRADIENT: f64 = 52.25 / 8.25 * 0.75 * HIDDEN;
 const HIDDEN: f64 = 1.5;
+/// Width of an unseen strip, px, that doubles the variance at its edge of the frame: of means and of slopes.
+const STRIP: [f64; 2] = [3.5, 4.0];
+/// Wider strips are as uncertain as this one, px; what they are continued by tells the rest.
+const MOST_STRIP: f64 = 16.0;
+/// Windows at whose edge nothing more is felt.
+const FAR: f64 = 2.5;
 /// Share of the information that is believed in any case.
 const LEAST_LEFT: f64 = 1e-3;
 /// Least weight of wider windows at a place that counts.
@@ -66,23 +74,14 @@ pub(super) struct Left {
 /// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
 const UNSEEN: f64 = 0.5;
 
-/// What the frame's edges add to the noise that windows leave.
-struct Edges {
-    /// For each window and each place along an axis: the factor of means and of slopes along the edge, and that of slopes across it.
-    factors: Vec<Vec<[f64; 2]>>,
-}
-
-impl Edges {
-    /// For an axis of `places` and `sites`.
-    fn new(sigmas: &[f64], places: usize, sites: usize) -> Self {
-        let last = PITCH * (sites - 1) as f64;
-        let factor = |sigma: f64, n: usize| {
-            let at = (PITCH * (SPACING * n) as f64).min(last);
-            let t = at.min(last - at) / sigma;
-            [1.0 + 14.0 * (-2.1 * t - 3.6 * t * t).exp(), 1.0 + 22.7 * (-(t / 0.74).powi(2)).exp()]
-        };
-        Self { factors: sigmas.iter().map(|&s| (0..places).map(|n| factor(s, n)).collect()).collect() }
+/// What an edge of the frame adds to the noise that a window leaves: the factor of means and of slopes along the edge, and that of slopes across it.
+fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
+    let t = edge.distance / sigma;
+    if t > FAR {
+        return [1.0; 2];
     }
+    let [means, slopes] = STRIP.map(|unit| 1.0 + (edge.strip.min(MOST_STRIP) / unit).powi(2));
+    [1.0 + 14.0 * means * (-2.1 * t - 3.6 * t * t).exp(), 1.0 + 22.7 * slopes * (-(t / 0.74).powi(2)).exp()]
 }
 
 /// The noise of one estimate.
@@ -92,21 +91,18 @@ pub(super) struct Noise<'a, T> {
     excess: f64,
     /// Information, in any direction, that white noise seems to have, over the residual energy it leaves.
     gradient: f64,
-    columns: Edges,
-    rows: Edges,
+    seen: &'a Seen,
 }
 
 impl<'a, T: SimdReal> Noise<'a, T> {
     /// For the estimate's last data term.
-    pub fn new(evidence: &'a Evidence<T>, data: &Planes<T>, energy: Energy, is_pair: bool) -> Self {
-        let (width, height) = evidence.size();
+    pub fn new(evidence: &'a Evidence<T>, (data, seen): (&Planes<T>, &'a Seen), energy: Energy, is_pair: bool) -> Self {
         Self {
             evidence,
             energy,
             excess: excess(evidence, data),
             gradient: if is_pair { PAIR_GRADIENT } else { TRIPLE_GRADIENT },
-            columns: Edges::new(evidence.sigmas, width, data.width),
-            rows: Edges::new(evidence.sigmas, height, data.height),
+            seen,
         }
     }
 
@@ -132,7 +128,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
             let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
             let (flow, slope) = (flow_share / (4.0 * PI * sigma.powi(2)), slope_share / (8.0 * PI * sigma.powi(4)));
-            let ([mean_x, across_x], [mean_y, across_y]) = (self.columns.factors[l][x], self.rows.factors[l][y]);
+            let [[mean_x, across_x], [mean_y, across_y]] = self.seen.edges(x, y).map(|edge| at_edge(&edge, *sigma));
             left.flow += weight[0] * flow * mean_x * mean_y;
             left.slopes[0] += weight[1] * slope * across_x * mean_y;
             left.slopes[1] += weight[1] * slope * mean_x * across_y;

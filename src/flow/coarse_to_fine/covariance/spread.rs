@@ -1,7 +1,7 @@
 //! From the places of the covariance to pixels.
 
 use super::super::grid::Planes;
-use super::super::refine::{PITCH, SPACING};
+use super::super::refine::{PITCH, SPACING, places};
 use super::Entries;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
@@ -9,45 +9,67 @@ use crate::simd::SimdReal;
 /// Pixels of the level of the estimate from one place to the next.
 const STEP: usize = SPACING * PITCH as usize;
 
+/// The places along one axis. All are as far apart but the last two: the last one is where the last site is.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Places {
+    pub count: usize,
+    /// Where the last one is, in distances of the others.
+    end: f64,
+}
+
+impl Places {
+    /// For so many sites.
+    pub fn of(sites: usize) -> Self {
+        Self { count: places(sites), end: (sites - 1) as f64 / SPACING as f64 }
+    }
+
+    /// The places around a coordinate and the share of the second; beyond the last, that one alone.
+    pub fn around(&self, at: f64) -> (usize, usize, f64) {
+        let at = at.clamp(0.0, self.end);
+        let first = (at as usize).min(self.count.saturating_sub(2));
+        let length = self.length(first);
+        (first, (first + 1).min(self.count - 1), if length > 0.0 { (at - first as f64) / length } else { 0.0 })
+    }
+
+    /// From a place to the next.
+    fn length(&self, first: usize) -> f64 {
+        (self.end - first as f64).clamp(0.0, 1.0)
+    }
+}
+
 /// A covariance that is linear between places, hence positive definite where theirs is.
 #[derive(Debug, Default)]
 pub(in crate::flow::coarse_to_fine) struct Spread<T> {
     planes: Planes<T>,
+    along: Places,
+    across: Places,
     /// Pixels from one place to the next.
     step: usize,
 }
 
 impl<T: SimdReal> Spread<T> {
-    /// Of `size` places, row by row, of the given level of the pyramid: flow in pixels of the frame is so many times larger, slopes are the same.
-    pub(super) fn new(places: &[Entries], size: (usize, usize), level: usize) -> Self {
+    /// Of places, row by row, of the given level of the pyramid: flow in pixels of the frame is so many times larger, slopes are the same.
+    pub(super) fn new(places: &[Entries], (along, across): (Places, Places), level: usize) -> Self {
         let factor = f64::from(1 << level as u32);
         let mut scale = [0.0; ENTRIES];
         for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
             scale[upper(i, j)] = factor.powi(i32::from(i < 2) + i32::from(j < 2));
         }
-        let mut planes = Planes::new(size.0, size.1, ENTRIES);
-        for (y, row) in places.chunks_exact(size.0.max(1)).enumerate() {
+        let mut planes = Planes::new(along.count, across.count, ENTRIES);
+        for (y, row) in places.chunks_exact(along.count.max(1)).enumerate() {
             for k in 0..ENTRIES {
                 let line = planes.line_mut(k, y);
                 line.iter_mut().zip(row).for_each(|(out, place)| *out = T::from_f64(scale[k] * place[k]));
             }
         }
-        Self { planes, step: STEP << level }
-    }
-
-    /// The places above and below row `y` and the share of the lower ones.
-    fn rows(&self, y: usize) -> (usize, usize, f64) {
-        let last = self.planes.height - 1;
-        let step = self.step;
-        ((y / step).min(last), (y / step + 1).min(last), (y % step) as f64 / step as f64)
+        Self { planes, along, across, step: STEP << level }
     }
 
     /// Entry `k` at a pixel.
     pub fn at(&self, k: usize, (x, y): (usize, usize)) -> T {
-        let (above, below, share) = self.rows(y);
-        let last = self.planes.width - 1;
-        let (left, right) = ((x / self.step).min(last), (x / self.step + 1).min(last));
-        let across = (x % self.step) as f64 / self.step as f64;
+        let place = |at: usize| at as f64 / self.step as f64;
+        let ((left, right, across), (above, below, share)) =
+            (self.along.around(place(x)), self.across.around(place(y)));
         let row = |y: usize| {
             let (a, b) = (self.planes.at(k, left, y).to_f64(), self.planes.at(k, right, y).to_f64());
             a + (b - a) * across
@@ -57,18 +79,21 @@ impl<T: SimdReal> Spread<T> {
 
     /// Entry `k` along row `y`, to the end of `out`; `places` is memory to work in.
     pub fn row(&self, k: usize, y: usize, places: &mut Vec<T>, out: &mut [T]) {
-        let (above, below, share) = self.rows(y);
+        let (above, below, share) = self.across.around(y as f64 / self.step as f64);
         let share = T::from_f64(share);
         places.clear();
         let (upper, lower) = (self.planes.line(k, above), self.planes.line(k, below));
         places.extend(upper.iter().zip(lower).map(|(&a, &b)| a + (b - a) * share));
-        places.extend(places.last().copied());
-        let share = T::from_f64(1.0 / self.step as f64);
-        for (pair, out) in places.windows(2).zip(out.chunks_mut(self.step)) {
-            let (first, rise) = (pair[0], (pair[1] - pair[0]) * share);
-            for (i, out) in out.iter_mut().enumerate() {
+        let last = places.len() - 1;
+        for (n, out) in out.chunks_mut(self.step).enumerate() {
+            let (first, next) = (places[n.min(last)], places[(n + 1).min(last)]);
+            let length = self.step as f64 * self.along.length(n);
+            let rise = (next - first) * T::from_f64(if length > 0.0 { 1.0 / length } else { 0.0 });
+            let (sloping, flat) = out.split_at_mut(out.len().min(length.ceil() as usize));
+            for (i, out) in sloping.iter_mut().enumerate() {
                 *out = first + rise * T::from_f64(i as f64);
             }
+            flat.fill(next);
         }
     }
 }
@@ -80,7 +105,8 @@ mod tests {
     #[test]
     fn rows_are_what_single_pixels_are() {
         let places: Vec<Entries> = (0..6).map(|n| std::array::from_fn(|k| ((n * n + 3 * k) as f64).cos())).collect();
-        let spread = Spread::<f64>::new(&places, (3, 2), 0);
+        // The last column is a single site after the one before, the last row three.
+        let spread = Spread::<f64>::new(&places, (Places::of(6), Places::of(4)), 0);
         let (mut memory, mut row) = (Vec::new(), [0.0; 22]);
         for y in 0..15 {
             for k in 0..ENTRIES {
@@ -91,6 +117,9 @@ mod tests {
             }
         }
         assert!((spread.at(0, (4, 0)) - 0.5 * (places[0][0] + places[1][0])).abs() < 1e-12);
-        assert_eq!(spread.at(5, (21, 14)), places[5][5]);
+        assert!((spread.at(0, (9, 0)) - 0.5 * (places[1][0] + places[2][0])).abs() < 1e-12);
+        for beyond in [(10, 6), (21, 14)] {
+            assert!((spread.at(5, beyond) - places[5][5]).abs() < 1e-12);
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The motion at every pixel: a blend of the neighbouring sites, each transported there by its own Jacobian.
+//! The motion at every pixel: between sites parabolas that have their values and the turn of their slopes.
 
 use super::super::grid::{LEFT as GRID_LEFT, Planes};
 use super::scratch::{Columns, LEFT};
@@ -46,11 +46,11 @@ fn site_row<V: Lanes>(
         along.copy_from_slice(ux);
     } else if y / 2 + 1 < motion.height {
         let [u2, ux2, uy2] = planes(y / 2 + 1);
-        let half = V::constant(0.5);
+        let (half, quarter) = (V::constant(0.5), V::constant(0.25));
         let mut at = 0;
         while at + V::LANES <= n {
-            let sum = (V::load(&u[at..]) + V::load(&u2[at..])) + (V::load(&uy[at..]) - V::load(&uy2[at..]));
-            (half * sum).store(&mut to[at..]);
+            let (sum, turn) = (V::load(&u[at..]) + V::load(&u2[at..]), V::load(&uy[at..]) - V::load(&uy2[at..]));
+            quarter.mul_add(turn, half * sum).store(&mut to[at..]);
             (half * (V::load(&ux[at..]) + V::load(&ux2[at..]))).store(&mut along[at..]);
             at += V::LANES;
         }
@@ -77,13 +77,13 @@ fn widen<V: Lanes>(n: usize, value: &[V::Scalar], slope: &[V::Scalar], even: &mu
     let (u, ux) = (&value[LEFT..LEFT + n], &slope[LEFT..LEFT + n]);
     let (next, next_slope) = (&value[LEFT + 1..=LEFT + n], &slope[LEFT + 1..=LEFT + n]);
     let (even, odd) = (&mut even[LEFT..LEFT + n], &mut odd[LEFT..LEFT + n]);
-    let half = V::constant(0.5);
+    let (half, quarter) = (V::constant(0.5), V::constant(0.25));
     let mut at = 0;
     while at + V::LANES <= n {
         let here = V::load(&u[at..]);
         here.store(&mut even[at..]);
-        let sum = (here + V::load(&next[at..])) + (V::load(&ux[at..]) - V::load(&next_slope[at..]));
-        (half * sum).store(&mut odd[at..]);
+        let turn = V::load(&ux[at..]) - V::load(&next_slope[at..]);
+        quarter.mul_add(turn, half * (here + V::load(&next[at..]))).store(&mut odd[at..]);
         at += V::LANES;
     }
 }

@@ -9,7 +9,7 @@ use crate::types::Mask;
 /// Residual energy, over that of the usual textured site, from which on frames contradict the motion.
 const CONTRADICTION: f64 = 10.0;
 /// Residual energy over information, px^2: where texture is strong, so are the errors of its interpolation, and a residual that a shift of this square explains is none.
-const EXPLAINED: f64 = 0.003;
+const EXPLAINED: f64 = 0.01;
 /// Share of the brightness' standard deviation that is never a residual.
 const LEAST: f64 = 4e-3;
 

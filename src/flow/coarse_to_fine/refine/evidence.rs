@@ -15,13 +15,15 @@ pub(in crate::flow::coarse_to_fine) struct Evidence<T> {
     means: Planes<T>,
     choice: Planes<T>,
     order: Order,
+    /// Sites of the motion along x and y.
+    sites: (usize, usize),
     /// Standard deviations of the windows, px.
     pub sigmas: &'static [f64],
 }
 
 impl<T: SimdReal> Evidence<T> {
-    pub(super) fn new(means: Planes<T>, choice: Choice<T>, sigmas: &'static [f64]) -> Self {
-        Self { means, choice: choice.planes, order: choice.order, sigmas }
+    pub(super) fn new(means: Planes<T>, choice: Choice<T>, (sites, sigmas): ((usize, usize), &'static [f64])) -> Self {
+        Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
     }
 
     /// The memory.
@@ -29,29 +31,44 @@ impl<T: SimdReal> Evidence<T> {
         [self.means, self.choice]
     }
 
-    /// Places along x and y.
+    /// Places along x and y, [`SPACING`] sites apart; the last ones are those of the last sites, however near to the ones before.
     pub fn size(&self) -> (usize, usize) {
-        (self.means.width, self.means.height)
+        (places(self.sites.0), places(self.sites.1))
     }
 
     /// Regional information `P_uu, P_uv, P_vv`, grey^2/px^2.
     pub fn information(&self, x: usize, y: usize) -> [f64; 3] {
-        [0, 1, 2].map(|k| self.means.at(k, x, y).to_f64())
+        [0, 1, 2].map(|k| at(&self.means, k, x, y))
     }
 
     /// Regional residual energy, grey^2.
     pub fn energy(&self, x: usize, y: usize) -> f64 {
-        self.means.at(Layout::ENERGY, x, y).to_f64().powi(4)
+        at(&self.means, Layout::ENERGY, x, y).powi(4)
     }
 
     /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field vanishes.
     pub fn weights(&self, l: usize, x: usize, y: usize) -> [f64; 2] {
-        [Use::Flow, Use::Slopes].map(|of| self.choice.at(self.order.weight(of, l), x, y).to_f64())
+        [Use::Flow, Use::Slopes].map(|of| at(&self.choice, self.order.weight(of, l), x, y))
+    }
+
+    /// Mean standard deviations of the windows of the flow and of the slopes, px.
+    pub fn mean_sigmas(&self, x: usize, y: usize) -> [f64; 2] {
+        let weights = self.sigmas.iter().enumerate().map(|(l, sigma)| self.weights(l, x, y).map(|w| w * sigma));
+        weights.fold([0.0; 2], |sum, w| [sum[0] + w[0], sum[1] + w[1]])
     }
 
     /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit density: a density, px^4.
     pub fn change(&self, l: usize, x: usize, y: usize) -> f64 {
-        self.means.at(Layout::change(l), x, y).to_f64().powi(4)
-            / difference_variance(self.sigmas[l], self.sigmas[l + 1])
+        at(&self.means, Layout::change(l), x, y).powi(4) / difference_variance(self.sigmas[l], self.sigmas[l + 1])
     }
+}
+
+/// How many places there are along so many sites.
+pub(in crate::flow::coarse_to_fine) fn places(sites: usize) -> usize {
+    (sites - 1).div_ceil(SPACING) + 1
+}
+
+/// At a place; what the grid of regional means does not reach goes on as it ends.
+fn at<T: SimdReal>(planes: &Planes<T>, k: usize, x: usize, y: usize) -> f64 {
+    planes.at(k, x.min(planes.width - 1), y.min(planes.height - 1)).to_f64()
 }

@@ -17,6 +17,9 @@ use std::ops::Range;
 const SHUT: f64 = 0.2;
 /// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for single precision.
 const WHOLE: f64 = 1e5;
+/// What the windows of the data and of the coupling, the same everywhere, smooth away: so much of the Laplacian of the flow and of its slopes, sites^2 (1 px^2 and somewhat less: at motion boundaries
+/// slopes lose more by it than they gain elsewhere).
+const SMOOTHED: [f64; 2] = [0.25, 0.2];
 /// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
 /// Planes of the result: the motion, the window's sigma, the noise density.
@@ -62,6 +65,18 @@ impl<T: SimdReal> Last<'_, T> {
             (third * third / third.mul_add(third, sixth)).store(&mut gates.steps[i..]);
         }
         gates
+    }
+
+    /// Plane `k` of the plain estimate without the smoothing that is the same everywhere, as far as edge fits do not count: beside a step there is no smooth flow to be restored.
+    #[inline(always)]
+    fn sharpened<V: Lanes<Scalar = T>>(&self, k: usize, (at, y): (usize, usize), share: V) -> V {
+        let [above, here, below] = [-1, 0, 1].map(|step| self.plain.line(k, y as isize + step));
+        let value = V::load(&here[at..]);
+        let around =
+            V::load(&here[at - 1..]) + V::load(&here[at + 1..]) + V::load(&above[at..]) + V::load(&below[at..]);
+        let laplacian = value.mul_add(V::constant(-4.0), around);
+        let smoothed = V::constant(SMOOTHED[usize::from(k >= 2)]);
+        ((V::constant(1.0) - share) * smoothed).neg_mul_add(laplacian, value)
     }
 }
 
@@ -140,7 +155,7 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
                     let at = LEFT + x + i;
                     let share = V::load(&shares[i..]);
                     for (k, base) in base.iter().enumerate() {
-                        let mut value = V::load(&last.plain.line(k, y as isize)[at..]);
+                        let mut value = last.sharpened(k, (at, y), share);
                         if let Some(sums) = sums {
                             value = (V::load(&sums[k * stride + at..]) - value).mul_add(share, value);
                         }

@@ -1,0 +1,117 @@
+//! What motion differs by from its affine continuation: the error of sites without data.
+//!
+//! The field itself tells. Over a distance `d`, as far as it is seen, `e_u(d) = u(p + d) - u(p) - M(p) d` and `e_M(d) = M(p + d) - M(p)` are measured along both axes; their mean squares are the variances of
+//! motion that is continued by `d`. They are taken from mean absolute values, as of Gaussian errors, so that the few pairs of places across a motion boundary do not tell for all others.
+
+use super::super::grid::Planes;
+use super::super::refine::{Evidence, PITCH, SPACING};
+use super::seen::Seen;
+use super::{Entries, bending};
+use crate::flow::windowed::solve::upper;
+use crate::simd::SimdReal;
+use std::f64::consts::FRAC_PI_2;
+
+/// Distances that are measured, places; each twice the one before.
+const STEPS: [usize; 4] = [1, 2, 4, 8];
+
+/// Windows at the edge see one side: their motion is that of half a deviation further in, continued.
+const ONE_SIDED: f64 = 0.5;
+/// The widest of them, px: wider ones are only chosen where nothing bends.
+const WIDEST: f64 = 8.0;
+/// Deviation of the windows of the data and of the coupling, px.
+const FIXED: f64 = 2.0;
+
+/// How far motion is continued, px, at a signed distance from the edge of the seen by windows of `sigma` px.
+fn continued(distance: f64, sigma: f64) -> f64 {
+    let reach = sigma.min(WIDEST) + FIXED;
+    let inner = distance.max(0.0) / reach;
+    (-distance).max(0.0) + ONE_SIDED * reach * (-2.0 * inner * inner).exp()
+}
+
+/// Variances of continued motion.
+pub(super) struct Extrapolation {
+    /// Of the flow, px^2, and of the slopes, at each of [`STEPS`].
+    variances: [[f64; 2]; STEPS.len()],
+}
+
+impl Extrapolation {
+    pub fn new<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>, seen: &Seen) -> Self {
+        let (width, height) = evidence.size();
+        let places: Vec<Option<[f64; 6]>> = (0..width * height)
+            .map(|n| (n % width, n / width))
+            .map(|(x, y)| (seen.beyond(x, y) == 0.0).then(|| bending::motion_at(motion, (x, y))))
+            .collect();
+        let mut variances = [[0.0; 2]; STEPS.len()];
+        for (n, step) in STEPS.into_iter().enumerate() {
+            let mut sums = [0.0; 3];
+            for (at, here) in places.iter().enumerate() {
+                let Some(here) = here else { continue };
+                let (x, y) = (at % width, at / width);
+                // The last places are nearer to the ones before.
+                let along = (x + step + 1 < width).then(|| (places[at + step], 2));
+                let across = (y + step + 1 < height).then(|| (places[at + step * width], 4));
+                for (there, slope) in along.into_iter().chain(across) {
+                    let Some(there) = there else { continue };
+                    let distance = PITCH * (SPACING * step) as f64;
+                    for k in 0..2 {
+                        // Forth and back, so that neither end is preferred.
+                        let turn = there[k] - here[k];
+                        sums[0] +=
+                            (turn - distance * here[slope + k]).abs() + (turn - distance * there[slope + k]).abs();
+                    }
+                    sums[1] += (2..6).map(|k| (there[k] - here[k]).abs()).sum::<f64>();
+                    sums[2] += 4.0;
+                }
+            }
+            if sums[2] > 0.0 {
+                variances[n] = [0, 1].map(|k| FRAC_PI_2 * (sums[k] / sums[2]).powi(2));
+            }
+            if n > 0 {
+                // The farther, the less is known; small frames have no far places.
+                variances[n] = [0, 1].map(|k| variances[n][k].max(variances[n - 1][k]));
+            }
+        }
+        Self { variances }
+    }
+
+    /// Adds them at a place so far (px, along both axes) from the edge of the seen; `sigmas`: of the windows that flow and slopes have there, px.
+    pub fn add(&self, place: &mut Entries, distances: [f64; 2], sigmas: [f64; 2]) {
+        for (kind, (sigma, entries)) in sigmas.into_iter().zip([0..2, 2..6]).enumerate() {
+            let [x, y] = distances.map(|d| continued(d, sigma));
+            let variance = self.variance(kind, x.hypot(y));
+            entries.for_each(|k| place[upper(k, k)] += variance);
+        }
+    }
+
+    /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one, and between them; constant beyond the last.
+    fn variance(&self, kind: usize, distance: f64) -> f64 {
+        let (mut from, mut least) = (0.0, 0.0);
+        for (step, variances) in STEPS.into_iter().zip(&self.variances) {
+            let to = PITCH * (SPACING * step) as f64;
+            if distance < to {
+                let share = (distance * distance - from * from) / (to * to - from * from);
+                return least + share * (variances[kind] - least);
+            }
+            (from, least) = (to, variances[kind]);
+        }
+        least
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curved_motion_differs_by_its_curvature_and_less_so_nearer() {
+        let from = |variance: f64| [variance, 0.1 * variance];
+        let e = Extrapolation { variances: [1.0, 4.0, 9.0, 16.0].map(from) };
+        assert_eq!(e.variance(0, 0.0), 0.0);
+        assert_eq!((e.variance(0, 4.0), e.variance(1, 8.0), e.variance(0, 1e4)), (0.25, 0.1, 16.0));
+        let mut place = [0.0; crate::flow::windowed::solve::ENTRIES];
+        e.add(&mut place, [f64::INFINITY, 100.0], [3.0, 4.0]);
+        assert!(place.iter().all(|entry| *entry < 1e-30));
+        e.add(&mut place, [-20.0, 100.0], [3.0, 4.0]);
+        assert!(place[upper(0, 0)] > 4.0 && place[upper(5, 5)] > 0.4 && place[upper(0, 1)] == 0.0);
+    }
+}
