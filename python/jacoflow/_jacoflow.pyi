@@ -147,6 +147,12 @@ class FlowField:
     def condition(self) -> _Floats | None:
         """Condition number of the equations (largest over smallest singular value), array (..., H, W); None if the method has none."""
     @property
+    def window(self) -> _Floats | None:
+        """Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+
+        Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times as wide, and bias of sixth order.
+        """
+    @property
     def divergence(self) -> NDArray[np.float64]:
         """Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
     @property
@@ -350,7 +356,7 @@ def estimate(
     covariance : bool
         Whether to compute the covariance of the parameters; default yes, where the method has one (not "horn_schunck").
     diagnostics : bool
-        Whether to report residual, rank and condition number.
+        Whether to report residual, rank and condition number, and the windows that "coarse_to_fine" chose.
     noise : float, grey levels
         Standard deviation of the pixel noise for the covariance; default from the frames.
     temporal : "none" or "recursive"

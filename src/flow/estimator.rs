@@ -200,6 +200,12 @@ impl Estimator {
         } else {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
+        let chooses = self.common.diagnostics && matches!(self.engine, Engine::CoarseToFine(_));
+        field.window = chooses.then(|| {
+            let mut plane = field.window.take().unwrap_or_default();
+            plane.resize(n, T::nan());
+            plane
+        });
         let tells = self.common.covariance && self.common.systematic && matches!(self.engine, Engine::Windowed(_));
         let entries = field.covariance.as_ref().map_or(0, Vec::len);
         field.systematic = tells.then(|| {

@@ -26,6 +26,8 @@ pub(super) struct FieldBand<'a, T> {
     pub rank: Option<&'a mut [u8]>,
     /// Condition number.
     pub condition: Option<&'a mut [T]>,
+    /// Window of the slopes.
+    pub window: Option<&'a mut [T]>,
 }
 
 /// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), never depending on the number of threads.
@@ -47,6 +49,7 @@ pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
     let mut residual = field.residual.as_mut().map(|r| r.chunks_mut(size));
     let mut rank = field.rank.as_mut().map(|r| r.chunks_mut(size));
     let mut condition = field.condition.as_mut().map(|r| r.chunks_mut(size));
+    let mut window = field.window.as_mut().map(|r| r.chunks_mut(size));
     (0..n.div_ceil(size))
         .map(|b| FieldBand {
             sites: b * size..((b + 1) * size).min(n),
@@ -57,6 +60,7 @@ pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
             residual: residual.as_mut().and_then(Iterator::next),
             rank: rank.as_mut().and_then(Iterator::next),
             condition: condition.as_mut().and_then(Iterator::next),
+            window: window.as_mut().and_then(Iterator::next),
         })
         .collect()
 }

@@ -182,6 +182,9 @@ fn write_arrays<T: Real + Element, W: Write + Seek>(
     if let Some(condition) = &field.condition {
         npz.array("condition", &[h, w], condition)?;
     }
+    if let Some(window) = &field.window {
+        npz.array("window", &[h, w], window)?;
+    }
     if let Sites::Points(points) = &field.layout.sites {
         let pairs: Vec<i64> = points.iter().flat_map(|&(x, y)| [x as i64, y as i64]).collect();
         npz.array("points", &[points.len(), 2], &pairs)?;
@@ -196,6 +199,7 @@ fn optional_arrays<T>(field: &FlowField<T>) -> Vec<String> {
         ("residual", field.residual.is_some()),
         ("rank", field.rank.is_some()),
         ("condition", field.condition.is_some()),
+        ("window", field.window.is_some()),
     ];
     present.into_iter().filter(|(_, present)| *present).map(|(name, _)| name.to_string()).collect()
 }
@@ -258,6 +262,7 @@ pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<
         systematic: None,
         residual: if npz.contains("residual") { Some(shape.planes(npz, "residual", None)?) } else { None },
         condition: if npz.contains("condition") { Some(shape.planes(npz, "condition", None)?) } else { None },
+        window: if npz.contains("window") { Some(shape.planes(npz, "window", None)?) } else { None },
         rank: if npz.contains("rank") { Some(shape.ranks(npz)?) } else { None },
         status: status.ok_or_else(|| npz.wrong("status", "holds an unknown code"))?,
         width,

@@ -53,6 +53,8 @@ pub struct FlowField<T> {
     pub rank: Option<Vec<u8>>,
     /// Condition number of the (column-scaled) equations: largest over smallest singular value.
     pub condition: Option<Vec<T>>,
+    /// Standard deviation, px, of the Gaussian window that the slopes rest on; only where the method chooses one at each site.
+    pub window: Option<Vec<T>>,
 }
 
 impl<T: Real> FlowField<T> {
@@ -82,6 +84,7 @@ impl<T: Real> FlowField<T> {
             residual: None,
             rank: None,
             condition: None,
+            window: None,
             layout,
         })
     }

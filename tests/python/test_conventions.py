@@ -13,7 +13,7 @@ from jacoflow import Status, scenes
 
 def planes(field):
     """Every array of a field."""
-    return [field.flow, field.jacobian, field.covariance, field.status, field.residual, field.rank, field.condition]
+    return [field.flow, field.jacobian, field.covariance, field.status, field.residual, field.rank, field.condition, field.window]
 
 
 def assert_same(one, other):

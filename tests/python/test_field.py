@@ -217,7 +217,7 @@ def test_files_round_trip(field, tmp_path, extension):
     assert_array_equal(back.valid, field.valid)
     if extension == "npz":
         assert back.flow.dtype == field.flow.dtype
-        for name in ("flow", "jacobian", "covariance", "status", "residual", "rank", "condition"):
+        for name in ("flow", "jacobian", "covariance", "status", "residual", "rank", "condition", "window"):
             assert_array_equal(getattr(back, name), getattr(field, name))
         assert np.load(path)["jacobian"].shape == (48, 56, 2, 2)
     else:

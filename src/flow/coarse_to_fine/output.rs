@@ -7,6 +7,7 @@ use super::data::{DataOptions, ENERGY, MOTION, UU, UV, VV};
 use super::grid::Planes;
 use super::memory::Space;
 use super::reference::at_first_frame;
+use super::refine::{Evidence, SPACING};
 use super::resample::{finer, motion_at};
 use super::rows::RowReader;
 use super::run::Estimate;
@@ -56,6 +57,7 @@ pub(super) fn fill<T: SimdReal>(
         observable: is_observable(estimate),
         consistency: Consistency::of(estimate),
         covariance: field.covariance.is_some().then(|| covariance(estimate, noise(), frames.len() == 2)),
+        evidence: estimate.evidence.as_ref(),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
@@ -102,6 +104,7 @@ struct Writer<'a, T: Clone> {
     observable: bool,
     consistency: Consistency,
     covariance: Option<Spread<T>>,
+    evidence: Option<&'a Evidence<T>>,
 }
 
 impl<T: SimdReal> Writer<'_, T> {
@@ -132,7 +135,7 @@ impl<T: SimdReal> Writer<'_, T> {
 
     /// Whether every pixel of row `y` has an estimate and nothing but that is wanted.
     fn is_plain(&self, y: usize, band: &FieldBand<'_, T>) -> bool {
-        let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none();
+        let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none() && band.window.is_none();
         // Without a short circuit, so that the compiler may use lanes.
         let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
         let agrees = !self.consistency.has_contradiction(y / self.pitch);
@@ -142,6 +145,9 @@ impl<T: SimdReal> Writer<'_, T> {
     /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
     fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
         let (x, y) = (x / self.pitch, y / self.pitch);
+        if let Some(window) = &mut band.window {
+            window[at] = self.evidence.filter(|_| known).map_or(T::nan(), |evidence| self.window_at(evidence, (x, y)));
+        }
         if let Some(residual) = &mut band.residual {
             let energy = self.data.at(ENERGY, x, y).to_f64().max(0.0);
             residual[at] = T::from_f64(if known { self.per_row * energy.sqrt() } else { f64::NAN });
@@ -155,6 +161,14 @@ impl<T: SimdReal> Writer<'_, T> {
             condition[at] =
                 T::from_f64(if known { ((middle + radius) / (middle - radius).max(0.0)).sqrt() } else { f64::NAN });
         }
+    }
+
+    /// The window of the slopes around a site, px of the frame: that of the nearest place where windows were chosen.
+    fn window_at(&self, evidence: &Evidence<T>, (x, y): (usize, usize)) -> T {
+        let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
+        let (columns, rows) = evidence.size();
+        let [_, slopes] = evidence.mean_sigmas(nearest(x, columns), nearest(y, rows));
+        T::from_f64(slopes * self.pitch as f64 / STEP)
     }
 
     /// What can be said of a pixel before looking at its motion.

@@ -131,6 +131,7 @@ fn estimate<T: SimdReal>(estimator: &Estimator, frames: &[&Frame<T>], first_inde
         residual: None,
         rank: None,
         condition: None,
+        window: None,
     };
     estimator.estimate_into(frames, first_index, &mut field)?;
     Ok(field)

@@ -143,7 +143,7 @@ macro_rules! define_estimate {
         /// covariance : bool
         ///     Whether to compute the covariance of the parameters; default yes, where the method has one (not "horn_schunck").
         /// diagnostics : bool
-        ///     Whether to report residual, rank and condition number.
+        ///     Whether to report residual, rank and condition number, and the windows that "coarse_to_fine" chose.
         /// noise : float, grey levels
         ///     Standard deviation of the pixel noise for the covariance; default from the frames.
         /// temporal : "none" or "recursive"

@@ -28,6 +28,8 @@ pub struct Packed<T: Real> {
     pub rank: Option<Vec<u8>>,
     /// `count` planes.
     pub condition: Option<Vec<T>>,
+    /// `count` planes.
+    pub window: Option<Vec<T>>,
 }
 
 impl<T: Real> Packed<T> {
@@ -44,6 +46,7 @@ impl<T: Real> Packed<T> {
             residual: field.residual,
             rank: field.rank,
             condition: field.condition,
+            window: field.window,
             layout: field.layout,
         }
     }
@@ -59,6 +62,7 @@ impl<T: Real> Packed<T> {
         extend(&mut self.residual, field.residual);
         extend(&mut self.rank, field.rank);
         extend(&mut self.condition, field.condition);
+        extend(&mut self.window, field.window);
         self.count += 1;
         Ok(())
     }
@@ -96,6 +100,7 @@ impl<T: Real> Packed<T> {
             residual: self.residual.as_deref().map(part),
             rank: self.rank.as_deref().map(|values| values[sites].to_vec()),
             condition: self.condition.as_deref().map(part),
+            window: self.window.as_deref().map(part),
         }
     }
 }

@@ -113,6 +113,14 @@ impl FlowField {
         each!(slf.get().store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
     }
 
+    /// Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+    ///
+    /// Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times as wide, and bias of sixth order.
+    #[getter]
+    fn window<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        each!(slf.get().store, packed => packed.window.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
+    }
+
     /// Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2).
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

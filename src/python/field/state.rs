@@ -24,7 +24,8 @@ pub fn save<'py>(field: &FlowField, py: Python<'py>) -> PyResult<Bound<'py, PyDi
         let shape = |total: usize| [field.count, total / (packed.count * width * height).max(1), height, width];
         state.set_item("motion", arrays::owned(py, &shape(packed.motion.len()), packed.motion[part(packed.motion.len())].to_vec())?)?;
         state.set_item("status", arrays::owned(py, &shape(packed.status.len()), packed.status[part(packed.status.len())].to_vec())?)?;
-        for (name, planes) in [("covariance", &packed.covariance), ("residual", &packed.residual), ("condition", &packed.condition)] {
+        let optional = [("covariance", &packed.covariance), ("residual", &packed.residual), ("condition", &packed.condition), ("window", &packed.window)];
+        for (name, planes) in optional {
             if let Some(planes) = planes {
                 state.set_item(name, arrays::owned(py, &shape(planes.len()), planes[part(planes.len())].to_vec())?)?;
             }
@@ -94,6 +95,7 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> PyResult<FlowField> {
         residual: plane(state, "residual", sites)?,
         rank: plane(state, "rank", sites)?,
         condition: plane(state, "condition", sites)?,
+        window: plane(state, "window", sites)?,
         layout,
     };
     if packed.status.iter().any(|&code| Status::from_code(code).is_none()) {
