@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import jacoflow
+import noise_bound
 
 Array = NDArray[np.floating]
 
@@ -27,11 +28,19 @@ class Setting:
     forward: bool = False
     """Whether three frames tell the step from the middle one to the next, and not the mean of both steps."""
     window: float | None = None
-    """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it has no single one."""
+    """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it chooses one at each pixel."""
 
     def field(self, frames: Sequence[NDArray[Any]], **more: Any) -> jacoflow.FlowField:
         """The estimate from two or three frames."""
         return jacoflow.estimate(frames, **{**self.options, **more})
+
+    def plain_windows(self, frames: Sequence[NDArray[Any]]) -> float | Array:
+        """Its window, or those it chose for the slopes, (H, W), px: the plain Gaussian ones as noisy as those of fourth order that it uses."""
+        if self.window is not None:
+            return self.window
+        chosen = self.field(frames, diagnostics=True).window
+        assert chosen is not None
+        return chosen.astype(float) * noise_bound.plain_window(slopes=True)
 
     def estimate(self, frames: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
         """Flow (H, W, 2) and Jacobian (H, W, 2, 2)."""

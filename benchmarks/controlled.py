@@ -27,7 +27,7 @@ SIZE = 256
 """Width and height of the frames, px."""
 MARGIN = 24
 """Left out along each side, px: what enters the frame has no counterpart."""
-RATIOS = ("end_point_gain", "jacobian_gain", "jacobian_gain_over_smoothed", "jacobian_over_bound")
+RATIOS = ("end_point_gain", "efficient_gain", "jacobian_gain", "jacobian_gain_over_smoothed", "jacobian_over_bound")
 
 
 @dataclass(frozen=True)
@@ -94,14 +94,14 @@ class Contestant:
     """When a pair's result is that of a pixel: 0 in the first frame, 0.5 halfway. A triple's: in the middle frame."""
     forward: bool = False
     """Whether a triple's result is the step to the next frame, and not the mean of both."""
-    window: float | None = None
-    """Standard deviation of its Gaussian window, px, for the noise bound."""
+    windows: Callable[[list[Picture]], float | Array] | None = None
+    """Standard deviation of its plain Gaussian window, px, for the noise bound: one, or (H, W)."""
 
     @classmethod
     def of(cls, setting: Setting) -> Contestant:
         """One of our settings."""
         moment = 0.0 if setting.frames == 3 else setting.moment
-        return cls(setting.name, setting.estimate, setting.frames, moment, setting.forward, setting.window)
+        return cls(setting.name, setting.estimate, setting.frames, moment, setting.forward, setting.plain_windows)
 
     def times(self) -> tuple[float, ...]:
         """Times of its frames."""
@@ -120,11 +120,18 @@ class Contestant:
         return (*end_point_error(flow, exact, where), jacobian_error(jacobian, slopes, where))
 
     def bound(self, case: Case) -> float | None:
-        """The least-squares noise bound of its window (see :mod:`noise_bound`), 1/frame."""
-        if self.window is None:
+        """The least-squares noise bound of its windows (see :mod:`noise_bound`), 1/frame."""
+        if self.windows is None:
             return None
         slopes = gradient(case.wavelength, case.speed, case.seed, self.moment)
-        return noise_bound.jacobian_bound(slopes, self.window, case.noise, inside(slopes.shape[:2], MARGIN), self.frames)
+        windows = self.windows([frame(case, t) for t in self.times()])
+        return noise_bound.jacobian_bound(slopes, windows, case.noise, inside(slopes.shape[:2], MARGIN), self.frames)
+
+    def efficient(self, case: Case) -> float:
+        """Mean end-point error, px, of an efficient estimate from as many frames in the best window (see :mod:`noise_bound`)."""
+        exact, _ = self.truth(case)
+        slopes = gradient(case.wavelength, case.speed, case.seed, self.moment)
+        return noise_bound.efficient_end_point_error(slopes, exact, case.noise, inside(exact.shape[:2], MARGIN), self.frames)
 
 
 def farneback(case: Case) -> Row:
@@ -143,9 +150,9 @@ def farneback(case: Case) -> Row:
 
 
 def row(case: Case, rival: dict[str, object], contestant: Contestant) -> Row:
-    """One scene: errors of both sides, how many times ours are smaller, and how far above the noise bound the Jacobian's is."""
+    """One scene: errors of both sides, how many times ours are smaller, how many times those of an efficient estimate are, and how far above the noise bound the Jacobian's is."""
     flow, share, slope = contestant.errors(case)
-    bound = contestant.bound(case)
+    bound, efficient = contestant.bound(case), contestant.efficient(case)
     gains = [float(str(rival[name])) for name in ("farneback_end_point_error", "farneback_jacobian_error", "smoothed_jacobian_error")]
     return {
         "wavelength": case.wavelength,
@@ -156,7 +163,9 @@ def row(case: Case, rival: dict[str, object], contestant: Contestant) -> Row:
         "share": share,
         "end_point_error": flow,
         "jacobian_error": slope,
+        "efficient_end_point_error": efficient,
         "end_point_gain": gains[0] / flow,
+        "efficient_gain": gains[0] / efficient,
         "jacobian_gain": gains[1] / slope,
         "jacobian_gain_over_smoothed": gains[2] / slope,
         "jacobian_bound": bound if bound is not None else "",

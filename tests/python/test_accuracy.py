@@ -23,12 +23,44 @@ FARNEBACK = {
 """Mean end-point error (px) and error of the Jacobian (1/frame) of OpenCV's Farneback with its defaults and `numpy.gradient`, as `benchmarks/controlled.py` prints them."""
 
 
+def contestant(name):
+    return controlled.Contestant.of(next(each for each in contestants.CONTROLLED if each.name == name))
+
+
 @pytest.mark.parametrize("case", FARNEBACK, ids=lambda case: f"{case.wavelength:g}-{case.speed:g}-{case.noise:g}")
 def test_three_frames_are_four_times_as_accurate(case):
-    balanced = next(each for each in contestants.CONTROLLED if each.name == "coarse to fine, balanced")
-    flow, share, jacobian = controlled.Contestant.of(balanced).errors(case)
+    flow, share, jacobian = contestant("coarse to fine, balanced").errors(case)
     theirs = FARNEBACK[case]
     assert share == 1.0 and flow < theirs[0] / 4 and jacobian < theirs[1] / 4
+
+
+@pytest.mark.parametrize("name", ["coarse to fine, balanced, pair", "coarse to fine, balanced"])
+@pytest.mark.parametrize("case", [controlled.Case(64.0, 1.0, 3.0), controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)], ids=str)
+def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(case, name):
+    """Least squares with exact gradients and nothing but noise would have the bound."""
+    ours = contestant(name)
+    _, _, error = ours.errors(case)
+    assert 1.0 < error / ours.bound(case) < 1.75
+
+
+def test_windows_follow_the_flow(tmp_path):
+    """They are wider for slower waves, a diagnostic that is told when asked for, and go to files."""
+    slow, quick = (jacoflow.estimate([controlled.frame(controlled.Case(wave, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True) for wave in (256.0, 64.0))
+    assert np.median(slow.window) > 2 * np.median(quick.window) > 10.0
+    assert 1.7 <= quick.window.min() and slow.window.max() <= 27.0 + 1e-4
+    slow.save(tmp_path / "slow.npz")
+    np.testing.assert_array_equal(jacoflow.FlowField.load(tmp_path / "slow.npz").window, slow.window)
+    part = jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True, points=[[40, 30]])
+    assert part.window[0] == quick.window[30, 40]
+    assert jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)]).window is None
+
+
+def test_two_frames_are_limited_by_noise():
+    """Where pairs are not four times as accurate as Farneback's flow, least squares in the best window is not either."""
+    case = controlled.Case(256.0, 1.0, 3.0)
+    ours = contestant("coarse to fine, balanced, pair")
+    efficient = ours.efficient(case)
+    assert FARNEBACK[case][0] / efficient < 4.0 and ours.errors(case)[0] < 1.2 * efficient
 
 
 @pytest.mark.parametrize("size", [(120, 160), (160, 200)])

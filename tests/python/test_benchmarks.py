@@ -62,6 +62,27 @@ def test_the_noise_bound_is_the_spread_of_least_squares():
     assert noise_bound.jacobian_bound(gradient, window, noise, where) == pytest.approx(np.sqrt(np.diagonal(bound)[2:].mean()))
 
 
+def test_windows_of_fourth_order_are_as_noisy_as_narrower_plain_ones():
+    """White noise through both, on the sites of a grid."""
+    from scipy.ndimage import gaussian_filter
+
+    white, sigma = np.random.default_rng(1).standard_normal((600, 600)), 6.0
+    fourth = sum(term * gaussian_filter(white, np.sqrt(n) * sigma, mode="wrap") for n, term in enumerate(noise_bound.TERMS, 1))
+    flow, slope = (gaussian_filter(white, sigma * noise_bound.plain_window(slopes), mode="wrap") for slopes in (False, True))
+    assert flow.std() == pytest.approx(fourth.std(), rel=0.05)
+    assert np.gradient(slope, axis=0).std() == pytest.approx(np.gradient(fourth, axis=0).std(), rel=0.05)
+
+
+def test_the_bound_of_varying_windows_is_that_of_each():
+    rng = np.random.default_rng(2)
+    gradient = rng.normal(size=(50, 50, 2)) * 6
+    where = np.zeros((50, 50), bool)
+    where[25, 20:30] = True
+    windows = np.broadcast_to(np.linspace(2.0, 6.0, 50), (50, 50))
+    each = [noise_bound.jacobian_bound(gradient, float(windows[25, x]), 1.0, np.arange(2500).reshape(50, 50) == 25 * 50 + x) for x in range(20, 30)]
+    assert noise_bound.jacobian_bound(gradient, windows, 1.0, where) == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=0.02)
+
+
 def test_controlled_scenes_have_the_speed_asked_for_and_exact_truth():
     case = controlled.Case(64.0, 3.0, 0.0, seed=2)
     assert np.linalg.norm(case.scene().truth(0.0).flow, axis=-1).max() == pytest.approx(3.0)
@@ -96,4 +117,4 @@ def test_settings_are_called_with_their_options():
     flow, jacobian = setting.estimate(frames)
     assert flow.shape == (40, 48, 2) and jacobian.shape == (40, 48, 2, 2)
     contestant = controlled.Contestant.of(setting)
-    assert (contestant.times(), contestant.moment, contestant.window) == ((0.0, 1.0), 0.5, 3.0)
+    assert (contestant.times(), contestant.moment, contestant.windows(frames)) == ((0.0, 1.0), 0.5, 3.0)

@@ -48,8 +48,11 @@ pub(super) struct Options {
     pub ladder: &'static [f64],
     /// Change, over what noise explains, that the plain fits accept for the flow.
     pub kappa: f64,
-    /// The same for their slopes: the noise of slopes falls with the fourth power of the window, their bias grows no faster than the flow's.
+    /// The same for their slopes, where noise is white.
     pub kappa_slopes: f64,
+    /// By how much slopes may accept more where the flow is restless, at most: noise that is not white (that of particle images) reaches wider windows than its density tells, and in
+    /// turbulence no window is free of bias. 1 does without.
+    pub restless: f64,
     /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,
     /// The same for the change from the widest plain fit to nothing.
@@ -73,11 +76,12 @@ pub(super) struct Options {
 impl Options {
     /// For what one step of the motion differs by from another, which is small and smooth or nothing.
     pub fn for_changes() -> Self {
-        let Self { ladder, kappa, kappa_slopes, kappa_edge, .. } = Self::default();
+        let Self { ladder, kappa, kappa_edge, .. } = Self::default();
         Self {
             ladder: ladder.get(CHANGES..).unwrap_or(ladder),
             kappa: 2.0 * kappa,
-            kappa_slopes: 2.0 * kappa_slopes,
+            kappa_slopes: 5.0,
+            restless: 1.0,
             kappa_edge: 2.0 * kappa_edge,
             may_vanish: true,
             ..Self::default()
@@ -90,7 +94,8 @@ impl Default for Options {
         Self {
             ladder: &[1.7, 2.5, 3.7, 5.5, 8.0, 12.0, 18.0, 27.0],
             kappa: 8.0,
-            kappa_slopes: 11.0,
+            kappa_slopes: 4.0,
+            restless: 3.1,
             kappa_edge: 6.0,
             kappa_nothing: 16.0,
             region: 20.0,

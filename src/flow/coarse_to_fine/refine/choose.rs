@@ -15,6 +15,10 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 const NONE: f64 = 1e-2;
 /// Least noise density, px^4: below what frames of any kind show.
 const QUIET: f64 = 1e-9;
+/// The step of the ladder that tells whether the flow is restless: wider than what the coupling smooths, narrower than what smooth flow bends in.
+const RESTLESS_STEP: usize = 2;
+/// Share of the change that counts.
+const RESTLESS_SHARE: f64 = 0.8;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
 const FLAT: f64 = 1e-6;
 
@@ -143,8 +147,10 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
             let out = &mut out[LEFT + x..];
             let density = density::<V>(means, stride);
             density.store(&mut out[order.density() * stride..]);
+            let restless = climb.restless::<V>(density, means);
             for of in Use::ALL {
-                climb.weights::<V>(of, density, means, out);
+                let noise = if of == Use::Slopes { density * restless } else { density };
+                climb.weights::<V>(of, noise, means, out);
             }
             for l in 0..order.windows {
                 let weight = V::load(&out[order.weight(Use::Flow, l) * stride..]);
@@ -161,7 +167,19 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
 }
 
 impl<T: SimdReal> Climb<'_, T> {
-    /// The weights of one use at some sites.
+    /// How restless the flow is, from 1 on: its change from one of the narrow windows to the next, over what white noise explains.
+    #[inline(always)]
+    fn restless<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
+        let one = V::constant(1.0);
+        if self.options.restless <= 1.0 || Layout::new(self.options).steps <= RESTLESS_STEP {
+            return one;
+        }
+        let change = power4(V::load(&means[Layout::change(RESTLESS_STEP) * self.means.stride()..]));
+        let ratio = change / (density * V::constant(self.noise[RESTLESS_STEP] / RESTLESS_SHARE));
+        ratio.max(one).min(V::constant(self.options.restless))
+    }
+
+    /// The weights of one use at some sites, for noise of the given density.
     #[inline(always)]
     fn weights<V: Lanes<Scalar = T>>(&self, of: Use, density: V, means: &[T], out: &mut [T]) {
         let (stride, windows) = (self.means.stride(), self.order.windows);

@@ -165,7 +165,10 @@ fn choices_follow_the_formulas() {
     let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
     for x in 0..9 {
         assert!((choice.planes.at(order.density(), x, 0) / a - 1.0).abs() < 1e-12);
-        for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, 11.0, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
+        // What the third window changes to the fourth, over what white noise would.
+        let restless = roots(2, x).powi(4) / (difference_variance(options.ladder[2], options.ladder[3]) * a);
+        let slopes = 4.0 * (0.8 * restless).clamp(1.0, 3.1);
+        for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, slopes, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
             let (mut accepted, mut weights) = (1.0, Vec::new());
             for l in 0..7 {
                 let next = if l == 6 {
