@@ -19,6 +19,7 @@ const LEVELS: &[(&str, u8)] = &[
     ("flow", 3),
     ("filter", 3),
     ("temporal", 4),
+    ("track", 4),
     ("pipeline", 5),
     ("cli", 6),
     ("python", 6),

@@ -5,9 +5,11 @@ mod frame;
 mod motion;
 mod region;
 mod status;
+mod track;
 
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};
 pub use region::{Rect, Sites};
 pub use status::Status;
+pub use track::{TargetBox, TrackState, TrackStatus};

@@ -1,0 +1,168 @@
+//! What a tracker says of its target, frame by frame.
+
+/// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that its centre is `(x + width / 2, y + height / 2)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetBox {
+    /// Left side, px.
+    pub x: f64,
+    /// Upper side, px.
+    pub y: f64,
+    /// Width, px.
+    pub width: f64,
+    /// Height, px.
+    pub height: f64,
+}
+
+impl TargetBox {
+    /// The box of a size about a centre.
+    pub fn about(centre: [f64; 2], width: f64, height: f64) -> Self {
+        Self { x: centre[0] - width / 2.0, y: centre[1] - height / 2.0, width, height }
+    }
+
+    /// Its centre `(x, y)`, px.
+    pub fn centre(&self) -> [f64; 2] {
+        [self.x + self.width / 2.0, self.y + self.height / 2.0]
+    }
+
+    /// Area of the intersection over area of the union, 0 where they do not touch.
+    pub fn overlap(&self, other: &Self) -> f64 {
+        let side = |a: f64, la: f64, b: f64, lb: f64| ((a + la).min(b + lb) - a.max(b)).max(0.0);
+        let common = side(self.x, self.width, other.x, other.width) * side(self.y, self.height, other.y, other.height);
+        let union = self.width * self.height + other.width * other.height - common;
+        if union > 0.0 { common / union } else { 0.0 }
+    }
+}
+
+/// How well the target is in hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[repr(u8)]
+pub enum TrackStatus {
+    /// Seen and measured.
+    #[default]
+    Tracking = 0,
+    /// Seen in part: something covers or touches it. Nothing is learnt.
+    Occluded = 1,
+    /// Not seen: the filter goes on by itself.
+    Coasting = 2,
+    /// Beyond the border of the picture.
+    Out = 3,
+    /// Not seen for so long that it counts as lost; it is still looked for.
+    Lost = 4,
+}
+
+impl TrackStatus {
+    /// Every status, by code.
+    pub const ALL: [Self; 5] = [Self::Tracking, Self::Occluded, Self::Coasting, Self::Out, Self::Lost];
+
+    /// The word used in files and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracking => "tracking",
+            Self::Occluded => "occluded",
+            Self::Coasting => "coasting",
+            Self::Out => "out",
+            Self::Lost => "lost",
+        }
+    }
+
+    /// Whether this frame's picture of the target was measured.
+    pub fn is_measured(self) -> bool {
+        matches!(self, Self::Tracking | Self::Occluded)
+    }
+}
+
+/// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is NaN or `None`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackState {
+    /// Which frame, counted from the one the tracker began with (0).
+    pub frame: usize,
+    /// How well the target is in hand.
+    pub status: TrackStatus,
+    /// Why the status is what it is, in a few words; empty where there is nothing to be said.
+    pub reason: &'static str,
+    /// Whether this is the first measurement after the target was lost or out of the picture.
+    pub reacquired: bool,
+    /// Filtered position of the target's centre, px.
+    pub position: [f64; 2],
+    /// Filtered velocity in the picture, px/frame: that in the scene and that of the camera together.
+    pub velocity: [f64; 2],
+    /// Filtered acceleration, px/frame^2.
+    pub acceleration: [f64; 2],
+    /// Velocity relative to the scene, px/frame.
+    pub scene_velocity: [f64; 2],
+    /// How far the picture of the still scene moved since the frame before, px; zero for a camera at rest.
+    pub camera_motion: [f64; 2],
+    /// Covariance of (position, velocity, acceleration) along x and along y.
+    pub covariance: [[[f64; 3]; 3]; 2],
+    /// Measured step since the frame before, unfiltered, px; NaN where nothing was measured.
+    pub displacement: [f64; 2],
+    /// The target's box, upright.
+    pub bounds: TargetBox,
+    /// Size over that at the beginning.
+    pub scale: f64,
+    /// Angle turned since the beginning, rad, from x towards y (clockwise on the screen), not wrapped.
+    pub rotation: f64,
+    /// Whether the target's picture tells its rotation.
+    pub rotation_observable: bool,
+    /// Share of the target that is seen, 0 to 1.
+    pub visibility: f64,
+    /// Normalised innovation squared of the position, both axes together; NaN where nothing was measured.
+    pub innovation: f64,
+    /// Brightness of the target over that at the beginning.
+    pub gain: f64,
+    /// Line of sight: centre of the window that is looked at, px.
+    pub line_of_sight: [f64; 2],
+    /// How many pixels' flow was used.
+    pub flow_count: usize,
+}
+
+impl TrackState {
+    /// A target at rest, with nothing measured yet.
+    pub fn at(position: [f64; 2], bounds: TargetBox) -> Self {
+        Self {
+            frame: 0,
+            status: TrackStatus::Tracking,
+            reason: "",
+            reacquired: false,
+            position,
+            velocity: [0.0; 2],
+            acceleration: [0.0; 2],
+            scene_velocity: [0.0; 2],
+            camera_motion: [0.0; 2],
+            covariance: [[[0.0; 3]; 3]; 2],
+            displacement: [f64::NAN; 2],
+            bounds,
+            scale: 1.0,
+            rotation: 0.0,
+            rotation_observable: true,
+            visibility: 1.0,
+            innovation: f64::NAN,
+            gain: 1.0,
+            line_of_sight: position,
+            flow_count: 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_overlap_by_their_common_area() {
+        let a = TargetBox::about([5.0, 5.0], 4.0, 2.0);
+        assert_eq!((a.x, a.y, a.centre()), (3.0, 4.0, [5.0, 5.0]));
+        assert_eq!(a.overlap(&a), 1.0);
+        assert_eq!(a.overlap(&TargetBox { x: 5.0, ..a }), 1.0 / 3.0);
+        assert_eq!(a.overlap(&TargetBox { x: 7.0, ..a }), 0.0);
+        assert_eq!(TargetBox { x: 0.0, y: 0.0, width: 0.0, height: 0.0 }.overlap(&a), 0.0);
+    }
+
+    #[test]
+    fn codes_count_up() {
+        for (code, status) in TrackStatus::ALL.into_iter().enumerate() {
+            assert_eq!(status as usize, code);
+        }
+        assert!(TrackStatus::Occluded.is_measured() && !TrackStatus::Out.is_measured());
+    }
+}
