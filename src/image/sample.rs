@@ -37,7 +37,7 @@ impl Interpolation {
     }
 
     /// Weights of the pixels at -1, 0, 1, 2 for a position `f` in [0, 1) past pixel 0.
-    fn weights(self, f: f64) -> [f64; 4] {
+    pub(crate) fn weights(self, f: f64) -> [f64; 4] {
         match self {
             Self::Bilinear => [0.0, 1.0 - f, f, 0.0],
             Self::Bicubic => [

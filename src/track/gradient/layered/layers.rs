@@ -1,0 +1,205 @@
+//! The two layers of the picture: the target (its brightness and its support, in its own coordinates) and what is behind it.
+//!
+//! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
+
+use super::patch::cubic;
+use super::pose::Pose;
+use crate::types::{Frame, TargetBox};
+
+/// Around the box, share of its sides, and least margin, px.
+const MARGIN: (f64, f64) = (0.2, 4.0);
+/// Around the box, nothing is known of the background: share of its sides, and px.
+pub(super) const UNSEEN: (f64, f64) = (0.1, 2.0);
+/// Support from which on a point is the target's.
+pub(super) const CORE: f64 = 0.6;
+/// Distance from the support at which points still count, px of the target.
+const NEAR: f64 = 2.0;
+/// Difference of the support's sides from the first box's that changes nothing, share.
+const BELIEVED: f64 = 0.2;
+/// Support that distances are counted from.
+const EDGE: f64 = 0.1;
+
+/// The target.
+#[derive(Debug, Clone)]
+pub(super) struct Target {
+    /// Support, 0 to 1.
+    pub a: Frame<f64>,
+    /// Brightness, grey levels.
+    pub t: Frame<f64>,
+    /// Support at first: the box.
+    pub prior: Frame<f64>,
+    /// Sums behind the support.
+    pub n: Frame<f64>,
+    /// As above.
+    pub d: Frame<f64>,
+    /// Sides at first, px.
+    pub size: [f64; 2],
+}
+
+impl Target {
+    /// What the box holds.
+    pub fn new(frame: &Frame<f64>, bounds: TargetBox, prior_weight: f64) -> Self {
+        let size = [bounds.width, bounds.height];
+        let half = size.map(|side| (side / 2.0 + (MARGIN.0 * side).max(MARGIN.1)).ceil() as usize);
+        let centre = bounds.centre();
+        let shape = half.map(|h| 2 * h + 1);
+        let along = |at: usize, k: usize| at as f64 - half[k] as f64;
+        let cover = |at: f64, side: f64| (side / 2.0 - at.abs() + 0.5).clamp(0.0, 1.0);
+        let prior =
+            Frame::from_fn(shape[0], shape[1], |i, j| cover(along(i, 0), size[0]) * cover(along(j, 1), size[1]));
+        let t =
+            Frame::from_fn(shape[0], shape[1], |i, j| cubic(frame, centre[0] + along(i, 0), centre[1] + along(j, 1)));
+        Self { a: prior.clone(), t, n: prior.map(|a| prior_weight * a), d: prior.map(|_| prior_weight), prior, size }
+    }
+
+    /// Target coordinates of a node.
+    #[inline(always)]
+    pub fn xi(&self, i: usize, j: usize) -> [f64; 2] {
+        [i as f64 - (self.a.width() / 2) as f64, j as f64 - (self.a.height() / 2) as f64]
+    }
+
+    /// Half the sides of the grid.
+    pub fn half(&self) -> [f64; 2] {
+        [(self.a.width() / 2) as f64, (self.a.height() / 2) as f64]
+    }
+
+    /// Centroid of the support, target coordinates.
+    pub fn centroid(&self) -> [f64; 2] {
+        let mut sums = [0.0; 3];
+        for j in 0..self.a.height() {
+            for (i, a) in self.a.row(j).iter().enumerate() {
+                let xi = self.xi(i, j);
+                sums[0] += a;
+                sums[1] += a * xi[0];
+                sums[2] += a * xi[1];
+            }
+        }
+        if sums[0] > 0.0 { [sums[1] / sums[0], sums[2] / sums[0]] } else { [0.0; 2] }
+    }
+
+    /// Sides of the support, px of the target: those of the first box unless it is clearly larger or smaller.
+    pub fn extent(&self) -> [f64; 2] {
+        let (width, height) = self.a.size();
+        let columns: Vec<f64> = (0..width).map(|i| (0..height).map(|j| self.a.get(i, j)).sum()).collect();
+        let rows: Vec<f64> = (0..height).map(|j| self.a.row(j).iter().sum()).collect();
+        [columns, rows]
+            .map(|sums| {
+                let most = sums.iter().copied().fold(0.0, f64::max);
+                sums.iter()
+                    .map(|sum| (sum / (0.5 * most.max(1e-9))).min(1.0))
+                    .filter(|share| *share >= 0.5)
+                    .sum::<f64>()
+            })
+            .into_iter()
+            .zip(self.size)
+            .map(|(extent, first)| if (extent / first - 1.0).abs() < BELIEVED { first } else { extent })
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap_or(self.size)
+    }
+
+    /// Points no farther than 2 px from the support.
+    pub fn near(&self) -> Frame<bool> {
+        let reach = NEAR as usize;
+        let (width, height) = self.a.size();
+        let wide = |at: usize, length: usize| at.saturating_sub(reach)..(at + reach + 1).min(length);
+        let along = Frame::from_fn(width, height, |i, j| self.a.row(j)[wide(i, width)].iter().any(|a| *a > EDGE));
+        Frame::from_fn(width, height, |i, j| wide(j, height).any(|k| along.get(i, k)))
+    }
+
+    /// The places of all nodes in the picture.
+    pub fn places(&self, pose: &Pose) -> Vec<[f64; 2]> {
+        let (width, height) = self.a.size();
+        (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| pose.apply(self.xi(i, j))).collect()
+    }
+}
+
+/// Whether a place is in the picture.
+#[inline(always)]
+pub(super) fn is_inside([x, y]: [f64; 2], frame: &Frame<f64>) -> bool {
+    x >= 0.0 && y >= 0.0 && x <= frame.width() as f64 - 1.0 && y <= frame.height() as f64 - 1.0
+}
+
+/// The picture behind the target, and where it is known.
+#[derive(Debug, Clone)]
+pub(super) struct Background {
+    /// Brightness; where it was never seen, a guess.
+    pub picture: Frame<f64>,
+    /// Where it was seen.
+    pub known: Frame<bool>,
+}
+
+impl Background {
+    /// The first frame; nothing is known of what the box covers.
+    pub fn new(frame: &Frame<f64>, bounds: TargetBox) -> Self {
+        let hidden = grown(bounds, UNSEEN);
+        let known = Frame::from_fn(frame.width(), frame.height(), |x, y| !holds(&hidden, x, y));
+        let mut this = Self { picture: frame.clone(), known };
+        this.guess(&hidden);
+        this
+    }
+
+    /// Unknown pixels get the mean of the known ones around the box.
+    fn guess(&mut self, hidden: &TargetBox) {
+        let around = grown(*hidden, (0.0, 3.0));
+        let pixels = || (0..self.known.height()).flat_map(|y| (0..self.known.width()).map(move |x| (x, y)));
+        let known: Vec<f64> = pixels()
+            .filter(|(x, y)| holds(&around, *x, *y) && self.known.get(*x, *y))
+            .map(|(x, y)| self.picture.get(x, y))
+            .collect();
+        if known.is_empty() {
+            return;
+        }
+        let mean = known.iter().sum::<f64>() / known.len() as f64;
+        let unknown: Vec<_> = pixels().filter(|(x, y)| !self.known.get(*x, *y)).collect();
+        unknown.into_iter().for_each(|(x, y)| self.picture.row_mut(y)[x] = mean);
+    }
+
+    /// Whether it is known at the pixel nearest to a place.
+    #[inline(always)]
+    pub fn is_known(&self, [x, y]: [f64; 2]) -> bool {
+        let nearest = |at: f64, length: usize| (at.max(0.0) + 0.5) as usize * usize::from(length > 0);
+        let (x, y) = (nearest(x, self.known.width()), nearest(y, self.known.height()));
+        self.known.get(x.min(self.known.width() - 1), y.min(self.known.height() - 1))
+    }
+}
+
+/// A box with a margin on every side: a share of the side, and px.
+pub(super) fn grown(bounds: TargetBox, (share, more): (f64, f64)) -> TargetBox {
+    TargetBox::about(
+        bounds.centre(),
+        bounds.width * (1.0 + 2.0 * share) + 2.0 * more,
+        bounds.height * (1.0 + 2.0 * share) + 2.0 * more,
+    )
+}
+
+/// Whether a pixel's centre is in a box.
+pub(super) fn holds(bounds: &TargetBox, x: usize, y: usize) -> bool {
+    let within = |at: usize, from: f64, length: f64| (from..=from + length).contains(&(at as f64));
+    within(x, bounds.x, bounds.width) && within(y, bounds.y, bounds.height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_support_begins_as_the_box_with_its_area() {
+        let frame = Frame::from_fn(60, 50, |x, y| (x + 2 * y) as f64);
+        let bounds = TargetBox::about([30.25, 20.5], 13.0, 9.5);
+        let target = Target::new(&frame, bounds, 144.0);
+        assert!((target.a.data().iter().sum::<f64>() - 13.0 * 9.5).abs() < 1e-9);
+        assert_eq!(target.centroid(), [0.0, 0.0]);
+        let middle = (target.a.width() / 2, target.a.height() / 2);
+        assert!((target.t.get(middle.0, middle.1) - (30.25 + 41.0)).abs() < 1e-9);
+        let near = target.near();
+        assert!(near.get(middle.0, middle.1) && !near.get(0, 0));
+        let background = Background::new(&frame, bounds);
+        assert!(
+            !background.is_known([30.0, 20.0])
+                && background.is_known([45.0, 20.0])
+                && background.is_known([-3.0, 90.0])
+        );
+        assert!((background.picture.get(30, 20) - 71.25).abs() < 3.0);
+    }
+}

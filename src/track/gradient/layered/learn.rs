@@ -1,0 +1,112 @@
+//! What is learnt from a frame in which the target was seen well.
+
+use super::layers::{Background, Target, UNSEEN, grown, holds};
+use super::look::View;
+use super::patch::smooth_known;
+use crate::track::gradient::local_flow::{MAD, median};
+use crate::types::{Frame, TargetBox};
+
+/// Memory of the support.
+const FORGETTING: f64 = 0.95;
+/// Weight of the first support, grey^2.
+pub(super) const PRIOR: f64 = 144.0;
+/// Rate of the template.
+const TEMPLATE_RATE: f64 = 0.08;
+/// Rate of the background.
+const BACKGROUND_RATE: f64 = 0.3;
+/// Longest step of the background where it changes suddenly, grey levels.
+const SUDDEN_STEP: f64 = 1.5;
+/// Support from which on the template is learnt; outside it goes on as it is there.
+const SOLID: f64 = 0.9;
+/// Width of that continuation, px of the target.
+const CONTINUED: f64 = 2.0;
+/// Least noise, grey levels.
+pub(super) const LEAST_NOISE: f64 = 1.5;
+/// How much of the noise's last measurement is taken.
+const NOISE_RATE: f64 = 0.1;
+/// Pixels that the noise is measured on, at most.
+const SAMPLES: usize = 4096;
+
+/// Support and brightness of the target.
+pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f64) {
+    for at in 0..view.seen.len() {
+        let (seen, behind) = (view.seen[at], view.behind[at]);
+        let (bright, a) = (gain * target.t.data()[at], target.a.data()[at]);
+        if seen.is_nan() {
+            continue;
+        }
+        learn_support(target, at, (seen, behind, bright), noise);
+        let model = if behind.is_nan() { bright } else { a * bright + (1.0 - a) * behind };
+        let off = seen - model;
+        let step = TEMPLATE_RATE * a * off / (1.0 + (off / (6.0 * noise + 10.0)).powi(2));
+        target.t.data_mut()[at] = (target.t.data()[at] + step / gain.max(0.1)) * gain;
+    }
+    continue_template(target);
+}
+
+/// `a` that explains the frames so far in the sense of least squares, beginning with the box.
+fn learn_support(target: &mut Target, at: usize, (seen, behind, bright): (f64, f64, f64), noise: f64) {
+    // What neither layer explains says nothing of where one ends and the other begins.
+    let least = 4.0 * noise + 6.0;
+    let between = (seen - bright) * (seen - behind) <= 0.0;
+    let explained = between || (seen - bright).abs() < least || (seen - behind).abs() < least;
+    if behind.is_nan() || !explained {
+        return;
+    }
+    let contrast = bright - behind;
+    let prior = (1.0 - FORGETTING) * PRIOR;
+    let n = FORGETTING * target.n.data()[at] + contrast * (seen - behind) + prior * target.prior.data()[at];
+    let d = FORGETTING * target.d.data()[at] + contrast * contrast + prior;
+    (target.n.data_mut()[at], target.d.data_mut()[at]) = (n, d);
+    target.a.data_mut()[at] = (n / d).clamp(0.0, 1.0);
+}
+
+/// Outside the solid part the template goes on as it is near it.
+fn continue_template(target: &mut Target) {
+    let (width, height) = target.t.size();
+    let known =
+        Frame::from_fn(width, height, |i, j| if target.a.get(i, j) > SOLID { target.t.get(i, j) } else { f64::NAN });
+    let smooth = smooth_known(&known, CONTINUED);
+    for at in 0..width * height {
+        let value = smooth.data()[at];
+        if known.data()[at].is_nan() && value.is_finite() {
+            target.t.data_mut()[at] = value;
+        }
+    }
+}
+
+/// The background outside the target's box, which is upright in the picture.
+pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, bounds: TargetBox, noise: f64) {
+    let hidden = grown(bounds, UNSEEN);
+    let sudden = 6.0 * noise + 8.0;
+    let (width, height) = frame.size();
+    let columns = [hidden.x, hidden.x + hidden.width].map(|x| x.clamp(-1.0, width as f64));
+    let (first, end) = (columns[0].ceil().max(0.0) as usize, ((columns[1].floor() + 1.0).max(0.0) as usize).min(width));
+    for y in 0..height {
+        let crossed = holds(&TargetBox { x: 0.0, width: 0.0, ..hidden }, 0, y) && first < end;
+        let parts = if crossed { [0..first, end..width] } else { [0..width, width..width] };
+        for part in parts {
+            let seen = &frame.row(y)[part.clone()];
+            let known = &mut background.known.row_mut(y)[part.clone()];
+            let picture = &mut background.picture.row_mut(y)[part];
+            for ((b, e), known) in picture.iter_mut().zip(seen).zip(known) {
+                let off = e - *b;
+                let mut step = BACKGROUND_RATE * off;
+                if off.abs() > sudden {
+                    step = step.clamp(-SUDDEN_STEP, SUDDEN_STEP);
+                }
+                *b = if *known { *b + step } else { *e };
+                *known = true;
+            }
+        }
+    }
+}
+
+/// The noise of the frames, from how the still scene differs from one to the next; grey levels.
+pub(super) fn learn_noise(noise: f64, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
+    let every = (frame.data().len() / SAMPLES).max(1) | 1;
+    let pairs = frame.data().iter().zip(previous.data()).step_by(every);
+    let mut off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
+    let now = MAD * median(&mut off) / std::f64::consts::SQRT_2;
+    (noise + NOISE_RATE * (now - noise)).max(LEAST_NOISE)
+}

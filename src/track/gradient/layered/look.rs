@@ -1,0 +1,84 @@
+//! What is seen of the target at a pose, and what there is beside it that looks like it.
+
+use super::layers::{Background, CORE, Target, is_inside};
+use super::patch::cubic;
+use super::pose::Pose;
+use crate::types::Frame;
+
+/// Contrast at which a point counts in full, grey levels.
+const CONTRAST: f64 = 60.0;
+/// Contrast of points whose background is not known, grey levels.
+const UNKNOWN: f64 = 30.0;
+
+/// The picture at all nodes of the target's grid.
+#[derive(Debug, Clone)]
+pub(super) struct View {
+    /// Brightness; NaN outside the picture.
+    pub seen: Vec<f64>,
+    /// Background; NaN where it was never seen, or outside the picture.
+    pub behind: Vec<f64>,
+}
+
+/// What a view amounts to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Look {
+    /// Share of the target that is seen, weighed by its contrast.
+    pub visibility: f64,
+    /// Points beside the target that look like it, over its area.
+    pub leak: f64,
+    /// How far those lie on one side, 0 to 1.
+    pub one_sided: f64,
+}
+
+/// Reads the picture at the nodes.
+pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background, pose: &Pose) -> View {
+    let places = target.places(pose);
+    let read = |place: &[f64; 2]| if is_inside(*place, frame) { cubic(frame, place[0], place[1]) } else { f64::NAN };
+    let behind = |place: &[f64; 2]| {
+        let known = is_inside(*place, frame) && background.is_known(*place);
+        if known { cubic(&background.picture, place[0], place[1]) } else { f64::NAN }
+    };
+    View { seen: places.iter().map(read).collect(), behind: places.iter().map(behind).collect() }
+}
+
+/// Whether the target is what is seen at a point; `contrast` is that to the background, where that is known.
+fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
+    let off = (seen - bright).abs();
+    let contrast = if behind.is_nan() { UNKNOWN } else { (bright - behind).abs() };
+    let nearer = behind.is_nan() || off < (seen - behind).abs();
+    nearer && off < 4.0 * noise + 0.15 * contrast + 6.0
+}
+
+/// Visibility, and look-alikes beside the target.
+pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look {
+    let near = target.near();
+    let (mut hit, mut all, mut area) = (0.0, 0.0, 0.0);
+    let (mut alike, mut sum, mut lengths) = (0.0, [0.0; 2], 0.0);
+    for (at, (&a, &t)) in target.a.data().iter().zip(target.t.data()).enumerate() {
+        let (seen, behind, bright) = (view.seen[at], view.behind[at], gain * t);
+        area += a;
+        if a > CORE {
+            let contrast = if behind.is_nan() { UNKNOWN } else { (bright - behind).abs() };
+            let counts = contrast.min(CONTRAST) * if contrast < 2.5 * noise { 0.1 } else { 1.0 };
+            all += counts;
+            // Outside the picture nothing is seen.
+            if is_hit(seen, bright, behind, noise) {
+                hit += counts;
+            }
+        } else if a < 0.2
+            && near.data()[at]
+            && (bright - behind).abs() > 4.0 * noise
+            && is_hit(seen, bright, behind, noise)
+        {
+            let xi = target.xi(at % target.a.width(), at / target.a.width());
+            alike += 1.0;
+            sum = [sum[0] + xi[0], sum[1] + xi[1]];
+            lengths += xi[0].hypot(xi[1]);
+        }
+    }
+    Look {
+        visibility: if all > 0.0 { hit / all } else { 0.0 },
+        leak: if area > 0.0 { alike / area } else { 0.0 },
+        one_sided: if lengths > 0.0 { sum[0].hypot(sum[1]) / lengths } else { 0.0 },
+    }
+}

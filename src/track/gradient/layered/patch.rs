@@ -1,0 +1,117 @@
+//! Parts of a picture, smoothed, and read between the pixels.
+
+use crate::image::{Border, GaussianSmoother, Interpolation};
+use crate::types::Frame;
+
+/// Where Gaussians are cut off, standard deviations.
+const TRUNCATE: f64 = 3.0;
+/// Least share of known pixels that a mean rests on.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// A rectangle of a picture.
+#[derive(Debug, Clone)]
+pub(super) struct Patch {
+    pub frame: Frame<f64>,
+    /// Its first pixel in the picture.
+    pub corner: [usize; 2],
+}
+
+/// Columns and rows of a rectangle: first and beyond the last.
+pub(super) type Bounds = [[usize; 2]; 2];
+
+/// Pixels of the picture that lie within `reach` px of `centre`; at least one.
+pub(super) fn bounds_about(centre: [f64; 2], reach: [f64; 2], (width, height): (usize, usize)) -> Bounds {
+    let lengths = [width, height];
+    std::array::from_fn(|k| {
+        let last = lengths[k] as f64 - 1.0;
+        let first = (centre[k] - reach[k]).floor().clamp(0.0, last);
+        let end = (centre[k] + reach[k]).ceil().clamp(0.0, last);
+        [first as usize, end as usize + 1]
+    })
+}
+
+impl Patch {
+    /// A rectangle of the picture as it is.
+    pub fn cut(frame: &Frame<f64>, [[x0, x1], [y0, y1]]: Bounds) -> Self {
+        let data = (y0..y1).flat_map(|y| frame.row(y)[x0..x1].iter().copied()).collect();
+        Self { frame: Frame::new(x1 - x0, y1 - y0, data).unwrap_or_default(), corner: [x0, y0] }
+    }
+
+    /// The same, smoothed. Where samples are NaN, the mean of those that are not; NaN where there are none near.
+    pub fn smoothed(mut self, sigma: f64) -> Self {
+        self.frame = if self.frame.data().iter().any(|v| v.is_nan()) {
+            smooth_known(&self.frame, sigma)
+        } else {
+            smooth(&self.frame, sigma)
+        };
+        self
+    }
+
+    /// Brightness at a place of the picture, by cubic convolution; at the patch's border its last pixels go on.
+    #[inline(always)]
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        cubic(&self.frame, x - self.corner[0] as f64, y - self.corner[1] as f64)
+    }
+}
+
+/// Gaussian smoothing; the border's pixels go on beyond it.
+pub(super) fn smooth(frame: &Frame<f64>, sigma: f64) -> Frame<f64> {
+    match GaussianSmoother::with(sigma, TRUNCATE, Border::Replicate) {
+        Ok(smoother) => smoother.apply(frame),
+        Err(_) => frame.clone(),
+    }
+}
+
+/// Normalised convolution of what is known.
+pub(super) fn smooth_known(frame: &Frame<f64>, sigma: f64) -> Frame<f64> {
+    let value = smooth(&frame.map(|v| if v.is_nan() { 0.0 } else { *v }), sigma);
+    let share = smooth(&frame.map(|v| if v.is_nan() { 0.0 } else { 1.0 }), sigma);
+    let data = value.data().iter().zip(share.data());
+    let data = data.map(|(v, s)| if *s < LEAST_SHARE { f64::NAN } else { v / s }).collect();
+    Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
+}
+
+/// Cubic convolution (R. Keys, 1981); positions beyond the border count as on it.
+#[inline(always)]
+pub(super) fn cubic(frame: &Frame<f64>, x: f64, y: f64) -> f64 {
+    let (width, height) = frame.size();
+    let (x, y) = (x.clamp(0.0, width as f64 - 1.0), y.clamp(0.0, height as f64 - 1.0));
+    let (x0, y0) = (x as usize, y as usize);
+    let (wx, wy) = (Interpolation::Bicubic.weights(x - x0 as f64), Interpolation::Bicubic.weights(y - y0 as f64));
+    if x0 >= 1 && y0 >= 1 && x0 + 2 < width && y0 + 2 < height {
+        let start = (y0 - 1) * width + x0 - 1;
+        let mut sum = 0.0;
+        for (j, weight) in wy.iter().enumerate() {
+            let row = &frame.data()[start + j * width..start + j * width + 4];
+            sum += weight * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
+        }
+        return sum;
+    }
+    let column = |i: usize| (x0 + i).saturating_sub(1).min(width - 1);
+    let line = |j: usize| (y0 + j).saturating_sub(1).min(height - 1);
+    (0..4).map(|j| wy[j] * (0..4).map(|i| wx[i] * frame.get(column(i), line(j))).sum::<f64>()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_know_where_they_are() {
+        let frame = Frame::from_fn(20, 15, |x, y| (3 * x + 5 * y) as f64);
+        let patch = Patch::cut(&frame, bounds_about([10.0, 7.0], [4.0, 3.0], frame.size()));
+        assert_eq!((patch.corner, patch.frame.size()), ([6, 4], (9, 7)));
+        assert!((patch.at([9.5, 6.25]) - (28.5 + 31.25)).abs() < 1e-12);
+        assert_eq!(patch.at([-5.0, -5.0]), frame.get(6, 4));
+        assert_eq!(bounds_about([-9.0, 40.0], [2.0, 2.0], (20, 15)), [[0, 1], [14, 15]]);
+    }
+
+    #[test]
+    fn what_is_unknown_takes_no_part() {
+        let mut frame = Frame::filled(12, 12, 4.0);
+        frame.row_mut(5)[5] = f64::NAN;
+        let patch = Patch { frame, corner: [0, 0] }.smoothed(1.0);
+        assert!(patch.frame.data().iter().all(|v| (v - 4.0).abs() < 1e-12));
+        assert!(smooth_known(&Frame::filled(5, 5, f64::NAN), 1.0).data().iter().all(|v| v.is_nan()));
+    }
+}

@@ -1,0 +1,74 @@
+//! Looking for the target all around, in whole pixels.
+
+use super::layers::{Background, CORE, Target, is_inside};
+use super::patch::cubic;
+use super::pose::Pose;
+use crate::types::Frame;
+
+/// Difference beyond which brightness is simply different, grey levels.
+const CAP: f64 = 30.0;
+/// Least share of the target's points that must be in the picture.
+const LEAST_SHARE: f64 = 0.4;
+/// Most points that are compared at each place.
+const POINTS: usize = 400;
+
+/// The pose within `reach` px whose picture is most like the target and least like the background:
+/// least `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`.
+pub(super) fn search(
+    frame: &Frame<f64>,
+    target: &Target,
+    background: &Background,
+    (guess, gain): (&Pose, f64),
+    reach: usize,
+) -> Option<Pose> {
+    let core: Vec<_> = (0..target.a.height())
+        .flat_map(|j| (0..target.a.width()).map(move |i| (i, j)))
+        .filter(|(i, j)| target.a.get(*i, *j) > CORE)
+        .collect();
+    let every = core.len().div_ceil(POINTS).max(1);
+    let points: Vec<_> =
+        core.iter().step_by(every).map(|&(i, j)| (guess.turn(target.xi(i, j)), gain * target.t.get(i, j))).collect();
+    let reach = reach as isize;
+    let mut best: Option<(f64, Pose)> = None;
+    for dy in -reach..=reach {
+        for dx in -reach..=reach {
+            let p = [(guess.p[0] + dx as f64).round(), (guess.p[1] + dy as f64).round()];
+            let Some(cost) = cost(frame, background, &points, p) else { continue };
+            // Of equals the nearest to the guess wins, so that nothing depends on the order.
+            let cost = cost + 1e-6 * (dx * dx + dy * dy) as f64;
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, Pose { p, ..*guess }));
+            }
+        }
+    }
+    best.map(|(_, pose)| pose)
+}
+
+/// The figure that is least at the target; `None` where too little of it would be in the picture.
+fn cost(frame: &Frame<f64>, background: &Background, points: &[([f64; 2], f64)], p: [f64; 2]) -> Option<f64> {
+    let (mut own, mut behind, mut count, mut known) = (0.0, 0.0, 0, 0);
+    for (offset, bright) in points {
+        let place = [p[0] + offset[0], p[1] + offset[1]];
+        if !is_inside(place, frame) {
+            continue;
+        }
+        // Points of an upright target of the first size lie on pixels.
+        let seen = nearest(frame, place);
+        own += (seen - bright).abs().min(CAP);
+        count += 1;
+        if background.is_known(place) {
+            behind += (seen - nearest(&background.picture, place)).abs().min(CAP);
+            known += 1;
+        }
+    }
+    if (count as f64) < LEAST_SHARE * points.len() as f64 || count == 0 {
+        return None;
+    }
+    Some(own / count as f64 - 0.5 * if known > 0 { behind / known as f64 } else { 0.0 })
+}
+
+/// Brightness at the nearest pixel, or between pixels where that is as far as it gets.
+fn nearest(frame: &Frame<f64>, [x, y]: [f64; 2]) -> f64 {
+    let (i, j) = ((x + 0.5) as usize, (y + 0.5) as usize);
+    if i < frame.width() && j < frame.height() { frame.get(i, j) } else { cubic(frame, x, y) }
+}

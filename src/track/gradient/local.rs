@@ -1,0 +1,259 @@
+//! The paper's loop (its figure 6): local flow in a moving window, its mean over what moves, a Gauss-Markov filter that steers the window.
+//!
+//! M. Chiba and S. Ozawa, section on the tracking algorithm, equations (11) to (26), with the repairs that it needs: a gate for weak gradients, two starts of the flow, steering by position, a
+//! gate for innovations, and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
+
+use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
+use super::local_flow::{LocalFlow, LocalFlowOptions, MAD, MeanFlow, median};
+use super::options::{Control, GradientOptions, Mode};
+use crate::image::Interpolation;
+use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
+
+/// Pixels around the window that masks need.
+const MARGIN: usize = 6;
+/// Fewest moving pixels that a target is.
+const FEWEST: usize = 12;
+/// Largest innovation squared that is taken for one of the target, four degrees of freedom.
+const GATE: f64 = 16.0;
+/// Refusals in a row after which a measurement is taken all the same.
+const REFUSALS: usize = 3;
+/// Frames without motion after which the target counts as lost.
+const LOST_AFTER: usize = 15;
+/// Least automatic `eps`, px/frame.
+const LEAST_EPS: f64 = 0.3;
+
+/// What is done, in all that the modes differ by.
+#[derive(Debug, Clone)]
+pub(super) struct Rules {
+    flow: LocalFlowOptions,
+    dynamics: Dynamics,
+    velocity: Velocity,
+    /// Variances of the measured position and velocity, px^2.
+    variances: [f64; 2],
+    /// How much of the mean flow the centroid is moved by.
+    brought: f64,
+    /// The window follows the filter's position, and not its velocity.
+    by_position: bool,
+    /// Pixels may start at rest.
+    rest: bool,
+    /// Measurements are gated, and targets may stop.
+    careful: bool,
+}
+
+impl Rules {
+    /// Those of a mode.
+    pub fn of(options: &GradientOptions) -> Self {
+        let mut rules = if options.mode == Mode::Paper { Self::paper() } else { Self::repaired() };
+        rules.flow.window = options.window.unwrap_or(rules.flow.window);
+        rules.flow.order = options.order.unwrap_or(rules.flow.order);
+        rules
+    }
+
+    fn repaired() -> Self {
+        Self {
+            flow: LocalFlowOptions::default(),
+            dynamics: Dynamics::default(),
+            velocity: Velocity::Mean,
+            variances: [1.0, 0.25],
+            brought: 1.0,
+            by_position: true,
+            rest: true,
+            careful: true,
+        }
+    }
+
+    fn paper() -> Self {
+        Self {
+            flow: LocalFlowOptions { window: 5, order: 2, min_sigma: 0.0, ..LocalFlowOptions::default() },
+            dynamics: Dynamics { q: 0.25, ..Dynamics::default() },
+            velocity: Velocity::AsPrinted,
+            variances: [4.0, 0.25],
+            brought: 0.5,
+            by_position: false,
+            rest: false,
+            careful: false,
+        }
+    }
+}
+
+/// One target in the loop.
+#[derive(Debug)]
+pub(super) struct LocalLoop {
+    rules: Rules,
+    fov: usize,
+    control: Control,
+    eps: Option<f64>,
+    filter: GaussMarkovFilter,
+    size: [f64; 2],
+    /// Centre of the window.
+    sight: [f64; 2],
+    previous: Frame<f64>,
+    refused: usize,
+    missed: usize,
+}
+
+impl LocalLoop {
+    pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+        let rules = Rules::of(options);
+        let centre = bounds.centre();
+        Self {
+            fov: options.fov,
+            control: options.control,
+            eps: options.eps,
+            filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
+            size: [bounds.width, bounds.height],
+            sight: centre,
+            previous: frame,
+            refused: 0,
+            missed: 0,
+            rules,
+        }
+    }
+
+    /// The next frame; `None`: it cannot be used.
+    pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
+        let found = frame.map(|frame| self.measure(frame));
+        let was_lost = self.missed >= LOST_AFTER;
+        self.filter.predict();
+        let (mut innovation, mut measured) = (f64::NAN, false);
+        match &found {
+            Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
+                let place = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
+                let [r_pos, r_vel] = self.rules.variances;
+                let z =
+                    Measurement { position: Some((place, [r_pos; 2])), velocity: Some((mean.velocity, [r_vel; 2])) };
+                innovation = self.filter.innovation(&z);
+                if !self.rules.careful || innovation < GATE || self.refused >= REFUSALS {
+                    self.filter.update(&z);
+                    (self.refused, measured) = (0, true);
+                } else {
+                    self.refused += 1;
+                }
+            }
+            Some(_) if self.rules.careful => {
+                // Nothing moves: the target has stopped, or is hidden.
+                self.filter
+                    .update(&Measurement { position: None, velocity: Some(([0.0; 2], [self.rules.variances[1]; 2])) });
+            }
+            _ => {}
+        }
+        self.missed = if measured { 0 } else { self.missed + 1 };
+        self.steer();
+        if let Some(frame) = frame {
+            self.previous = frame.clone();
+        }
+        self.tell(state, found, (innovation, measured, was_lost));
+    }
+
+    /// What moves in the window between the last frame and this one.
+    fn measure(&self, frame: &Frame<f64>) -> MeanFlow {
+        let (first, second) = (self.cut(&self.previous), self.cut(frame));
+        let velocity = self.filter.speed();
+        let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
+        let mut flow = self.rules.flow.from_two_starts(&first, &second, starts);
+        self.keep_window(&mut flow);
+        let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
+        let mut mean = flow.mean(eps);
+        let corner = self.corner();
+        mean.centroid = [mean.centroid[0] + corner[0], mean.centroid[1] + corner[1]];
+        mean
+    }
+
+    /// Centre of the window that is cut.
+    fn line_of_sight(&self) -> [f64; 2] {
+        match self.control {
+            Control::Integer => self.sight.map(|at| (at + 0.5).floor()),
+            Control::Subpixel => self.sight,
+        }
+    }
+
+    /// Upper left pixel of what is cut out, margin included.
+    fn corner(&self) -> [f64; 2] {
+        self.line_of_sight().map(|at| at - (self.fov / 2 + MARGIN) as f64)
+    }
+
+    /// The window with its margin; NaN outside the picture.
+    fn cut(&self, frame: &Frame<f64>) -> Frame<f64> {
+        let (corner, side) = (self.corner(), self.fov + 2 * MARGIN);
+        let inside = |at: f64, length: usize| at >= 0.0 && at <= length as f64 - 1.0;
+        Frame::from_fn(side, side, |x, y| {
+            let (x, y) = (corner[0] + x as f64, corner[1] + y as f64);
+            if !inside(x, frame.width()) || !inside(y, frame.height()) {
+                f64::NAN
+            } else if self.control == Control::Integer {
+                frame.get(x as usize, y as usize)
+            } else {
+                Interpolation::Bilinear.at(frame, x, y)
+            }
+        })
+    }
+
+    /// Only pixels of the window itself count.
+    fn keep_window(&self, flow: &mut LocalFlow) {
+        let inside = MARGIN..MARGIN + self.fov;
+        let (width, height) = flow.accepted.size();
+        for y in 0..height {
+            for x in 0..width {
+                if !inside.contains(&x) || !inside.contains(&y) {
+                    flow.accepted.row_mut(y)[x] = false;
+                }
+            }
+        }
+    }
+
+    /// Three deviations of the accepted flow outside the target.
+    fn automatic_eps(&self, flow: &LocalFlow) -> f64 {
+        let (corner, centre) = (self.corner(), self.filter.position());
+        let outside = |at: usize| {
+            let place = [at % flow.flow.width(), at / flow.flow.width()];
+            (0..2).any(|k| (corner[k] + place[k] as f64 - centre[k]).abs() > self.size[k] / 2.0)
+        };
+        let pixels = flow.flow.data().iter().zip(flow.accepted.data()).enumerate();
+        let mut sizes: Vec<f64> = pixels
+            .filter(|(at, (_, accepted))| **accepted && outside(*at))
+            .flat_map(|(_, (w, _))| w.map(f64::abs))
+            .collect();
+        (3.0 * MAD * median(&mut sizes)).max(LEAST_EPS)
+    }
+
+    fn steer(&mut self) {
+        let to = if self.rules.by_position {
+            self.filter.position()
+        } else {
+            let velocity = self.filter.speed();
+            [0, 1].map(|k| self.sight[k] + velocity[k])
+        };
+        if to.iter().all(|at| at.is_finite()) {
+            self.sight = to;
+        }
+    }
+
+    fn tell(
+        &self,
+        state: &mut TrackState,
+        found: Option<MeanFlow>,
+        (innovation, measured, was_lost): (f64, bool, bool),
+    ) {
+        let count = found.map_or(0, |mean| mean.count);
+        (state.status, state.reason) = match (measured, found) {
+            (true, _) => (TrackStatus::Tracking, ""),
+            _ if self.missed >= LOST_AFTER => (TrackStatus::Lost, "nothing that moves like the target for long"),
+            (_, None) => (TrackStatus::Coasting, "the frame cannot be used"),
+            (_, Some(mean)) if mean.count < FEWEST => (TrackStatus::Coasting, "nothing moves"),
+            _ => (TrackStatus::Coasting, "what moves is not where the target should be"),
+        };
+        state.reacquired = measured && was_lost;
+        state.position = self.filter.position();
+        state.velocity = self.filter.speed();
+        state.scene_velocity = state.velocity;
+        state.acceleration = self.filter.acceleration();
+        state.covariance = self.filter.covariance();
+        state.displacement = if measured { found.map_or([f64::NAN; 2], |mean| mean.velocity) } else { [f64::NAN; 2] };
+        state.bounds = TargetBox::about(state.position, self.size[0], self.size[1]);
+        state.rotation_observable = false;
+        state.visibility = f64::from(u8::from(measured));
+        state.innovation = innovation;
+        state.line_of_sight = self.line_of_sight();
+        state.flow_count = count;
+    }
+}

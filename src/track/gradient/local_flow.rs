@@ -1,0 +1,330 @@
+//! Flow of single pixels from the gradient equation in a small window: M. Chiba and S. Ozawa, equations (1) to (10).
+
+use super::kernels::{DerivativeKernels, KernelMask, REACH, derivative_kernels};
+use crate::image::Interpolation;
+use crate::types::Frame;
+
+/// Factor from the median of absolute deviations to a standard deviation, for Gaussian noise.
+pub(super) const MAD: f64 = 1.4826;
+/// Weakest gradient that counts, over the noise.
+const OVER_NOISE: f64 = 0.7;
+
+/// How local flow is computed and what is accepted of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalFlowOptions {
+    /// Side of the window of equations, px, odd.
+    pub window: usize,
+    /// Degree of the polynomials behind the derivatives, 1 to 4.
+    pub order: usize,
+    /// Largest condition number `sqrt(lambda_max / lambda_min)` of the gradients in the window (8).
+    pub cond_max: f64,
+    /// Least gradient along the weaker direction, `sqrt(lambda_min / m)`, grey levels/px. Above 0 it is at least 0.7 times the noise of the frames: the condition number does not change with contrast, so
+    /// that weak texture and noise pass it.
+    pub min_sigma: f64,
+    /// Longest step of one solution (4), px.
+    pub step_max: f64,
+}
+
+impl Default for LocalFlowOptions {
+    fn default() -> Self {
+        Self { window: 7, order: 4, cond_max: 10.0, min_sigma: 2.5, step_max: 4.0 }
+    }
+}
+
+/// Flow at every pixel of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalFlow {
+    /// `(u, v)`, px/frame; NaN where there is no solution.
+    pub flow: Frame<[f64; 2]>,
+    /// Where it was accepted.
+    pub accepted: Frame<bool>,
+}
+
+/// What moves, and where to (11).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeanFlow {
+    /// Mean flow over what moves, px/frame; zero where nothing does.
+    pub velocity: [f64; 2],
+    /// Mean place of what moves in the first frame, px; NaN where nothing does.
+    pub centroid: [f64; 2],
+    /// How many pixels move.
+    pub count: usize,
+}
+
+/// Noise of the frames from their difference: `1.4826 median|E(t+1) - E(t)| / sqrt 2`, grey levels; 0 where they have no common pixel.
+pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>) -> f64 {
+    let mut differences: Vec<f64> =
+        first.data().iter().zip(second.data()).map(|(a, b)| (b - a).abs()).filter(|d| d.is_finite()).collect();
+    MAD * median(&mut differences) / std::f64::consts::SQRT_2
+}
+
+/// The middle value (the upper one of two); 0 of nothing.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Correlation with a mask; NaN along the border and where a pixel is.
+fn correlate(frame: &Frame<f64>, mask: &KernelMask) -> Frame<f64> {
+    let (width, height) = frame.size();
+    let mut out = Frame::filled(width, height, f64::NAN);
+    if width <= 2 * REACH || height <= 2 * REACH {
+        return out;
+    }
+    for y in REACH..height - REACH {
+        let target = &mut out.row_mut(y)[REACH..width - REACH];
+        target.fill(0.0);
+        for (j, weights) in mask.iter().enumerate() {
+            let row = frame.row(y + j - REACH);
+            for (i, &w) in weights.iter().enumerate() {
+                if w != 0.0 {
+                    target.iter_mut().zip(&row[i..]).for_each(|(t, e)| *t += w * e);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Sums over a square window; NaN where the window reaches over the border or holds NaN.
+fn box_sum(plane: &Frame<f64>, window: usize) -> Frame<f64> {
+    let (width, height) = plane.size();
+    let reach = window / 2;
+    let mut out = Frame::filled(width, height, f64::NAN);
+    if width < window || height < window {
+        return out;
+    }
+    let mut line = vec![0.0; width];
+    for y in reach..height - reach {
+        line.fill(0.0);
+        for j in y - reach..=y + reach {
+            line.iter_mut().zip(plane.row(j)).for_each(|(l, e)| *l += e);
+        }
+        let target = &mut out.row_mut(y)[reach..width - reach];
+        target.fill(0.0);
+        for i in 0..window {
+            target.iter_mut().zip(&line[i..]).for_each(|(t, l)| *t += l);
+        }
+    }
+    out
+}
+
+/// The equations in the windows around all pixels, summed: `G'G`, `G'b` and `b'b`.
+pub(super) struct Equations {
+    xx: Frame<f64>,
+    xy: Frame<f64>,
+    yy: Frame<f64>,
+    xt: Frame<f64>,
+    yt: Frame<f64>,
+    /// Residual of no step at all.
+    pub tt: Frame<f64>,
+    /// Equations in a window.
+    count: f64,
+}
+
+impl Equations {
+    /// Of a frame and the next one, which was warped by what is known of the flow.
+    pub fn new(first: &Frame<f64>, warped: &Frame<f64>, kernels: &DerivativeKernels, window: usize) -> Self {
+        let (width, height) = first.size();
+        let combine = |f: &dyn Fn(f64, f64) -> f64| {
+            let data = first.data().iter().zip(warped.data()).map(|(a, b)| f(*a, *b)).collect();
+            Frame::new(width, height, data).unwrap_or_default()
+        };
+        let (mean, difference) = (combine(&|a, b| 0.5 * (a + b)), combine(&|a, b| b - a));
+        let (x, y, t) =
+            (correlate(&mean, &kernels.x), correlate(&mean, &kernels.y), correlate(&difference, &kernels.value));
+        let product = |a: &Frame<f64>, b: &Frame<f64>| {
+            let data = a.data().iter().zip(b.data()).map(|(a, b)| a * b).collect();
+            box_sum(&Frame::new(width, height, data).unwrap_or_default(), window)
+        };
+        Self {
+            xx: product(&x, &x),
+            xy: product(&x, &y),
+            yy: product(&y, &y),
+            xt: product(&x, &t),
+            yt: product(&y, &t),
+            tt: product(&t, &t),
+            count: (window * window) as f64,
+        }
+    }
+
+    /// The step at a pixel (7), and whether it is accepted; `least` is the weakest gradient that counts.
+    pub fn step(&self, at: usize, options: &LocalFlowOptions, least: f64) -> Option<([f64; 2], bool)> {
+        let at = |plane: &Frame<f64>| plane.data()[at];
+        let (xx, xy, yy, xt, yt) = (at(&self.xx), at(&self.xy), at(&self.yy), at(&self.xt), at(&self.yt));
+        let determinant = xx * yy - xy * xy;
+        // Also false for NaN.
+        if !(determinant > 0.0) {
+            return None;
+        }
+        let step = [-(yy * xt - xy * yt) / determinant, -(xx * yt - xy * xt) / determinant];
+        let (middle, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+        let (largest, smallest) = (middle + radius, determinant / (middle + radius));
+        let accepted = largest <= options.cond_max.powi(2) * smallest
+            && (smallest / self.count).sqrt() >= least
+            && step[0].hypot(step[1]) <= options.step_max;
+        step[0].is_finite().then_some((step, accepted && step[1].is_finite()))
+    }
+}
+
+impl LocalFlowOptions {
+    /// The weakest gradient that counts between these frames.
+    pub(super) fn least(&self, first: &Frame<f64>, second: &Frame<f64>) -> f64 {
+        if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second)) } else { 0.0 }
+    }
+
+    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made.
+    pub(super) fn from_two_starts(&self, first: &Frame<f64>, second: &Frame<f64>, starts: &[[f64; 2]]) -> LocalFlow {
+        let (kernels, least) = (derivative_kernels(self.order), self.least(first, second));
+        let equations: Vec<_> = starts
+            .iter()
+            .map(|start| (*start, Equations::new(first, &shifted(second, *start), &kernels, self.window)))
+            .collect();
+        let (width, height) = first.size();
+        let mut out = LocalFlow::none(width, height);
+        for at in 0..width * height {
+            let residual = |e: &Equations| if e.tt.data()[at].is_nan() { f64::INFINITY } else { e.tt.data()[at] };
+            let best = equations.iter().min_by(|a, b| residual(&a.1).total_cmp(&residual(&b.1)));
+            let Some((start, equations)) = best else { continue };
+            if let Some((step, accepted)) = equations.step(at, self, least) {
+                out.flow.data_mut()[at] = [start[0] + step[0], start[1] + step[1]];
+                out.accepted.data_mut()[at] = accepted;
+            }
+        }
+        out
+    }
+}
+
+impl LocalFlow {
+    fn none(width: usize, height: usize) -> Self {
+        Self { flow: Frame::filled(width, height, [f64::NAN; 2]), accepted: Frame::filled(width, height, false) }
+    }
+
+    /// Mean flow over the accepted pixels that move along x or along y by at least `eps` px/frame (11).
+    pub fn mean(&self, eps: f64) -> MeanFlow {
+        let (mut velocity, mut centroid, mut count) = ([0.0; 2], [0.0; 2], 0usize);
+        let pixels = self.flow.data().iter().zip(self.accepted.data()).enumerate();
+        for (at, (flow, _)) in pixels.filter(|(_, (_, accepted))| **accepted) {
+            if flow[0].abs() >= eps || flow[1].abs() >= eps {
+                let place = [at % self.flow.width(), at / self.flow.width()];
+                for k in 0..2 {
+                    velocity[k] += flow[k];
+                    centroid[k] += place[k] as f64;
+                }
+                count += 1;
+            }
+        }
+        let over = |sum: [f64; 2]| sum.map(|s| s / count as f64);
+        MeanFlow { velocity: if count > 0 { over(velocity) } else { [0.0; 2] }, centroid: over(centroid), count }
+    }
+}
+
+/// Flow of single pixels from the first frame to the second, one step from rest (1)-(8).
+pub fn local_flow(first: &Frame<f64>, second: &Frame<f64>, options: &LocalFlowOptions) -> LocalFlow {
+    options.from_two_starts(first, second, &[[0.0; 2]])
+}
+
+/// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the frame.
+pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
+    if shift == [0.0; 2] {
+        return frame.clone();
+    }
+    let (width, height) = frame.size();
+    let [sx, sy] = shift;
+    let (fx, fy) = (sx - sx.floor(), sy - sy.floor());
+    let (wx, wy) = (Interpolation::Bicubic.weights(fx), Interpolation::Bicubic.weights(fy));
+    let along = weighted(width, height, sx.floor() as isize, &wx, |x, y| frame.get(x, y));
+    // Columns in place of rows.
+    let turned = weighted(height, width, sy.floor() as isize, &wy, |y, x| along.get(x, y));
+    Frame::from_fn(width, height, |x, y| turned.get(y, x))
+}
+
+/// `sum_k w_k value(x + whole - 1 + k)`, NaN beyond the ends; values of weight zero are not needed.
+fn weighted(
+    length: usize,
+    lines: usize,
+    whole: isize,
+    weights: &[f64; 4],
+    value: impl Fn(usize, usize) -> f64,
+) -> Frame<f64> {
+    Frame::from_fn(length, lines, |x, line| {
+        let mut sum = 0.0;
+        for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            let at = x as isize + whole - 1 + k as isize;
+            if at < 0 || at >= length as isize {
+                return f64::NAN;
+            }
+            sum += w * value(at as usize, line);
+        }
+        sum
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    fn texture(width: usize, height: usize) -> Frame<f64> {
+        Frame::from_fn(width, height, |x, y| {
+            let (x, y) = (x as f64, y as f64);
+            128.0 + 30.0 * (0.5 * x + 0.2 * y).sin() + 25.0 * (0.35 * y - 0.3 * x).cos() + 10.0 * (0.6 * y).sin()
+        })
+    }
+
+    #[test]
+    fn a_small_shift_is_found_with_its_sign() {
+        let first = texture(40, 32);
+        // What is at p in the first frame is at p + (0.3, -0.2) in the second.
+        let second = shifted(&first, [-0.3, 0.2]);
+        let found = local_flow(&first, &second, &LocalFlowOptions { min_sigma: 0.5, ..LocalFlowOptions::default() });
+        let middle = found.flow.get(20, 16);
+        assert!((middle[0] - 0.3).abs() < 0.03 && (middle[1] + 0.2).abs() < 0.03, "{middle:?}");
+        assert!(found.accepted.get(20, 16) && !found.accepted.get(3, 16));
+        let mean = found.mean(0.25);
+        assert!((mean.velocity[0] - 0.3).abs() < 0.02 && (mean.centroid[0] - 19.5).abs() < 0.5 && mean.count > 300);
+    }
+
+    #[test]
+    fn the_better_start_is_chosen_pixel_by_pixel() {
+        let first = texture(60, 40);
+        let moved = shifted(&first, [-3.0, 1.0]);
+        let second = Frame::from_fn(60, 40, |x, y| if x < 30 { first.get(x, y) } else { moved.get(x, y) });
+        let found = LocalFlowOptions::default().from_two_starts(&first, &second, &[[0.0; 2], [2.9, -0.9]]);
+        let (still, moving) = (found.flow.get(12, 20), found.flow.get(46, 20));
+        assert!(still[0].abs() < 1e-9 && (moving[0] - 3.0).abs() < 0.05 && (moving[1] + 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn flat_and_noisy_pictures_are_refused_and_nan_stays_where_it_is() {
+        let flat = Frame::filled(30, 30, 90.0);
+        assert!(local_flow(&flat, &flat, &LocalFlowOptions::default()).mean(0.5).count == 0);
+        let noisy = |seed: u64| {
+            let rng = CounterRng::new(seed);
+            Frame::from_fn(60, 60, |x, y| f64::round(90.0 + 2.0 * rng.normal((60 * y + x) as u64)))
+        };
+        let count = |min_sigma: f64| {
+            let options = LocalFlowOptions { min_sigma, ..LocalFlowOptions::default() };
+            local_flow(&noisy(1), &noisy(2), &options).mean(0.5).count
+        };
+        assert!(count(0.0) > 500 && count(2.5) == 0);
+        let (first, second) = (texture(40, 32), shifted(&texture(40, 32), [-0.3, 0.2]));
+        let mut broken = second.clone();
+        broken.row_mut(10)[10] = f64::NAN;
+        let [whole, holed] = [&second, &broken].map(|s| local_flow(&first, s, &LocalFlowOptions::default()));
+        assert!(holed.flow.get(10, 10)[0].is_nan() && !holed.accepted.get(10, 10));
+        assert_eq!(holed.flow.get(25, 20), whole.flow.get(25, 20));
+    }
+
+    #[test]
+    fn tiny_frames_have_no_flow() {
+        for (width, height) in [(0, 0), (1, 1), (4, 30), (9, 9)] {
+            let frame = Frame::filled(width, height, 1.0);
+            let found = local_flow(&frame, &frame, &LocalFlowOptions::default());
+            assert!(found.accepted.data().iter().all(|a| !a) && found.mean(0.5).count == 0);
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Local flow refined by warping, (9), and from coarse pictures to fine ones.
+
+use super::kernels::derivative_kernels;
+use super::local_flow::{Equations, LocalFlow, LocalFlowOptions, median};
+use crate::image::Interpolation;
+use crate::types::Frame;
+
+/// How flow is refined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RefineOptions {
+    /// The single steps.
+    pub local: LocalFlowOptions,
+    /// Most steps at a level.
+    pub steps: usize,
+    /// Sides of the square windows that both frames are smoothed with, one level after the other, px; 1 leaves them as they are.
+    pub levels: [usize; 3],
+}
+
+impl Default for RefineOptions {
+    fn default() -> Self {
+        Self { local: LocalFlowOptions::default(), steps: 6, levels: [9, 5, 1] }
+    }
+}
+
+/// Side of the square that the median of the field is taken over between levels, px.
+const MEDIAN: usize = 5;
+
+/// Flow of single pixels from the first frame to the second, refined by warping with cubic convolution (9)(10), coarse to fine; motions up to about 3 px.
+///
+/// At a level a pixel goes on as long as the residual of its window strictly falls. Pixels without a solution keep what the level before found.
+pub fn refine_flow(first: &Frame<f64>, second: &Frame<f64>, options: &RefineOptions) -> LocalFlow {
+    let (width, height) = first.size();
+    let mut field = Frame::filled(width, height, [0.0; 2]);
+    let mut accepted = Frame::filled(width, height, false);
+    for (n, &side) in options.levels.iter().enumerate() {
+        let (a, b) = (box_mean(first, side), box_mean(second, side));
+        let window = options.local.window.max(if side > 1 { 2 * side + 1 } else { 0 });
+        let local = LocalFlowOptions { window, ..options.local };
+        accepted = refine_level(&a, &b, &local, options.steps, &mut field);
+        if n + 1 < options.levels.len() {
+            field = median_field(&field);
+        }
+    }
+    LocalFlow { flow: field, accepted }
+}
+
+/// Steps (9) at one level; tells which pixels were accepted at their last one.
+fn refine_level(
+    first: &Frame<f64>,
+    second: &Frame<f64>,
+    options: &LocalFlowOptions,
+    steps: usize,
+    field: &mut Frame<[f64; 2]>,
+) -> Frame<bool> {
+    let (width, height) = first.size();
+    let (kernels, least) = (derivative_kernels(options.order), options.least(first, second));
+    let mut best = Frame::filled(width, height, f64::INFINITY);
+    let mut active = Frame::filled(width, height, true);
+    let mut accepted = Frame::filled(width, height, false);
+    let mut trial = field.clone();
+    for step in 0..=steps {
+        let equations = Equations::new(first, &warped(second, &trial), &kernels, options.window);
+        for at in 0..width * height {
+            if !active.data()[at] {
+                continue;
+            }
+            let residual = equations.tt.data()[at];
+            // Strictly: at a fixed point it would never fail otherwise (10).
+            if !(residual < best.data()[at]) {
+                active.data_mut()[at] = false;
+                trial.data_mut()[at] = field.data()[at];
+                continue;
+            }
+            (best.data_mut()[at], field.data_mut()[at]) = (residual, trial.data()[at]);
+            let Some((delta, sound)) = equations.step(at, options, least).filter(|_| step < steps) else {
+                continue;
+            };
+            accepted.data_mut()[at] = sound;
+            if sound {
+                let now = &mut trial.data_mut()[at];
+                *now = [now[0] + delta[0], now[1] + delta[1]];
+            }
+        }
+    }
+    accepted
+}
+
+/// `frame(p + flow(p))` by cubic convolution.
+fn warped(frame: &Frame<f64>, field: &Frame<[f64; 2]>) -> Frame<f64> {
+    Frame::from_fn(frame.width(), frame.height(), |x, y| {
+        let [u, v] = field.get(x, y);
+        Interpolation::Bicubic.at(frame, x as f64 + u, y as f64 + v)
+    })
+}
+
+/// Mean over a square of `side` px (odd); NaN where it reaches over the border.
+fn box_mean(frame: &Frame<f64>, side: usize) -> Frame<f64> {
+    if side <= 1 {
+        return frame.clone();
+    }
+    let reach = side / 2;
+    let (width, height) = frame.size();
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / side as f64;
+    let inside = |at: usize, length: usize| at >= reach && at + reach < length;
+    let along = Frame::from_fn(width, height, |x, y| {
+        if inside(x, width) { mean(&mut frame.row(y)[x - reach..=x + reach].iter().copied()) } else { f64::NAN }
+    });
+    Frame::from_fn(width, height, |x, y| {
+        if inside(y, height) { mean(&mut (y - reach..=y + reach).map(|j| along.get(x, j))) } else { f64::NAN }
+    })
+}
+
+/// Median of each component over a square; beyond the border there is nothing.
+fn median_field(field: &Frame<[f64; 2]>) -> Frame<[f64; 2]> {
+    let reach = MEDIAN / 2;
+    Frame::from_fn(field.width(), field.height(), |x, y| {
+        let (columns, rows) = (
+            x.saturating_sub(reach)..(x + reach + 1).min(field.width()),
+            y.saturating_sub(reach)..(y + reach + 1).min(field.height()),
+        );
+        [0, 1].map(|k| {
+            let mut values: Vec<f64> =
+                rows.clone().flat_map(|j| field.row(j)[columns.clone()].iter().map(|w| w[k])).collect();
+            median(&mut values)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture(shift: [f64; 2]) -> Frame<f64> {
+        Frame::from_fn(72, 64, |x, y| {
+            let (x, y) = (x as f64 - shift[0], y as f64 - shift[1]);
+            128.0 + 40.0 * (0.3 * x + 0.1 * y).sin() + 35.0 * (0.23 * y - 0.17 * x).cos()
+        })
+    }
+
+    #[test]
+    fn three_pixels_are_found_to_a_thousandth() {
+        for shift in [[0.5, -0.25], [2.5, 1.0]] {
+            let found = refine_flow(&texture([0.0; 2]), &texture(shift), &RefineOptions::default());
+            for (x, y) in [(30, 30), (40, 25)] {
+                let w = found.flow.get(x, y);
+                assert!((w[0] - shift[0]).hypot(w[1] - shift[1]) < 3e-3, "{shift:?}: {w:?}");
+                assert!(found.accepted.get(x, y));
+            }
+        }
+    }
+
+    #[test]
+    fn frames_without_texture_stay_where_they_are() {
+        let flat = Frame::filled(40, 40, 7.0);
+        let found = refine_flow(&flat, &flat, &RefineOptions::default());
+        assert!(found.flow.data().iter().all(|w| *w == [0.0; 2]) && found.accepted.data().iter().all(|a| !a));
+    }
+}
