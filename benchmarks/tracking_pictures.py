@@ -90,9 +90,11 @@ class Figure:
 
     def _patch(self, shape: tuple[int, ...], t: int) -> tuple[slice, slice] | None:
         """Rows and columns of the picture that it may touch."""
-        reach = np.hypot(*self.sizes[t]) / 2 + 1
-        x, y = self.centres[t]
-        ends = [(max(0, int(np.floor(c - reach))), min(n, int(np.ceil(c + reach)) + 1)) for c, n in zip((y, x), shape, strict=True)]
+        c, s = abs(np.cos(self.angles[t])), abs(np.sin(self.angles[t]))
+        width, height = self.sizes[t]
+        reach = (s * width + c * height) / 2 + 1, (c * width + s * height) / 2 + 1
+        middle = self.centres[t][::-1]
+        ends = [(max(0, int(np.floor(m - r))), min(n, int(np.ceil(m + r)) + 1)) for m, r, n in zip(middle, reach, shape, strict=True)]
         return None if any(first >= last for first, last in ends) else (slice(*ends[0]), slice(*ends[1]))
 
     def _samples(self, patch: tuple[slice, slice], t: int) -> tuple[NDArray[np.bool_], Array, Array]:

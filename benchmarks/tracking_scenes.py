@@ -43,8 +43,8 @@ class Plane:
     seed: int
     motion: Array | None = None
     """(T, 2), how far it has moved since the beginning, px; None: it is still."""
-    rows: slice = slice(None)
-    """Rows of the frame that show it."""
+    rows: tuple[int, int] = (0, SIZE)
+    """The rows of the frame that show it: the first, and the one after the last."""
 
     @cached_property
     def still(self) -> Array:
@@ -126,7 +126,8 @@ class Scene:
         """(H, W), brightness at frame `t` without noise, grey levels."""
         picture = np.empty((SIZE, SIZE))
         for plane in self.planes:
-            picture[plane.rows] = plane.at(t)[plane.rows]
+            rows = slice(*plane.rows)
+            picture[rows] = plane.at(t)[rows]
         for figure in (self.target, *self.others):
             figure.draw(picture, t)
         return picture if self.gain is None else picture * self.gain[t]
