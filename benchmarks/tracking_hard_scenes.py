@@ -19,7 +19,7 @@ KIND = "fractal:1,90,30"
 SEED = 5
 RADIUS = 20.0
 CAMERA_SEED = 12
-TEXTURE_SEED = 11
+TEXTURE_SEED = 2
 BAR_LEVEL = 40.0
 MIDDLE = 25
 """The frame in which twins meet."""

@@ -28,9 +28,9 @@ TIMES = np.arange(FRAMES, dtype=float)
 CENTRE = np.array([128.0, 128.0])
 """Middle of the paths, px."""
 NOISE_SEED = 1
-BACKGROUNDS = ("flat:90", "smooth:4,90,20", "smooth:2,90,20", "fractal:1,90,30")
+BACKGROUNDS = ("smooth:4,90,20", "smooth:2,90,20", "smooth:2,128,40", "fractal:1,90,30")
 """Those of the 24 simulations."""
-MORE_BACKGROUNDS = ("smooth:8,90,30", "smooth:2,128,40", "fractal:1,90,15", "fractal:1.5,90,30")
+MORE_BACKGROUNDS = ("flat:90", "smooth:8,90,30", "fractal:1,90,15", "fractal:1.5,90,30")
 """Those that the 96 sequences have besides."""
 BACKGROUND_SEED = 3
 

@@ -181,12 +181,12 @@ def test_scores():
     exact = trackers.Track(scene.boxes, steps, steps, scene.centres, scene.scales, scene.angles, milliseconds=2.0)
     best = scores(exact, Truth.of(scene))
     assert best.pop("milliseconds") == 2.0
-    assert [best.pop(name) for name in ("on3", "success", "mean_overlap", "sight_on3")] == [1.0] * 4
-    assert set(best.values()) == {0.0} and len(best) == 7
+    assert [best.pop(name) for name in ("on3", "success", "mean_overlap", "sight_on3")] == pytest.approx([1.0] * 4)
+    assert max(best.values()) < 1e-9 and len(best) == 7
     half = scene.boxes + np.where(np.arange(51) > 25, 8.0, 0.5)[:, None] * (1, 0, 0, 0)
     worse = scores(trackers.Track(half, steps + (0.3, 0.0)), Truth.of(scene))
     assert worse["on3"] == worse["success"] == 0.5 and worse["centre_error"] == pytest.approx(4.25)
-    assert worse["displacement_error_x"] == pytest.approx(0.3) and worse["displacement_error_y"] == 0.0
+    assert worse["displacement_error_x"] == pytest.approx(0.3) and worse["displacement_error_y"] == pytest.approx(0.0, abs=1e-9)
     assert "scale_error" not in worse and "velocity_error_x" not in worse
 
 
@@ -202,6 +202,6 @@ def test_reference_masks_are_the_printed_ones():
     value, along_x, along_y = tracking_flow.reference_masks(4)
     rows = [[31, -44, 0, 44, -31], [-5, -62, 0, 62, 5], [-17, -68, 0, 68, 17], [-5, -62, 0, 62, 5], [31, -44, 0, 44, -31]]
     assert_allclose(along_x, np.array(rows) / 420, atol=1e-12)
-    assert_array_equal(along_y, along_x.T)
+    assert_allclose(along_y, along_x.T, atol=1e-12)
     assert_allclose(value[2], [0.078367, 0.200816, 0.441633, 0.200816, 0.078367], atol=1e-6)
     assert_allclose(tracking_flow.reference_masks(2)[1], np.tile(np.arange(-2, 3) / 50, (5, 1)), atol=1e-12)
