@@ -44,7 +44,7 @@ def read_all(data: Path) -> Iterator[Recording | str]:
         try:
             yield from read(data)
         except OSError as problem:
-            yield f"{name}: {problem}"
+            yield f"{name}: {problem.strerror or type(problem).__name__}"
 
 
 def crossing(data: Path) -> Iterator[Recording]:
