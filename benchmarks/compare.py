@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow memory filter accuracy controlled coverage` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow memory filter accuracy controlled coverage tracking` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking")
 
 
 def main() -> None:
@@ -80,6 +80,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import coverage
 
         return coverage.sections(quick, data)
+    if name == "tracking":
+        import tracking
+
+        return tracking.sections(quick, data)
     if data is None:
         return {}
     import accuracy
@@ -99,7 +103,7 @@ def describe_machine(simd: str) -> dict[str, str]:
     import jacoflow
 
     machine["jacoflow"] = jacoflow.__version__
-    for package in ("numpy", "opencv-python-headless", "filterpy"):
+    for package in ("numpy", "opencv-contrib-python-headless", "filterpy"):
         try:
             machine[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
