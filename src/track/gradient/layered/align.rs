@@ -19,6 +19,8 @@ const LEAST_SHARE: f64 = 0.03;
 const GAIN: (f64, f64) = (0.8, 1.25);
 /// Support that the brightness ratio is measured on.
 const BRIGHT: f64 = 0.7;
+/// Support from which on a point must be the target, unless something covers it.
+const SOLID: f64 = 0.3;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
 const CORRELATED: f64 = 4.0;
 
@@ -107,6 +109,7 @@ pub(super) struct Aligned {
 /// One level: everything smoothed alike.
 struct Level<'a> {
     task: Task<'a>,
+    sigma: f64,
     frame: Patch,
     behind: Patch,
     support: Frame<f64>,
@@ -124,6 +127,7 @@ impl<'a> Level<'a> {
         let product = Frame::new(target.a.width(), target.a.height(), product).unwrap_or_default();
         Self {
             task,
+            sigma,
             frame: Patch::cut(task.frame, bounds).smoothed(sigma),
             behind: Patch::cut(&task.background.picture, bounds).smoothed(sigma),
             support: smooth(&target.a, inner),
@@ -141,7 +145,7 @@ struct Vote {
 
 impl Level<'_> {
     /// Votes of all points near the support, without the weights for outliers; and the range of the model among them.
-    fn votes(&self, pose: &Pose, gain: f64, near: &Frame<bool>) -> (Vec<Vote>, f64) {
+    fn votes(&self, pose: &Pose, gain: f64, (near, silent): (&Frame<bool>, Option<&Frame<bool>>)) -> (Vec<Vote>, f64) {
         let Task { frame, target, background, .. } = self.task;
         let (width, height) = target.a.size();
         let (mut votes, mut range) = (Vec::with_capacity(width * height), (f64::INFINITY, f64::NEG_INFINITY));
@@ -156,11 +160,8 @@ impl Level<'_> {
                 let a = self.support.get(i, j);
                 let model = gain * self.bright.get(i, j) + (1.0 - a) * behind;
                 range = (range.0.min(model), range.1.max(model));
-                let mut weight = if background.is_known(place) { 1.0 } else { a.powi(4) };
-                if self.is_silent(a, (seen, behind), gain * target.t.get(i, j)) {
-                    weight = 0.0;
-                }
-                if weight > 0.0 {
+                let weight = if background.is_known(place) { 1.0 } else { a.powi(4) };
+                if weight > 0.0 && !silent.is_some_and(|silent| silent.get(i, j)) {
                     let slope = |plane: &Frame<f64>| {
                         let (row, above, below) = (plane.row(j), plane.row(j - 1), plane.row(j + 1));
                         [0.5 * (row[i + 1] - row[i - 1]), 0.5 * (below[i] - above[i])]
@@ -175,19 +176,25 @@ impl Level<'_> {
         (votes, (range.1 - range.0).max(0.0))
     }
 
-    fn is_silent(&self, a: f64, (seen, behind): (f64, f64), bright: f64) -> bool {
-        let nearer_behind = (seen - behind).abs() < (seen - bright).abs();
-        match self.task.silence {
-            Silence::None => false,
-            Silence::Covered => a > 0.3 && nearer_behind,
-            Silence::Lookalike => {
-                if a > 0.3 {
-                    nearer_behind
-                } else {
-                    !nearer_behind
-                }
+    /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the target its support ends without the target ending.
+    fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
+        let Task { frame, target, silence, .. } = self.task;
+        let (width, height) = target.a.size();
+        let silent = Frame::from_fn(width, height, |i, j| {
+            let place = pose.apply(target.xi(i, j));
+            if !is_inside(place, frame) {
+                return false;
             }
-        }
+            let (seen, behind, bright) = (self.frame.at(place), self.behind.at(place), gain * target.t.get(i, j));
+            let nearer_behind = (seen - behind).abs() < (seen - bright).abs();
+            match silence {
+                Silence::None => false,
+                Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
+                Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
+                Silence::Lookalike => !nearer_behind,
+            }
+        });
+        (silence != Silence::None).then(|| dilated(&silent, 1 + self.sigma.ceil() as usize))
     }
 
     /// Ratio of what is seen to the template.
@@ -205,6 +212,14 @@ impl Level<'_> {
         }
         if ratios.is_empty() { before } else { median(&mut ratios).clamp(GAIN.0, GAIN.1) }
     }
+}
+
+/// Everything within `reach` points along both axes.
+fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
+    let (width, height) = mask.size();
+    let wide = |at: usize, length: usize| at.saturating_sub(reach)..(at + reach + 1).min(length);
+    let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, width)].contains(&true));
+    Frame::from_fn(width, height, |i, j| wide(j, height).any(|k| along.get(i, k)))
 }
 
 /// The residual's deviation, robustly.
@@ -239,8 +254,9 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
     let mut last = None;
     for &sigma in task.levels {
         let level = Level::new(task, &pose, sigma);
+        let silent = level.silent(&pose, gain);
         for _ in 0..STEPS {
-            let (votes, range) = level.votes(&pose, gain, &near);
+            let (votes, range) = level.votes(&pose, gain, (&near, silent.as_ref()));
             if votes.len() < unknowns {
                 return None;
             }

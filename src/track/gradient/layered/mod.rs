@@ -32,6 +32,10 @@ const BADLY: f64 = 0.6;
 const LEAST: [f64; 2] = [0.35, 0.5];
 /// Innovation squared from which on a measurement is doubted.
 const DOUBT: f64 = 12.0;
+/// Innovation squared up to which a measurement is not questioned when the camera moves.
+const SURE: f64 = 4.0;
+/// Frames in which the support is still adapting to what the box holds.
+const YOUNG: usize = 6;
 /// Part of the target's area that may look like it beside it.
 const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
@@ -75,6 +79,10 @@ pub(super) struct Layered {
     turned: f64,
     gain: f64,
     rotation_told: bool,
+    /// Whether the target keeps its place in the picture when the camera moves.
+    with_camera: bool,
+    /// Frames measured.
+    age: usize,
 }
 
 /// What a frame says of the target.
@@ -112,6 +120,8 @@ impl Layered {
             turned: 0.0,
             gain: 1.0,
             rotation_told: true,
+            with_camera: false,
+            age: 0,
         }
     }
 
@@ -134,7 +144,7 @@ impl Layered {
         };
         self.follow_camera(motion, &frame);
         self.filter.predict();
-        let finding = self.find(&frame);
+        let finding = self.find_wherever_it_rides(&frame, motion);
         match &finding {
             Some(found) => self.take(found, &frame),
             None => self.miss(),
@@ -154,10 +164,36 @@ impl Layered {
             return;
         }
         self.background.moved(motion, frame);
+        self.shift(motion);
+    }
+
+    fn shift(&mut self, motion: [f64; 2]) {
         self.filter.shift(motion);
         let shift = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
         self.pose.p = shift(self.pose.p);
         self.before = self.before.map(shift);
+    }
+
+    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
+    fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
+        let against = motion.map(|m| -m);
+        if motion != [0.0; 2] && self.with_camera {
+            self.shift(against);
+        }
+        let first = self.find(frame);
+        let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
+        if motion == [0.0; 2] || nis(&first) < SURE {
+            return first;
+        }
+        let (there, back) = if self.with_camera { (motion, against) } else { (against, motion) };
+        self.shift(there);
+        let second = self.find(frame);
+        if nis(&second) < nis(&first) {
+            self.with_camera = !self.with_camera;
+            return second;
+        }
+        self.shift(back);
+        first
     }
 
     /// Where the filter expects the target.
@@ -208,7 +244,7 @@ impl Layered {
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
         let mut best = plain;
         let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
-        if doubted || interrupted {
+        if (doubted || interrupted) && self.age >= YOUNG {
             best = self.covered(frame, plain, levels).or(best);
         }
         if let Some(found) = best.filter(|found| !found.occluded) {
@@ -291,7 +327,9 @@ impl Layered {
         }
         self.before = (!occluded).then_some(at);
         (self.missed, self.hidden, self.started) = (0, occluded, true);
-        if !occluded && look.visibility >= WELL {
+        self.age += 1;
+        let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
+        if !occluded && look.visibility >= least {
             self.learn(frame, aligned.gain, look.visibility);
         }
     }
