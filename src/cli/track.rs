@@ -166,10 +166,11 @@ impl TrackCommand {
 
     /// How targets are drawn: with the window where the tracker looks through one.
     fn drawing(&self, options: &GradientOptions) -> TrackOverlay {
-        let mut overlay = TrackOverlay::default();
-        overlay.enlargement = self.enlarge;
-        overlay.window = (options.mode != Mode::Layered).then_some(options.fov as f64);
-        overlay
+        TrackOverlay {
+            window: (options.mode != Mode::Layered).then_some(options.fov as f64),
+            enlargement: self.enlarge,
+            ..TrackOverlay::default()
+        }
     }
 
     fn details(&self, opened: &Opened) -> Value {

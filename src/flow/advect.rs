@@ -137,18 +137,15 @@ impl Lattice {
             let there = x < field.width && y < field.height && field.status[site].is_valid();
             there.then(|| field.affine(site).to_array()).map(|m| [m[0].to_f64(), m[1].to_f64()])
         };
-        let difference = |pairs: [(Option<[f64; 2]>, Option<[f64; 2]>, f64); 2]| {
-            let mut slope = [0.0; 2];
-            for (after, before, weight) in pairs {
-                if let (Some(after), Some(before)) = (after, before) {
-                    (0..2).for_each(|c| slope[c] += weight * (after[c] - before[c]) / self.stride);
-                }
+        let step = |after: Option<[f64; 2]>, before: Option<[f64; 2]>, weight: f64| -> [f64; 2] {
+            match (after, before) {
+                (Some(after), Some(before)) => std::array::from_fn(|c| weight * (after[c] - before[c]) / self.stride),
+                _ => [0.0; 2],
             }
-            slope
         };
-        let along_x = difference([(flow(1, 0), flow(0, 0), 1.0 - fy), (flow(1, 1), flow(0, 1), fy)]);
-        let along_y = difference([(flow(0, 1), flow(0, 0), 1.0 - fx), (flow(1, 1), flow(1, 0), fx)]);
-        [[along_x[0], along_y[0]], [along_x[1], along_y[1]]]
+        let x = [step(flow(1, 0), flow(0, 0), 1.0 - fy), step(flow(1, 1), flow(0, 1), fy)];
+        let y = [step(flow(0, 1), flow(0, 0), 1.0 - fx), step(flow(1, 1), flow(1, 0), fx)];
+        std::array::from_fn(|c| [x[0][c] + x[1][c], y[0][c] + y[1][c]])
     }
 }
 

@@ -24,7 +24,7 @@ pub fn read_otb(path: impl AsRef<Path>) -> Result<Vec<Option<TargetBox>>> {
         .map(|(line, values)| match values[..] {
             [x, y, width, height] => {
                 let there = [x, y, width, height].iter().all(|v| v.is_finite()) && width > 0.0 && height > 0.0;
-                Ok(there.then(|| TargetBox { x: x - FIRST_PIXEL, y: y - FIRST_PIXEL, width, height }))
+                Ok(there.then_some(TargetBox { x: x - FIRST_PIXEL, y: y - FIRST_PIXEL, width, height }))
             }
             _ => Err(Error::format(path, format!("line {line}: expected four numbers x,y,w,h, got {}", values.len()))),
         })
@@ -60,10 +60,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("groundtruth_rect.txt");
         std::fs::write(&path, "\u{feff}11,21,13,5\n11\t21\t13\t5\r\n 11 21  13 5\n0,0,0,0\nNaN,NaN,NaN,NaN\n").unwrap();
-        let bounds = Some(TargetBox { x: 9.5, y: 19.5, width: 13.0, height: 5.0 });
-        assert_eq!(read_otb(&path).unwrap(), [bounds, bounds, bounds, None, None]);
+        let bounds = TargetBox { x: 9.5, y: 19.5, width: 13.0, height: 5.0 };
+        assert_eq!(read_otb(&path).unwrap(), [Some(bounds), Some(bounds), Some(bounds), None, None]);
         // The benchmark's own centre of a box, x + (w - 1) / 2 counted from 1, is ours.
-        assert_eq!(bounds.unwrap().centre(), [11.0 + 6.0 - 1.0, 21.0 + 2.0 - 1.0]);
+        assert_eq!(bounds.centre(), [11.0 + 6.0 - 1.0, 21.0 + 2.0 - 1.0]);
     }
 
     #[test]

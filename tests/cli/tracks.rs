@@ -165,7 +165,7 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m -o old.csv", &["output", "--force"]),
         ("track s.y4m --overlay old.csv", &["overlay", "folder"]),
         ("track s.y4m --enlarge 2", &["--overlay"]),
-        ("track s.y4m --limit 1 -o new.csv", &["frames", "at least 2"]),
+        ("track s.y4m --limit 1 --json", &["frames", "at least 2"]),
         ("track s.y4m --threads 0", &["--threads"]),
     ] {
         let ended = place.line(line);

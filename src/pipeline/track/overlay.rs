@@ -44,17 +44,17 @@ impl Overlays {
             return Err(Error::argument("overlay", "a folder", folder.display()));
         }
         let entries = folder.read_dir().into_iter().flatten().flatten();
-        let ours =
-            |name: &str| name.strip_prefix(STEM).is_some_and(|rest| rest.starts_with('_') && rest.ends_with(".png"));
-        match entries
-            .map(|entry| entry.path())
-            .find(|path| path.file_name().is_some_and(|n| ours(&n.to_string_lossy())))
-        {
-            Some(path) => Err(Error::argument(
-                "overlay",
-                "a place without earlier results (--force replaces them)",
-                path.display(),
-            )),
+        let ours = |path: &PathBuf| {
+            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let number = stem.strip_prefix(STEM).and_then(|rest| rest.strip_prefix('_'));
+            path.extension().is_some_and(|e| e == "png")
+                && number.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
+        };
+        match entries.map(|entry| entry.path()).find(ours) {
+            Some(path) => {
+                let wanted = "a place without earlier results (--force replaces them)";
+                Err(Error::argument("overlay", wanted, path.display()))
+            }
             None => Ok(()),
         }
     }
