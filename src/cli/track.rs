@@ -189,7 +189,8 @@ impl TrackCommand {
             (_, asked) => asked.as_ref(),
         };
         if !self.tell.quiet && (failure.is_none() || interrupted) {
-            tell(&in_words(summary, output.map(PathBuf::as_path)));
+            let place = output.or(self.overlay.as_ref());
+            tell(&in_words(summary, place.map(PathBuf::as_path)));
         }
         let mut object = json!({
             "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,
