@@ -14,3 +14,5 @@ mod mistakes;
 mod recordings;
 #[path = "cli/streams.rs"]
 mod streams;
+#[path = "cli/tracks.rs"]
+mod tracks;

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -215,6 +215,32 @@ class FlowField:
 
         `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
         The standard deviation allows for the correlation of neighbouring estimates, and for an error that they have in common: what they claim and do not scatter. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        """
+    @overload
+    def advect(self, /, points: ArrayLike, covariance: None = None) -> NDArray[np.float64]:
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its fields, (T + 1, N, 2), beginning with `points`.
+
+        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites the flow is bilinear in what the four sites about a point
+        say of it by flow and Jacobian: affine motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+
+        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes
+        (I + M) C (I + M)^T with the Jacobian M, plus the covariance of the flow there where the field has one: errors of the flow are taken as independent of
+        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain points.
+
+        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other shapes, and for matrices that are no covariance.
+        """
+    @overload
+    def advect(self, /, points: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its fields, (T + 1, N, 2), beginning with `points`.
+
+        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites the flow is bilinear in what the four sites about a point
+        say of it by flow and Jacobian: affine motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+
+        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes
+        (I + M) C (I + M)^T with the Jacobian M, plus the covariance of the flow there where the field has one: errors of the flow are taken as independent of
+        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain points.
+
+        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other shapes, and for matrices that are no covariance.
         """
     def unit(self, /, name: str) -> str:
         """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name."""

@@ -8,6 +8,7 @@ use super::interrupt::Watch;
 use super::measure::MeasureCommand;
 use super::report::Report;
 use super::synth::SynthCommand;
+use super::track::TrackCommand;
 use crate::error::Result;
 use clap::Subcommand;
 
@@ -20,6 +21,8 @@ pub enum Command {
     Filter(Box<FilterCommand>),
     /// Measure rotation, time to contact, divergence, ... with their standard deviations
     Measure(Box<MeasureCommand>),
+    /// Follow moving targets: position, velocity, box, scale and rotation, with their covariance
+    Track(Box<TrackCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
     Synth(Box<SynthCommand>),
     /// Tell what a recording or a result file holds
@@ -35,6 +38,7 @@ impl Command {
             Self::Flow(command) => command.tell.json,
             Self::Filter(command) => command.tell.json,
             Self::Measure(command) => command.tell.json,
+            Self::Track(command) => command.tell.json,
             Self::Synth(command) => command.tell.json,
             Self::Info(command) => command.tell.json,
             Self::Demo(command) => command.tell.json,
@@ -47,6 +51,7 @@ impl Command {
             Self::Flow(command) => command.execute(watch),
             Self::Filter(command) => command.execute(watch),
             Self::Measure(command) => command.execute(watch),
+            Self::Track(command) => command.execute(watch),
             Self::Synth(command) => command.execute(watch),
             Self::Info(command) => command.execute(watch),
             Self::Demo(command) => command.execute(watch),

@@ -20,6 +20,7 @@ mod report;
 mod run;
 mod scene_list;
 mod synth;
+mod track;
 
 use clap::Parser;
 use command::Command;
@@ -34,7 +35,8 @@ use std::ffi::OsString;
     Examples:\n  \
     jacoflow demo -o demo\n  \
     jacoflow flow frames/ -o out/ --picture colour,divergence\n  \
-    jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100"
+    jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100\n  \
+    jacoflow track film.y4m --box 120,80,24,30 -o track.csv"
 )]
 struct Cli {
     #[command(subcommand)]

@@ -12,6 +12,7 @@
 //! * [`observability`]: which condition of theorem 1 holds at each pixel.
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 
+mod advect;
 pub mod baseline;
 pub mod coarse_to_fine;
 pub mod derived;
@@ -24,6 +25,7 @@ mod options;
 mod site;
 pub mod windowed;
 
+pub use advect::{Advected, PointCovariance, advect};
 pub use estimator::Estimator;
 pub use observability::{Condition, Observability, ObservabilityMap, classify, observability};
 pub use options::{Common, Method, RankPolicy};

@@ -1,4 +1,4 @@
-//! Frames in, results out: sources of grey frames, and readers and writers of flow, arrays, tables and pictures.
+//! Frames in, results out: sources of grey frames, and readers and writers of flow, arrays, tables, tracks and pictures.
 //!
 //! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader takes damaged and hostile files for what they
 //! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
@@ -10,6 +10,7 @@ mod flo;
 mod flow_image;
 mod jpeg;
 mod kitti;
+mod mot;
 mod npy;
 pub mod npz;
 mod numbered;
@@ -18,6 +19,8 @@ mod picture_png;
 mod sink;
 mod source;
 mod table;
+mod text_boxes;
+mod track_table;
 pub mod write;
 
 pub use decode::read_image;
@@ -26,6 +29,7 @@ pub use field_npz::{StoredField, read_npz, read_npz_from, write_npz, write_npz_t
 pub use flo::{read_flo, write_flo};
 pub use flow_image::FlowImage;
 pub use kitti::{read_kitti, write_kitti};
+pub use mot::{MotBox, MotTable, read_mot};
 pub use npy::{Element, ElementType, NpyHeader};
 pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
@@ -36,3 +40,5 @@ pub use source::{
     open,
 };
 pub use table::{FieldTable, TableWriter, cell};
+pub use text_boxes::read_otb;
+pub use track_table::TrackTable;

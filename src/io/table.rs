@@ -47,11 +47,21 @@ impl TableWriter {
     /// # Errors
     /// As [`AtomicFile::create`].
     pub fn create<S: AsRef<str>>(path: impl AsRef<Path>, header: &[S]) -> Result<Self> {
+        let mut table = Self::create_without_header(path, header.len())?;
+        table.row(header.iter().map(AsRef::as_ref))?;
+        Ok(table)
+    }
+
+    /// The same without a header, for rows of so many columns.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`].
+    pub fn create_without_header(path: impl AsRef<Path>, columns: usize) -> Result<Self> {
         let path = path.as_ref();
         if path == Path::new("-") {
-            return Self::begin(Target::Stream(Box::new(std::io::stdout())), "standard output".into(), header);
+            return Ok(Self::new(Target::Stream(Box::new(std::io::stdout())), "standard output".into(), columns));
         }
-        Self::begin(Target::File(AtomicFile::create(path)?), path.to_path_buf(), header)
+        Ok(Self::new(Target::File(AtomicFile::create(path)?), path.to_path_buf(), columns))
     }
 
     /// Begins a table on any stream; `name` stands for it in messages.
@@ -59,14 +69,13 @@ impl TableWriter {
     /// # Errors
     /// [`Error::Io`] when the header cannot be written.
     pub fn on_stream<S: AsRef<str>>(stream: Box<dyn Write + Send>, name: &str, header: &[S]) -> Result<Self> {
-        Self::begin(Target::Stream(stream), name.into(), header)
-    }
-
-    fn begin<S: AsRef<str>>(target: Target, path: PathBuf, header: &[S]) -> Result<Self> {
-        let csv = csv::WriterBuilder::new().flexible(true).from_writer(target);
-        let mut table = Self { csv, path, columns: header.len() };
+        let mut table = Self::new(Target::Stream(stream), name.into(), header.len());
         table.row(header.iter().map(AsRef::as_ref))?;
         Ok(table)
+    }
+
+    fn new(target: Target, path: PathBuf, columns: usize) -> Self {
+        Self { csv: csv::WriterBuilder::new().flexible(true).from_writer(target), path, columns }
     }
 
     /// Adds a row.

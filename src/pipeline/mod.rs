@@ -1,4 +1,5 @@
-//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks.
+//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks; and, with trackers in their place, to
+//! tracks ([`TrackRun`]).
 //!
 //! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`] frames wait behind the reader,
 //! and a stage keeps the few frames that it needs (figures 1 and 2 of WO2010/098160). Frames are read and decoded on a thread of their own
@@ -9,9 +10,14 @@ mod prefetch;
 mod run;
 mod sink;
 mod stage;
+mod track;
 
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_folder};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};
 pub use stage::{EstimatorStage, FilterStage, Output, Stage};
+pub use track::{
+    Begin, Begun, Overlays, PATH_LENGTH, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackStep,
+    TrackSummary,
+};

@@ -189,7 +189,7 @@ impl<T: SimdReal> Pipeline<T> {
 }
 
 /// The first frame sets the size; every other one must have it.
-fn check_size(first: &mut Option<(usize, usize)>, size: (usize, usize), index: usize) -> Result<()> {
+pub(super) fn check_size(first: &mut Option<(usize, usize)>, size: (usize, usize), index: usize) -> Result<()> {
     let (width, height) = *first.get_or_insert(size);
     if size == (width, height) {
         return Ok(());

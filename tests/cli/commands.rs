@@ -9,7 +9,7 @@ fn version_and_help_go_to_standard_output() {
     let place = Place::new();
     let version = place.good("--version");
     assert_eq!(version.out.trim(), concat!("jacoflow ", env!("CARGO_PKG_VERSION")));
-    for command in ["flow", "filter", "measure", "synth", "info", "demo"] {
+    for command in ["flow", "filter", "measure", "track", "synth", "info", "demo"] {
         let help = place.good(&format!("{command} --help"));
         assert!(help.out.contains("Example") && help.out.contains("--json"), "{command}");
     }

@@ -25,6 +25,8 @@ def test_estimate() -> None:
     assert_type(field.rpm, NDArray[np.float64])
     assert_type(field.region_mean("curl"), tuple[float, float, int])
     assert_type(field[0] if field.shape[0] < 0 else field, FlowField)
+    assert_type(field.advect([[5.0, 6.0]]), NDArray[np.float64])
+    assert_type(field.advect([[5.0, 6.0]], np.eye(2)), tuple[NDArray[np.float64], NDArray[np.float64]])
     covariance = field.covariance
     assert covariance is not None and covariance.shape[-2:] == (6, 6)
     assert Status(int(field.status[5, 5])) is Status.OK

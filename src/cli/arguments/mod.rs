@@ -6,6 +6,7 @@ mod input;
 mod method;
 mod output;
 mod sites;
+mod track;
 
 pub use compute::{ComputeArguments, Precision, TellArguments};
 pub use filter::{FilterArguments, describe_filter};
@@ -13,6 +14,7 @@ pub use input::InputArguments;
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use sites::SiteArguments;
+pub use track::{TargetArguments, TrackerArguments};
 
 /// `KxL` (or `K` for a square): width and height of a neighbourhood or a frame.
 pub fn parse_size(text: &str) -> Result<(usize, usize), String> {

@@ -3,18 +3,40 @@
 use super::{Picture, percentile};
 use crate::types::AnyFrame;
 
-/// A grey picture of a frame. Eight-bit samples are shown as they are; other types are stretched from their 0.5th to their 99.5th percentile,
-/// since sensors of 10 to 14 bit and float pictures say nothing of their full scale. NaN is black.
-pub fn grey_picture(frame: &AnyFrame) -> Picture {
-    let (width, height) = frame.size();
-    if let AnyFrame::U8(frame) = frame {
-        return Picture::from_fn(width, height, |x, y| [frame.get(x, y); 3]);
+/// The samples that are shown as black and as white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GreyRange {
+    low: f64,
+    gain: f64,
+}
+
+impl GreyRange {
+    /// The range of a frame: for eight-bit samples all there is, for other types from their 0.5th to their 99.5th percentile, since sensors of 10 to 14 bit and float
+    /// pictures say nothing of their full scale. The range of the first frame of a sequence serves for all of it, so that brightness can be compared.
+    pub fn of(frame: &AnyFrame) -> Self {
+        if matches!(frame, AnyFrame::U8(_)) {
+            return Self { low: 0.0, gain: 1.0 };
+        }
+        let frame = frame.to_real::<f64>();
+        let low = percentile(frame.data().iter().copied(), 0.5);
+        let high = percentile(frame.data().iter().copied(), 99.5);
+        Self { low, gain: if high > low { 255.0 / (high - low) } else { 0.0 } }
     }
-    let frame = frame.to_real::<f64>();
-    let low = percentile(frame.data().iter().copied(), 0.5);
-    let high = percentile(frame.data().iter().copied(), 99.5);
-    let gain = if high > low { 255.0 / (high - low) } else { 0.0 };
-    Picture::from_fn(width, height, |x, y| [((frame.get(x, y) - low) * gain).round() as u8; 3])
+
+    /// A grey picture of a frame in this range. NaN is black.
+    pub fn picture(&self, frame: &AnyFrame) -> Picture {
+        let (width, height) = frame.size();
+        if let AnyFrame::U8(frame) = frame {
+            return Picture::from_fn(width, height, |x, y| [frame.get(x, y); 3]);
+        }
+        let frame = frame.to_real::<f64>();
+        Picture::from_fn(width, height, |x, y| [((frame.get(x, y) - self.low) * self.gain).round() as u8; 3])
+    }
+}
+
+/// A grey picture of a frame in its own [`GreyRange`].
+pub fn grey_picture(frame: &AnyFrame) -> Picture {
+    GreyRange::of(frame).picture(frame)
 }
 
 #[cfg(test)]
@@ -30,5 +52,7 @@ mod tests {
         assert_eq!([0, 1].map(|x| grey_picture(&words).pixel(x, 0)[0]), [0, 255]);
         let flat = AnyFrame::F32(Frame::new(2, 1, vec![f32::NAN, 5.0]).unwrap());
         assert_eq!(grey_picture(&flat).pixel(0, 0), [0; 3]);
+        let darker = AnyFrame::U16(Frame::filled(2, 1, 550));
+        assert_eq!(GreyRange::of(&words).picture(&darker).pixel(0, 0), [128; 3]);
     }
 }

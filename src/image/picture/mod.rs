@@ -1,15 +1,18 @@
-//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey.
+//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks over them.
 //!
 //! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes it as PNG.
 
+mod digits;
 mod diverging;
 mod grey;
 mod line;
+mod overlay;
 mod quiver;
 mod wheel;
 
 pub use diverging::{SignedMap, symmetric_range};
-pub use grey::grey_picture;
+pub use grey::{GreyRange, grey_picture};
+pub use overlay::{PathPoint, TrackOverlay, status_colour};
 pub use quiver::{Arrow, Quiver, arrows_on_grid};
 pub use wheel::{FlowColours, wheel_legend};
 

@@ -10,6 +10,7 @@ pub use fields::Fields;
 pub use measurements::Measurements;
 pub use memory::Collect;
 pub use pictures::{PictureRanges, Pictures};
+pub(in crate::pipeline) use table::end_table;
 pub use table::{Rows, Table, TableTarget};
 
 use crate::error::Result;

@@ -20,7 +20,7 @@ pub enum TableTarget {
 
 impl TableTarget {
     /// As a writer of tables takes it.
-    fn path(&self) -> &Path {
+    pub(in crate::pipeline) fn path(&self) -> &Path {
         match self {
             Self::StandardOutput => Path::new("-"),
             Self::File(path) => path,
@@ -29,7 +29,8 @@ impl TableTarget {
 
     /// The name for the rows of a run that was stopped: `points.csv` becomes `points.partial.csv`.
     fn partial(&self) -> PathBuf {
-        self.path().with_extension("partial.csv")
+        let extension = self.path().extension().map_or_else(|| "csv".into(), |e| e.to_string_lossy());
+        self.path().with_extension(format!("partial.{extension}"))
     }
 }
 
@@ -78,7 +79,7 @@ impl Table {
     /// As [`TableWriter::finish`].
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
         let Some(writer) = self.writer.take() else { return Ok(()) };
-        self.kept = end(&self.target, ending, self.rows > 0, |name| match name {
+        self.kept = end_table(&self.target, ending, self.rows > 0, |name| match name {
             Some(name) => writer.finish_as(name),
             None => writer.finish(),
         })?;
@@ -92,7 +93,7 @@ impl Table {
 }
 
 /// Ends a table by `finish(None)` under its own name, by `finish(Some(name))` under the partial one, or, without rows, by dropping it. The file that is in place then.
-fn end(
+pub(in crate::pipeline) fn end_table(
     target: &TableTarget,
     ending: Ending,
     any: bool,
@@ -137,7 +138,7 @@ impl<T: Real> Sink<T> for Rows {
 
     fn finish(&mut self, ending: Ending) -> Result<()> {
         let Some(table) = self.table.take() else { return Ok(()) };
-        self.kept = end(&self.target, ending, true, |name| match name {
+        self.kept = end_table(&self.target, ending, true, |name| match name {
             Some(name) => table.finish_as(name),
             None => table.finish(),
         })?;

@@ -1,5 +1,6 @@
 //! `FlowField`: flow, Jacobian, covariance and status of one frame or of a stack, as arrays that share the core's memory.
 
+mod advect;
 mod derived;
 mod measures;
 mod packed;

@@ -1,0 +1,75 @@
+//! Small numbers in pictures.
+
+use super::{Picture, Rgb};
+
+/// The digits 0 to 9 in 3 x 5 dots: rows from the top, the left dot in the highest of three bits.
+const DOTS: [[u8; 5]; 10] = [
+    [7, 5, 5, 5, 7],
+    [2, 6, 2, 2, 7],
+    [7, 1, 7, 4, 7],
+    [7, 1, 7, 1, 7],
+    [5, 5, 7, 1, 1],
+    [7, 4, 7, 1, 7],
+    [7, 4, 7, 5, 7],
+    [7, 1, 2, 2, 2],
+    [7, 5, 7, 5, 7],
+    [7, 5, 7, 1, 7],
+];
+
+/// Writes `number` so that it ends 2 dots above `(left, bottom)`, in dots of `size x size` px; nothing for a place that is not finite.
+pub(super) fn draw_number(picture: &mut Picture, number: usize, left: f64, bottom: f64, size: usize, colour: Rgb) {
+    if !(left.is_finite() && bottom.is_finite()) {
+        return;
+    }
+    let size = size as isize;
+    let (left, top) = (left.round() as isize, (bottom.round() as isize).saturating_sub(7 * size));
+    for (place, digit) in number.to_string().bytes().enumerate() {
+        let first = left.saturating_add(4 * size * place as isize);
+        for (row, bits) in DOTS[usize::from(digit - b'0')].into_iter().enumerate() {
+            for column in (0..3).filter(|column| bits & (4 >> column) != 0) {
+                dot(
+                    picture,
+                    first.saturating_add(column * size),
+                    top.saturating_add(row as isize * size),
+                    size,
+                    colour,
+                );
+            }
+        }
+    }
+}
+
+fn dot(picture: &mut Picture, x: isize, y: isize, size: isize, colour: Rgb) {
+    for dy in 0..size {
+        for dx in 0..size {
+            picture.blend(x.saturating_add(dx), y.saturating_add(dy), colour, 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(number: usize) -> Vec<String> {
+        let mut picture = Picture::filled(7, 7, [0; 3]);
+        draw_number(&mut picture, number, 0.0, 7.0, 1, [255; 3]);
+        let ink = |x, y| if picture.pixel(x, y)[0] > 0 { '#' } else { '.' };
+        (0..5).map(|y| (0..7).map(|x| ink(x, y)).collect()).collect()
+    }
+
+    #[test]
+    fn digits_can_be_read() {
+        assert_eq!(shape(14), [".#..#.#", "##..#.#", ".#..###", ".#....#", "###...#"]);
+        assert_eq!(shape(7), ["###....", "..#....", ".#.....", ".#.....", ".#....."]);
+    }
+
+    #[test]
+    fn places_far_away_do_no_harm() {
+        let mut picture = Picture::filled(4, 4, [0; 3]);
+        for place in [f64::NAN, 1e300, -1e300] {
+            draw_number(&mut picture, 1234567890, place, place, 3, [255; 3]);
+        }
+        assert_eq!(picture, Picture::filled(4, 4, [0; 3]));
+    }
+}

@@ -1,0 +1,226 @@
+//! Tracks drawn over a frame: box, path, centre with its error ellipse, window.
+
+use super::digits::draw_number;
+use super::line::draw_stroke;
+use super::{Picture, Rgb};
+use crate::types::{TrackState, TrackStatus};
+
+/// Squared radius of the ellipse that holds 95 % of a two-dimensional Gaussian: the 0.95 quantile of chi-squared with two degrees of freedom, -2 ln 0.05.
+const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
+
+/// Strokes that an ellipse is drawn of.
+const ELLIPSE_STROKES: usize = 48;
+
+/// Half of the cross at the centre, px on the screen.
+const CROSS: f64 = 3.0;
+
+/// Longest side and length that are drawn, px: a target that ran away must not cost strokes without end.
+const LONGEST: f64 = 1e5;
+
+/// Colour of a target by how well it is in hand, told apart by people with any kind of colour vision: green tracking, orange occluded, blue coasting, grey out, red
+/// lost.
+///
+/// Source: M. Okabe, K. Ito, "Color Universal Design", 2008.
+pub fn status_colour(status: TrackStatus) -> Rgb {
+    match status {
+        TrackStatus::Tracking => [0, 200, 140],
+        TrackStatus::Occluded => [240, 170, 20],
+        TrackStatus::Coasting => [86, 180, 233],
+        TrackStatus::Out => [170, 170, 170],
+        TrackStatus::Lost => [224, 80, 40],
+    }
+}
+
+/// How a target is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct TrackOverlay {
+    /// Side of the window about the line of sight, px; default `None`: not drawn, for trackers that have none.
+    pub window: Option<f64>,
+    /// By how much the picture is larger than the frame ([`Picture::enlarged`]); default 1.
+    pub enlargement: usize,
+    /// Width of the strokes, px of the picture; default 1.3.
+    pub thickness: f64,
+}
+
+impl Default for TrackOverlay {
+    fn default() -> Self {
+        Self { window: None, enlargement: 1, thickness: 1.3 }
+    }
+}
+
+/// A place on a path: where the target's centre was, px, and how well it was in hand.
+pub type PathPoint = ([f64; 2], TrackStatus);
+
+impl TrackOverlay {
+    /// Draws target number `target` over `picture`: its box, turned by its rotation where that is observable; the path that it came, in the colours of its status; its
+    /// centre as a cross, with the ellipse that holds the true centre with 95 % certainty if the covariance is right; the window about the line of sight, dashed; the
+    /// number at the box. What is not finite is left out.
+    pub fn draw(&self, picture: &mut Picture, target: usize, state: &TrackState, path: &[PathPoint]) {
+        let colour = status_colour(state.status);
+        for pair in path.windows(2) {
+            self.stroke(picture, pair[0].0, pair[1].0, status_colour(pair[1].1));
+        }
+        self.draw_window(picture, state.line_of_sight);
+        let corners = box_corners(state);
+        self.polygon(picture, &corners, colour);
+        self.polygon(picture, &ellipse(state), colour);
+        self.draw_cross(picture, state.position, colour);
+        if let Some(label) = corners.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1])]) {
+            let [x, y] = self.on_picture(label);
+            draw_number(picture, target, x, y, self.enlargement.clamp(1, 3), colour);
+        }
+    }
+
+    /// A place in the frame on the enlarged picture: pixel `x` covers `factor` pixels from `factor x` on, so its centre lies half a factor further, less half a pixel.
+    fn on_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let factor = self.enlargement.max(1) as f64;
+        [x, y].map(|c| (c + 0.5) * factor - 0.5)
+    }
+
+    fn stroke(&self, picture: &mut Picture, from: [f64; 2], to: [f64; 2], colour: Rgb) {
+        let ([x0, y0], [x1, y1]) = (self.on_picture(from), self.on_picture(to));
+        draw_stroke(picture, (x0, y0), (x1, y1), self.thickness, colour);
+    }
+
+    fn polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb) {
+        for (k, corner) in corners.iter().enumerate() {
+            self.stroke(picture, *corner, corners[(k + 1) % corners.len()], colour);
+        }
+    }
+
+    /// A cross of one size on the screen, whatever the enlargement.
+    fn draw_cross(&self, picture: &mut Picture, centre: [f64; 2], colour: Rgb) {
+        let [x, y] = self.on_picture(centre);
+        draw_stroke(picture, (x - CROSS, y), (x + CROSS, y), self.thickness, colour);
+        draw_stroke(picture, (x, y - CROSS), (x, y + CROSS), self.thickness, colour);
+    }
+
+    /// The window of side `window` about the line of sight, dashed.
+    fn draw_window(&self, picture: &mut Picture, [x, y]: [f64; 2]) {
+        let Some(half) = self.window.map(|side| side / 2.0).filter(|half| *half < LONGEST) else { return };
+        let corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]];
+        for (k, from) in corners.iter().enumerate() {
+            self.dashed(picture, *from, corners[(k + 1) % 4]);
+        }
+    }
+
+    fn dashed(&self, picture: &mut Picture, from: [f64; 2], to: [f64; 2]) {
+        // An odd number of equal parts, so that corners are inked.
+        let parts = 2 * ((to[0] - from[0]).hypot(to[1] - from[1]) / 12.0).round() as usize + 1;
+        let at = |k: usize| -> [f64; 2] {
+            let share = k as f64 / parts as f64;
+            std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
+        };
+        for k in (0..parts).step_by(2) {
+            self.stroke(picture, at(k), at(k + 1), [235, 235, 235]);
+        }
+    }
+}
+
+/// Corners of the box about its centre, turned where the rotation can be told; none for a box that is not known.
+fn box_corners(state: &TrackState) -> Vec<[f64; 2]> {
+    let (bounds, [x, y]) = (state.bounds, state.bounds.centre());
+    let angle = if state.rotation_observable && state.rotation.is_finite() { state.rotation } else { 0.0 };
+    let (sin, cos) = angle.sin_cos();
+    let (a, b) = (bounds.width / 2.0, bounds.height / 2.0);
+    if !(a.abs() < LONGEST && b.abs() < LONGEST && x.is_finite() && y.is_finite()) {
+        return Vec::new();
+    }
+    [[-a, -b], [a, -b], [a, b], [-a, b]].map(|[dx, dy]| [x + cos * dx - sin * dy, y + sin * dx + cos * dy]).to_vec()
+}
+
+/// The ellipse of 95 % about the position; its axes are those of the picture, since errors along x and y are taken as independent. None where the variance is not known.
+fn ellipse(state: &TrackState) -> Vec<[f64; 2]> {
+    let radius = |axis: usize| (CHI_SQUARED_95 * state.covariance[axis][0][0]).sqrt();
+    let (rx, ry, [x, y]) = (radius(0), radius(1), state.position);
+    if !(rx < LONGEST && ry < LONGEST && x.is_finite() && y.is_finite()) {
+        return Vec::new();
+    }
+    let angle = |k: usize| std::f64::consts::TAU * k as f64 / ELLIPSE_STROKES as f64;
+    (0..ELLIPSE_STROKES).map(|k| [x + rx * angle(k).cos(), y + ry * angle(k).sin()]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::TargetBox;
+
+    const GREY: Rgb = [90; 3];
+
+    fn state() -> TrackState {
+        TrackState::at([30.0, 20.0], TargetBox::about([30.0, 20.0], 20.0, 10.0))
+    }
+
+    fn drawn(overlay: TrackOverlay, state: &TrackState, path: &[PathPoint]) -> Picture {
+        let mut picture = Picture::filled(64, 48, GREY);
+        overlay.draw(&mut picture, 1, state, path);
+        picture
+    }
+
+    #[test]
+    fn the_box_is_drawn_on_its_sides_and_turned_where_that_is_known() {
+        let upright = drawn(TrackOverlay::default(), &state(), &[]);
+        let green = status_colour(TrackStatus::Tracking);
+        for (x, y) in [(20, 18), (40, 22), (25, 15), (35, 25)] {
+            assert_eq!(upright.pixel(x, y), green, "{x} {y}");
+        }
+        let turned = TrackState { rotation: std::f64::consts::FRAC_PI_2, ..state() };
+        let picture = drawn(TrackOverlay::default(), &turned, &[]);
+        for (x, y) in [(25, 12), (35, 28), (30, 10), (30, 30)] {
+            assert_eq!(picture.pixel(x, y), green, "{x} {y}");
+        }
+        assert_eq!(picture.pixel(40, 22), GREY);
+        let blind = TrackState { rotation_observable: false, ..turned };
+        assert_eq!(drawn(TrackOverlay::default(), &blind, &[]), upright);
+    }
+
+    #[test]
+    fn the_ellipse_has_the_axes_of_the_covariance() {
+        let mut state = state();
+        state.covariance[0][0][0] = 36.0 / CHI_SQUARED_95;
+        state.covariance[1][0][0] = 144.0 / CHI_SQUARED_95;
+        let picture = drawn(TrackOverlay::default(), &state, &[]);
+        for (x, y) in [(24, 20), (36, 20), (30, 8), (30, 32)] {
+            assert_ne!(picture.pixel(x, y), GREY, "{x} {y}");
+        }
+        assert_eq!(picture.pixel(18, 20), GREY);
+    }
+
+    #[test]
+    fn path_window_and_status_have_their_colours() {
+        let lost = TrackState { status: TrackStatus::Lost, ..state() };
+        let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Coasting)];
+        let overlay = TrackOverlay { window: Some(30.0), ..TrackOverlay::default() };
+        let picture = drawn(overlay, &lost, &path);
+        assert_eq!(picture.pixel(10, 40), status_colour(TrackStatus::Coasting));
+        assert_eq!(picture.pixel(30, 15), status_colour(TrackStatus::Lost));
+        assert_eq!(picture.pixel(16, 5), [235; 3]);
+        let dark = (15..46).filter(|x| picture.pixel(*x, 5) == GREY).count();
+        assert!(dark >= 4, "the window is dashed");
+    }
+
+    #[test]
+    fn an_enlarged_picture_has_everything_in_its_place() {
+        let overlay = TrackOverlay { enlargement: 3, ..TrackOverlay::default() };
+        let mut picture = Picture::filled(64, 48, GREY).enlarged(3);
+        overlay.draw(&mut picture, 12, &state(), &[]);
+        // Pixel 20 covers 60 to 62; its centre is 61.
+        assert_eq!(picture.pixel(61, 55), status_colour(TrackStatus::Tracking));
+    }
+
+    #[test]
+    fn what_is_not_known_is_left_out() {
+        let mut unknown = state();
+        unknown.bounds.x = f64::NAN;
+        unknown.position = [f64::NAN; 2];
+        unknown.line_of_sight = [f64::NAN; 2];
+        unknown.covariance[0][0][0] = f64::NAN;
+        let overlay = TrackOverlay { window: Some(51.0), ..TrackOverlay::default() };
+        assert_eq!(drawn(overlay, &unknown, &[]), Picture::filled(64, 48, GREY));
+        unknown = state();
+        unknown.covariance[1][0][0] = f64::INFINITY;
+        unknown.bounds = TargetBox::about([1e300, -1e300], 3.0, 3.0);
+        drawn(overlay, &unknown, &[([f64::NAN; 2], TrackStatus::Out), ([1e300; 2], TrackStatus::Out)]);
+    }
+}

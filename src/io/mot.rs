@@ -1,0 +1,180 @@
+//! Boxes of tracks as text in the form of the MOT challenge, and what is read back from it.
+//!
+//! A line is `frame,id,x,y,w,h,conf,-1,-1,-1`. Frames and pixels are counted from 1: `x`, `y` is the first pixel that the box covers. A box of ours that covers
+//! exactly the pixels `a ..= b` (from 0) reaches from `a - 1/2` to `b + 1/2`, since centres of pixels lie at integers; hence `x = box_x + 3/2`.
+//!
+//! Source: A. Milan, L. Leal-Taixe, I. Reid, S. Roth, K. Schindler, "MOT16: A Benchmark for Multi-Object Tracking", 2016.
+
+use super::table::TableWriter;
+use super::text_boxes::{FIRST_PIXEL, numbers};
+use crate::error::{Error, Result};
+use crate::types::{TargetBox, TrackState, TrackStatus};
+use std::path::Path;
+
+/// Writes boxes in the form of the MOT challenge, in thousandths of a pixel, to a file that appears when it is finished or to standard output.
+#[derive(Debug)]
+pub struct MotTable {
+    table: TableWriter,
+}
+
+impl MotTable {
+    /// Begins a file, or standard output for `-`.
+    ///
+    /// # Errors
+    /// As [`TableWriter::create`].
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(Self { table: TableWriter::create_without_header(path, 10)? })
+    }
+
+    /// Adds the line of target number `target` (from 1) at frame `frame` (from 0) of the input. The confidence is the visibility, and 0 where the target was not
+    /// measured. A target that is out of the picture or lost, and a box that is not known, have no line.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be written.
+    pub fn write(&mut self, target: usize, frame: usize, state: &TrackState) -> Result<()> {
+        let TargetBox { x, y, width, height } = state.bounds;
+        let sides = [x + FIRST_PIXEL, y + FIRST_PIXEL, width, height];
+        let gone = matches!(state.status, TrackStatus::Out | TrackStatus::Lost);
+        if gone || !sides.iter().all(|side| side.is_finite()) {
+            return Ok(());
+        }
+        let confidence = if state.status.is_measured() { state.visibility } else { 0.0 };
+        let mut cells = vec![(frame + 1).to_string(), target.to_string()];
+        cells.extend(sides.map(thousandths));
+        cells.push(thousandths(if confidence.is_finite() { confidence } else { 0.0 }));
+        cells.extend(["-1"; 3].map(String::from));
+        self.table.row(&cells)
+    }
+
+    /// As [`TableWriter::flush`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::flush`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.table.flush()
+    }
+
+    /// Ends the text and gives the file its name.
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn finish(self) -> Result<()> {
+        self.table.finish()
+    }
+
+    /// As [`TableWriter::finish_as`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish_as`].
+    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+        self.table.finish_as(path)
+    }
+}
+
+fn thousandths(value: f64) -> String {
+    let text = format!("{value:.3}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" { "0".into() } else { short.into() }
+}
+
+/// One box of a MOT file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotBox {
+    /// Index of the frame, from 0.
+    pub frame: usize,
+    /// Number of the target as the file has it; -1 in files of detections.
+    pub target: i64,
+    /// The box, px.
+    pub bounds: TargetBox,
+    /// The seventh number: confidence of results, in ground truth 0 for boxes that are not to be judged; 1 where the line has none.
+    pub confidence: f64,
+}
+
+/// Reads a MOT challenge file (`gt.txt`, detections or results), in the order of its lines. Numbers may be separated by commas, tabs or blanks; what follows the
+/// seventh is not read.
+///
+/// # Errors
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] with the line for fewer than six numbers, a frame below 1 or a box without an extent.
+pub fn read_mot(path: impl AsRef<Path>) -> Result<Vec<MotBox>> {
+    let path = path.as_ref();
+    numbers(path)?
+        .into_iter()
+        .map(|(line, values)| {
+            mot_box(&values).ok_or_else(|| {
+                let wanted = "expected frame,id,x,y,w,h,conf,... with a frame from 1 and a positive width and height";
+                Error::format(path, format!("line {line}: {wanted}"))
+            })
+        })
+        .collect()
+}
+
+fn mot_box(values: &[f64]) -> Option<MotBox> {
+    let &[frame, target, x, y, width, height, ref rest @ ..] = values else { return None };
+    let whole = |value: f64| value.is_finite() && value.fract() == 0.0;
+    let sound = whole(frame) && whole(target) && frame >= 1.0 && x.is_finite() && y.is_finite();
+    (sound && width > 0.0 && height > 0.0 && width.is_finite() && height.is_finite()).then(|| MotBox {
+        frame: frame as usize - 1,
+        target: target as i64,
+        bounds: TargetBox { x: x - FIRST_PIXEL, y: y - FIRST_PIXEL, width, height },
+        confidence: rest.first().copied().unwrap_or(1.0),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state(bounds: TargetBox, status: TrackStatus) -> TrackState {
+        TrackState { status, visibility: 0.75, ..TrackState::at(bounds.centre(), bounds) }
+    }
+
+    #[test]
+    fn lines_count_from_one_and_leave_out_who_is_gone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.txt");
+        // Pixels 10 to 22 and 20 to 24.
+        let bounds = TargetBox { x: 9.5, y: 19.5, width: 13.0, height: 5.0 };
+        let unknown = TargetBox { x: f64::NAN, ..bounds };
+        let mut table = MotTable::create(&path).unwrap();
+        for (target, status) in TrackStatus::ALL.into_iter().enumerate() {
+            table.write(target + 1, 0, &state(bounds, status)).unwrap();
+        }
+        table.write(1, 1, &state(unknown, TrackStatus::Tracking)).unwrap();
+        table.write(2, 1, &state(TargetBox { x: -1.50004, ..bounds }, TrackStatus::Tracking)).unwrap();
+        table.finish().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines,
+            [
+                "1,1,11,21,13,5,0.75,-1,-1,-1",
+                "1,2,11,21,13,5,0.75,-1,-1,-1",
+                "1,3,11,21,13,5,0,-1,-1,-1",
+                "2,2,0,21,13,5,0.75,-1,-1,-1"
+            ]
+        );
+        let read = read_mot(&path).unwrap();
+        assert_eq!(read.len(), 4);
+        assert_eq!(read[1], MotBox { frame: 0, target: 2, bounds, confidence: 0.75 });
+        assert_eq!((read[3].frame, read[3].bounds.x), (1, -1.5));
+    }
+
+    #[test]
+    fn truth_and_detections_are_read_and_damage_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("gt.txt");
+        std::fs::write(&path, "3, 2, 794.27, 247.59, 71.245, 174.88, 0, 1, 0.86\r\n\n1 -1 1 1 4 4\n").unwrap();
+        let read = read_mot(&path).unwrap();
+        assert_eq!((read[0].frame, read[0].target, read[0].confidence), (2, 2, 0.0));
+        assert_eq!((read[1].target, read[1].bounds.x, read[1].confidence), (-1, -0.5, 1.0));
+        for (damage, line) in
+            [("1,1,1,1,4,4\n0,1,1,1,4,4", 2), ("1,1,1,1,4", 1), ("1,1,1,1,0,4", 1), ("1,1,nan,1,4,4", 1), ("a,b", 1)]
+        {
+            std::fs::write(&path, damage).unwrap();
+            let error = read_mot(&path).unwrap_err();
+            assert!(matches!(error, Error::Format { .. }), "{error}");
+            assert!(error.to_string().contains(&format!("line {line}")), "{damage:?}: {error}");
+        }
+        assert!(matches!(read_mot(folder.path().join("none.txt")), Err(Error::Io { .. })));
+    }
+}

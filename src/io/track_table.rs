@@ -1,0 +1,237 @@
+//! Tracks as CSV: one row a target and frame.
+
+use super::table::{TableWriter, cell};
+use crate::error::Result;
+use crate::types::TrackState;
+use std::path::Path;
+
+/// Columns before the covariance.
+const NUMBERS: [&str; 30] = [
+    "target",
+    "frame",
+    "status",
+    "reason",
+    "reacquired",
+    "x",
+    "y",
+    "velocity_x",
+    "velocity_y",
+    "acceleration_x",
+    "acceleration_y",
+    "scene_velocity_x",
+    "scene_velocity_y",
+    "camera_motion_x",
+    "camera_motion_y",
+    "displacement_x",
+    "displacement_y",
+    "box_x",
+    "box_y",
+    "box_width",
+    "box_height",
+    "scale",
+    "rotation",
+    "rotation_observable",
+    "visibility",
+    "innovation",
+    "gain",
+    "line_of_sight_x",
+    "line_of_sight_y",
+    "flow_count",
+];
+
+/// The entries of one axis's covariance that a symmetric matrix is known by, with their names: p position, v velocity, a acceleration.
+const ENTRIES: [(&str, usize, usize); 6] =
+    [("pp", 0, 0), ("pv", 0, 1), ("pa", 0, 2), ("vv", 1, 1), ("va", 1, 2), ("aa", 2, 2)];
+
+/// Writes tracks as CSV, to a file that appears when it is finished or to standard output. Numbers read back exactly; what is not known is `nan`.
+///
+/// | columns | unit |
+/// |---|---|
+/// | `target` | number of the target, from 1 |
+/// | `frame` | index of the frame in the input, from 0 |
+/// | `status`, `reason` | words, as [`TrackStatus::name`](crate::types::TrackStatus::name) and [`TrackState::reason`] |
+/// | `reacquired`, `rotation_observable` | `true` or `false` |
+/// | `x`, `y`, `line_of_sight_x`, `line_of_sight_y` | px, centres of pixels at integers, x right, y down |
+/// | `velocity_*`, `scene_velocity_*` | px/frame |
+/// | `acceleration_*` | px/frame^2 |
+/// | `camera_motion_*`, `displacement_*` | px since the frame before |
+/// | `box_x`, `box_y`, `box_width`, `box_height` | px, as [`TargetBox`](crate::types::TargetBox): the centre is `(box_x + box_width / 2, box_y + box_height / 2)` |
+/// | `scale`, `gain` | of what they were at the beginning |
+/// | `rotation` | rad since the beginning, from x towards y |
+/// | `visibility` | share, 0 to 1 |
+/// | `innovation` | squared, over its variance: no unit |
+/// | `flow_count` | pixels |
+/// | `cov_x_pp`, `cov_x_pv`, `cov_x_pa`, `cov_x_vv`, `cov_x_va`, `cov_x_aa`, the same with `cov_y_` | covariance of position (p, px), velocity (v, px/frame) and acceleration (a, px/frame^2) along the axis |
+#[derive(Debug)]
+pub struct TrackTable {
+    table: TableWriter,
+}
+
+impl TrackTable {
+    /// Names of the columns, in their order.
+    pub fn columns() -> Vec<String> {
+        let covariance = ["x", "y"].into_iter().flat_map(|axis| ENTRIES.map(|(name, ..)| format!("cov_{axis}_{name}")));
+        NUMBERS.into_iter().map(String::from).chain(covariance).collect()
+    }
+
+    /// Begins a table in a file, or on standard output for `-`.
+    ///
+    /// # Errors
+    /// As [`TableWriter::create`].
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        Ok(Self { table: TableWriter::create(path, &Self::columns())? })
+    }
+
+    /// Adds the row of target number `target` (from 1) at frame `frame` of the input.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io) when it cannot be written.
+    pub fn write(&mut self, target: usize, frame: usize, state: &TrackState) -> Result<()> {
+        let mut cells = vec![
+            target.to_string(),
+            frame.to_string(),
+            state.status.name().to_string(),
+            state.reason.to_string(),
+            state.reacquired.to_string(),
+        ];
+        let bounds = state.bounds;
+        let pairs = [
+            state.position,
+            state.velocity,
+            state.acceleration,
+            state.scene_velocity,
+            state.camera_motion,
+            state.displacement,
+            [bounds.x, bounds.y],
+            [bounds.width, bounds.height],
+            [state.scale, state.rotation],
+        ];
+        cells.extend(pairs.into_iter().flatten().map(cell));
+        cells.push(state.rotation_observable.to_string());
+        cells.extend([state.visibility, state.innovation, state.gain].map(cell));
+        cells.extend(state.line_of_sight.map(cell));
+        cells.push(state.flow_count.to_string());
+        cells.extend(state.covariance.iter().flat_map(|axis| ENTRIES.map(|(_, row, column)| cell(axis[row][column]))));
+        self.table.row(&cells)
+    }
+
+    /// As [`TableWriter::flush`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::flush`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.table.flush()
+    }
+
+    /// Ends the table and gives the file its name.
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn finish(self) -> Result<()> {
+        self.table.finish()
+    }
+
+    /// As [`TableWriter::finish_as`].
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish_as`].
+    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+        self.table.finish_as(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{TargetBox, TrackStatus};
+
+    /// A state whose numbers are all different.
+    fn numbered() -> TrackState {
+        let axis = |first: f64| {
+            let [pp, pv, pa, vv, va, aa] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0].map(|k| first + k);
+            [[pp, pv, pa], [pv, vv, va], [pa, va, aa]]
+        };
+        TrackState {
+            frame: 4,
+            status: TrackStatus::Occluded,
+            reason: "something, in front",
+            reacquired: true,
+            position: [1.5, 2.5],
+            velocity: [3.5, 4.5],
+            acceleration: [5.5, 6.5],
+            scene_velocity: [7.5, 8.5],
+            camera_motion: [9.5, 10.5],
+            displacement: [f64::NAN, 12.5],
+            bounds: TargetBox { x: 13.5, y: 14.5, width: 15.5, height: 16.5 },
+            scale: 17.5,
+            rotation: 0.1,
+            rotation_observable: false,
+            visibility: 0.2,
+            innovation: 0.3,
+            gain: 0.4,
+            line_of_sight: [0.5, 0.6],
+            flow_count: 77,
+            covariance: [axis(100.0), axis(200.0)],
+        }
+    }
+
+    #[test]
+    fn every_number_stands_under_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        let mut table = TrackTable::create(&path).unwrap();
+        table.write(2, 31, &numbered()).unwrap();
+        table.flush().unwrap();
+        assert!(!path.exists());
+        table.finish().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut lines = csv::ReaderBuilder::new().from_reader(text.as_bytes());
+        let names: Vec<String> = lines.headers().unwrap().iter().map(String::from).collect();
+        assert_eq!((names.len(), &names), (42, &TrackTable::columns()));
+        let row = lines.records().next().unwrap().unwrap();
+        let cell = |name: &str| &row[names.iter().position(|known| known == name).unwrap()];
+        for (name, value) in [
+            ("target", "2"),
+            ("frame", "31"),
+            ("status", "occluded"),
+            ("reason", "something, in front"),
+            ("reacquired", "true"),
+            ("x", "1.5"),
+            ("velocity_y", "4.5"),
+            ("acceleration_x", "5.5"),
+            ("scene_velocity_y", "8.5"),
+            ("camera_motion_x", "9.5"),
+            ("displacement_x", "nan"),
+            ("displacement_y", "12.5"),
+            ("box_x", "13.5"),
+            ("box_height", "16.5"),
+            ("scale", "17.5"),
+            ("rotation", "0.1"),
+            ("rotation_observable", "false"),
+            ("visibility", "0.2"),
+            ("innovation", "0.3"),
+            ("gain", "0.4"),
+            ("line_of_sight_y", "0.6"),
+            ("flow_count", "77"),
+            ("cov_x_pp", "100"),
+            ("cov_x_pa", "102"),
+            ("cov_x_va", "104"),
+            ("cov_y_pv", "201"),
+            ("cov_y_vv", "203"),
+            ("cov_y_aa", "205"),
+        ] {
+            assert_eq!(cell(name), value, "{name}");
+        }
+    }
+
+    #[test]
+    fn rows_of_a_run_that_was_stopped_have_another_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut table = TrackTable::create(folder.path().join("t.csv")).unwrap();
+        table.write(1, 0, &numbered()).unwrap();
+        table.finish_as(folder.path().join("part.csv")).unwrap();
+        drop(TrackTable::create(folder.path().join("u.csv")).unwrap());
+        let names: Vec<_> = folder.path().read_dir().unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(names, ["part.csv"]);
+    }
+}

@@ -1,0 +1,200 @@
+//! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in bounded memory.
+
+mod overlay;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+pub use overlay::{Overlays, PATH_LENGTH};
+pub use rows::{TrackFormat, TrackRows};
+
+use super::prefetch::Prefetch;
+use super::run::{Numbering, check_size};
+use super::sink::Ending;
+use crate::error::{Error, Result};
+use crate::image::Preprocess;
+use crate::io::FrameSource;
+use crate::parallel::{Progress, Threads};
+use crate::track::{GreyLevels, Tracker};
+use crate::types::{AnyFrame, Frame, TrackState, TrackStatus};
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// What every tracker says of one frame.
+#[derive(Debug)]
+pub struct TrackStep<'a> {
+    /// Index of the frame in the input.
+    pub frame_index: usize,
+    /// The frame as it came.
+    pub frame: &'a AnyFrame,
+    /// The targets; number `k + 1` is at `k`.
+    pub states: &'a [TrackState],
+}
+
+/// A receiver of tracks.
+pub trait TrackSink: Send {
+    /// Takes the targets at one frame.
+    ///
+    /// # Errors
+    /// Files that cannot be written; the run then ends.
+    fn accept(&mut self, step: &TrackStep<'_>) -> Result<()>;
+
+    /// Called once at the end, however the run ended: brings what is complete under its final name and removes the rest.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    fn finish(&mut self, ending: Ending) -> Result<()>;
+
+    /// Files in place so far: their number and the latest one.
+    fn files(&self) -> (usize, Option<PathBuf>);
+}
+
+/// What a run begins with. Sinks come with the trackers, so that no file is begun for targets that cannot be followed.
+pub struct Begun {
+    /// One tracker a target.
+    pub trackers: Vec<Box<dyn Tracker>>,
+    /// The receivers of the tracks.
+    pub sinks: Vec<Box<dyn TrackSink>>,
+}
+
+/// Makes trackers and sinks from the first frame in grey levels.
+pub type Begin<'a> = Box<dyn FnOnce(&Frame<f64>) -> Result<Begun> + 'a>;
+
+/// How one target fared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetSummary {
+    /// Frames with each status, in the order of [`TrackStatus::ALL`].
+    pub counts: [usize; TrackStatus::ALL.len()],
+    /// The target at the last frame.
+    pub last: TrackState,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TrackSummary {
+    /// Frames read and taken by every sink.
+    pub frames: usize,
+    /// The targets; empty before the first frame.
+    pub targets: Vec<TargetSummary>,
+    /// Files written.
+    pub files: usize,
+    /// The last of them, under the name that it really has.
+    pub latest: Option<PathBuf>,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// A run: frames in, tracks out. Targets are followed independently of each other, in parallel; the result does not depend on the number of threads.
+#[derive(Default)]
+pub struct TrackRun {
+    preprocess: Preprocess,
+    threads: Threads,
+    numbering: Numbering,
+    sinks: Vec<Box<dyn TrackSink>>,
+    summary: TrackSummary,
+}
+
+impl TrackRun {
+    /// What is done to each frame first, on its own scale of brightness.
+    pub fn with_preprocess(mut self, preprocess: Preprocess) -> Self {
+        self.preprocess = preprocess;
+        self
+    }
+    /// Threads of the preparation and of the targets.
+    pub fn with_threads(mut self, threads: Threads) -> Self {
+        self.threads = threads;
+        self
+    }
+    /// Which frames of the input come.
+    pub fn with_numbering(mut self, numbering: Numbering) -> Self {
+        self.numbering = numbering;
+        self
+    }
+
+    /// What was done so far; valid after a failed or interrupted run too.
+    pub fn summary(&self) -> TrackSummary {
+        self.summary.clone()
+    }
+
+    /// Works through `source` and ends every sink, however the run ends. `begin` makes trackers and sinks; the trackers' state at the first frame is
+    /// the first row.
+    ///
+    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its error stops the run, and what is complete then stays.
+    ///
+    /// # Errors
+    /// Those of the source, of `begin`, the trackers, the sinks and `progress`; [`Error::Argument`] named `frames` for fewer than two frames or one of another size.
+    pub fn run(&mut self, source: Box<dyn FrameSource>, begin: Begin<'_>, progress: &dyn Progress) -> Result<()> {
+        let start = Instant::now();
+        let worked = self.work(source, begin, progress);
+        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
+        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        let mut result = worked;
+        for sink in &mut self.sinks {
+            result = result.and(sink.finish(ending));
+        }
+        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
+        self.summary.files = files.iter().map(|(number, _)| number).sum();
+        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
+        self.summary.seconds = start.elapsed().as_secs_f64();
+        result
+    }
+
+    fn work(&mut self, source: Box<dyn FrameSource>, begin: Begin<'_>, progress: &dyn Progress) -> Result<()> {
+        let total = source.len_hint().unwrap_or(0);
+        let frames = Prefetch::start(source)?;
+        let next = |done: usize| {
+            progress.step(done, total)?;
+            frames.next(|| progress.step(done, total))
+        };
+        let first = next(0)?.ok_or_else(|| too_few(0))?;
+        let mut size = Some(first.size());
+        let levels = GreyLevels::decide(&first);
+        let Begun { mut trackers, sinks } = begin(&self.prepared(&first, levels))?;
+        self.sinks = sinks;
+        let states: Vec<TrackState> = trackers.iter().map(|tracker| tracker.state().clone()).collect();
+        self.deliver(&first, &states)?;
+        drop(first);
+        while let Some(frame) = next(self.summary.frames)? {
+            check_size(&mut size, frame.size(), self.numbering.index(self.summary.frames))?;
+            let grey = self.prepared(&frame, levels);
+            let states = self.threads.install(|| {
+                trackers.par_iter_mut().map(|tracker| tracker.update(&grey)).collect::<Result<Vec<TrackState>>>()
+            })?;
+            self.deliver(&frame, &states)?;
+        }
+        progress.step(self.summary.frames, total)?;
+        if self.summary.frames < 2 { Err(too_few(self.summary.frames)) } else { Ok(()) }
+    }
+
+    /// The frame after preparation, in grey levels.
+    fn prepared(&self, frame: &AnyFrame, levels: GreyLevels) -> Frame<f64> {
+        let preprocess = &self.preprocess;
+        let prepared = self.threads.install(|| preprocess.apply(frame.to_real::<f64>()));
+        GreyLevels::scaled(prepared, levels.gain(frame))
+    }
+
+    fn deliver(&mut self, frame: &AnyFrame, states: &[TrackState]) -> Result<()> {
+        let step = TrackStep { frame_index: self.numbering.index(self.summary.frames), frame, states };
+        for sink in &mut self.sinks {
+            sink.accept(&step)?;
+        }
+        self.summary.frames += 1;
+        self.count(states);
+        Ok(())
+    }
+
+    fn count(&mut self, states: &[TrackState]) {
+        let targets = &mut self.summary.targets;
+        targets
+            .extend(states[targets.len()..].iter().map(|state| TargetSummary { counts: [0; 5], last: state.clone() }));
+        for (target, state) in targets.iter_mut().zip(states) {
+            target.counts[state.status as usize] += 1;
+            target.last = state.clone();
+        }
+    }
+}
+
+fn too_few(frames: usize) -> Error {
+    Error::argument("frames", "at least 2 frames to track through", frames)
+}

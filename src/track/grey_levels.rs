@@ -1,0 +1,82 @@
+//! Frames of any sample type on the scale that trackers think in: 8-bit grey levels.
+
+use crate::types::{AnyFrame, Frame};
+
+/// Brightest value of a float picture whose white is 1, with room for noise and overshoot.
+const UNIT_WHITE: f64 = 1.5;
+
+/// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast, gradient) are in these.
+///
+/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white: if any value of the first frame is above 1.5
+/// they are grey levels already, else white is 1 and they are multiplied by 255. That is decided once, at the first frame, and kept: brightness must not jump.
+///
+/// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be scaled beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GreyLevels {
+    /// What floats are multiplied by.
+    float: f64,
+}
+
+impl GreyLevels {
+    /// Decides by the first frame of a sequence.
+    pub fn decide(first: &AnyFrame) -> Self {
+        let levels = match first {
+            AnyFrame::F32(frame) => frame.data().iter().any(|&value| f64::from(value) > UNIT_WHITE),
+            AnyFrame::F64(frame) => frame.data().iter().any(|&value| value > UNIT_WHITE),
+            AnyFrame::U8(_) | AnyFrame::U16(_) => true,
+        };
+        Self { float: if levels { 1.0 } else { 255.0 } }
+    }
+
+    /// What the samples of a frame are multiplied by.
+    pub fn gain(&self, frame: &AnyFrame) -> f64 {
+        match frame {
+            AnyFrame::U8(_) => 1.0,
+            AnyFrame::U16(_) => 1.0 / 257.0,
+            AnyFrame::F32(_) | AnyFrame::F64(_) => self.float,
+        }
+    }
+
+    /// A frame in grey levels, as [`Tracker::update`](super::Tracker::update) takes it. NaN and infinities stay what they are.
+    pub fn convert(&self, frame: &AnyFrame) -> Frame<f64> {
+        Self::scaled(frame.to_real(), self.gain(frame))
+    }
+
+    /// Samples multiplied by a gain; handed through untouched by a gain of 1.
+    pub fn scaled(mut frame: Frame<f64>, gain: f64) -> Frame<f64> {
+        if gain != 1.0 {
+            frame.data_mut().iter_mut().for_each(|value| *value *= gain);
+        }
+        frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn levels(first: &AnyFrame, frame: &AnyFrame) -> Vec<f64> {
+        GreyLevels::decide(first).convert(frame).into_data()
+    }
+
+    #[test]
+    fn white_is_255_for_every_type() {
+        let bytes = AnyFrame::U8(Frame::new(3, 1, vec![0, 7, 255]).unwrap());
+        let words = AnyFrame::U16(Frame::new(3, 1, vec![0, 7 * 257, 65535]).unwrap());
+        let singles = AnyFrame::F32(Frame::new(3, 1, vec![0.0, 0.5, 1.0]).unwrap());
+        assert_eq!(levels(&bytes, &bytes), [0.0, 7.0, 255.0]);
+        for (got, want) in levels(&words, &words).into_iter().zip([0.0, 7.0, 255.0]) {
+            assert!((got - want).abs() < 1e-12);
+        }
+        assert_eq!(levels(&singles, &singles), [0.0, 127.5, 255.0]);
+    }
+
+    #[test]
+    fn the_first_frame_decides_for_floats() {
+        let dark = AnyFrame::F64(Frame::new(2, 1, vec![f64::NAN, 1.2]).unwrap());
+        let bright = AnyFrame::F64(Frame::new(2, 1, vec![1.0, 200.0]).unwrap());
+        assert_eq!(levels(&bright, &dark)[1], 1.2);
+        assert!(levels(&bright, &dark)[0].is_nan());
+        assert_eq!(levels(&dark, &bright), [255.0, 51000.0]);
+    }
+}
