@@ -10,7 +10,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 (1, 64, 96)
 """
 
-from . import filters, io, plot, scenes, video
+from . import filters, io, plot, scenes, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -55,5 +55,6 @@ __all__ = [
     "quantities",
     "scenes",
     "smooth",
+    "track",
     "video",
 ]

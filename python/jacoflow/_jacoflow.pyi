@@ -43,7 +43,10 @@ __all__ = [
     "_write_pfm",
     "_write_flow",
     "_write_frames",
+    "_GradientTracker",
     "_classify",
+    "_derivative_kernels",
+    "_local_flow",
     "_observability",
     "Scene",
     "Sensor",
@@ -863,6 +866,29 @@ class FrameReader:
         """Frames per second, where the source says so, else None."""
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
+class _GradientTracker:
+    def __new__(
+        cls,
+        frame: NDArray[Any],
+        bbox: list[float],
+        method: str,
+        fov: int,
+        control: str,
+        model: str,
+        camera: str,
+        order: int | None,
+        window: int | None,
+        eps: float | None,
+    ) -> _GradientTracker: ...
+    def update(self, frame: NDArray[Any]) -> dict[str, Any]:
+        """The target in the next frame, as a dictionary."""
+    def state(self) -> dict[str, Any]:
+        """The target at the last frame, as a dictionary."""
+
+def _derivative_kernels(order: int) -> list[NDArray[np.float64]]: ...
+def _local_flow(
+    first: NDArray[Any], second: NDArray[Any], refine: bool, window: int, order: int, cond_max: float, min_sigma: float, step_max: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

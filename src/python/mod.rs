@@ -18,6 +18,7 @@ mod options;
 mod progress;
 mod scenes;
 mod spare;
+mod track;
 
 use pyo3::prelude::*;
 
@@ -50,6 +51,8 @@ mod _jacoflow {
     use super::observability::{classify, observability};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
+    #[pymodule_export]
+    use super::track::{PyGradientTracker, flow, kernels};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name of the attribute")]

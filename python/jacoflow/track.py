@@ -1,0 +1,214 @@
+"""Trackers: a moving target followed from frame to frame, with its velocity, size, angle and how far each can be trusted.
+
+Frames are arrays (H, W) of uint8, uint16, float32 or float64; positions are (x, y) in px, x right, y down, times in frames.
+
+>>> import numpy as np
+>>> from jacoflow.track import GradientTracker
+>>> frames = np.full((6, 64, 64), 90, np.uint8)
+>>> for t in range(6):
+...     frames[t, 20:33, 20 + t : 33 + t] = 200
+>>> tracker = GradientTracker(frames[0], bbox=(19.5, 19.5, 13, 13))
+>>> for frame in frames[1:]:
+...     result = tracker.update(frame)
+>>> result.status, result.position.round(1).tolist()
+('tracking', [31.0, 26.0])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._jacoflow import _derivative_kernels, _GradientTracker, _local_flow
+
+__all__ = ["GradientTracker", "Track", "TrackResult", "derivative_kernels", "local_flow", "refine_flow", "track"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackResult:
+    """The target at one frame. Lengths in px, times in frames; NaN where nothing was measured."""
+
+    position: Array
+    """Filtered centre (x, y), px."""
+    velocity: Array
+    """Filtered velocity in the picture, (2,), px/frame."""
+    acceleration: Array
+    """Filtered acceleration, (2,), px/frame^2."""
+    scene_velocity: Array
+    """Velocity relative to the scene, (2,), px/frame."""
+    camera_motion: Array
+    """How far the still scene moved in the picture since the frame before, (2,), px."""
+    covariance: Array
+    """Covariance of position, velocity and acceleration along x and along y, (2, 3, 3), px and frames."""
+    displacement: Array
+    """Measured step since the frame before, unfiltered, (2,), px."""
+    box: Array
+    """Upright box (x, y, width, height), px, with x = centre - width / 2."""
+    scale: float
+    """Size over that in the first frame, no unit."""
+    rotation: float
+    """Angle turned since the first frame, rad, clockwise on the screen, not wrapped."""
+    rotation_observable: bool
+    """Whether the picture tells the rotation; else it is held (no unit)."""
+    visibility: float
+    """Share of the target that is seen, 0 to 1, no unit."""
+    status: str
+    """"tracking", "occluded", "coasting" (not seen), "out" (beyond the border) or "lost" (not seen for 15 frames)."""
+    reason: str
+    """Why the status is what it is; empty if there is nothing to be said (no unit)."""
+    reacquired: bool
+    """Whether this is the first measurement after the target was lost or out of the picture (no unit)."""
+    innovation: float
+    """Normalised innovation squared of the position, both axes together, no unit."""
+    gain: float
+    """Brightness over that in the first frame, no unit."""
+    los: Array
+    """Line of sight: middle of the window that is looked at, (2,), px."""
+    n_flow: int
+    """How many pixels' flow was used ("local" and "paper"), no unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A target through a sequence: as `TrackResult`, each with a leading axis of T frames; frame 0 is the one the tracker began with. Lengths in px."""
+
+    results: tuple[TrackResult, ...]
+    """One for each of the T frames."""
+
+    def __len__(self) -> int:
+        return len(self.results)
+
+    def __iter__(self) -> Iterator[TrackResult]:
+        return iter(self.results)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name not in {field.name for field in fields(TrackResult)}:
+            raise AttributeError(name)
+        return np.array([getattr(result, name) for result in self.results])
+
+
+class GradientTracker:
+    """Follows one target by the gradient equation.
+
+    Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers.
+
+    Parameters
+    ----------
+    frame : array (H, W) of uint8, uint16, float32 or float64
+        The first frame, at least 16 x 16 px. Floats up to 1.5 are taken for shares of white.
+    bbox : (x, y, width, height), px
+        The target's box in it, with x = centre - width / 2; sides of at least 3 px; it may reach over the border.
+    method : "layered", "local" or "paper"
+        "layered" (default): target and background as layers, one gradient step over the whole target from the filter's prediction. "local": the paper's loop (local flow in a window, its mean over what moves,
+        a Gauss-Markov filter) with the repairs that it needs. "paper": its text to the letter, which loses targets on all but flat backgrounds.
+    fov : int, px
+        Side of the window that is looked at ("local", "paper"); default 51.
+    control : "integer" or "subpixel"
+        Whether that window moves in whole pixels (default) or not.
+    model : "similarity" or "affine"
+        What the target's picture does besides moving ("layered"): turn and grow (default), or be stretched as well.
+    camera : "auto" or "none"
+        Whether the camera may move ("layered", default) or stands still, which is faster.
+    order : int
+        Degree of the polynomials behind the derivatives, 1 to 4 ("local": 4, "paper": 2).
+    window : int, px
+        Side of the windows of local flow, 3, 5 or 7 ("local": 7, "paper": 5).
+    eps : float or "auto", px/frame
+        Slowest flow that counts as motion ("local", "paper"); default 0.5; "auto": three deviations of the flow outside the target, at least 0.3.
+
+    Raises
+    ------
+    ValueError
+        For a first frame that is too small, not two-dimensional or not finite, a box that is too small or wholly outside, and options out of range; each message names the argument.
+    TypeError
+        For another dtype.
+    """
+
+    def __init__(
+        self,
+        frame: ArrayLike,
+        bbox: ArrayLike,
+        *,
+        method: str = "layered",
+        fov: int = 51,
+        control: str = "integer",
+        model: str = "similarity",
+        camera: str = "auto",
+        order: int | None = None,
+        window: int | None = None,
+        eps: float | str = 0.5,
+    ) -> None:
+        box = np.asarray(bbox, float)
+        if box.shape != (4,):
+            raise ValueError(f"bbox: expected (x, y, width, height), got shape {box.shape}")
+        slowest = None if eps == "auto" else float(eps)
+        self._tracker = _GradientTracker(np.asarray(frame), box.tolist(), method, fov, control, model, camera, order, window, slowest)
+
+    def update(self, frame: ArrayLike) -> TrackResult:
+        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
+
+        Raises
+        ------
+        ValueError
+            For a frame of another size, naming `frame`.
+        """
+        return TrackResult(**self._tracker.update(np.asarray(frame)))
+
+    @property
+    def result(self) -> TrackResult:
+        """The target at the last frame; lengths in px."""
+        return TrackResult(**self._tracker.state())
+
+
+def track(frames: Iterable[ArrayLike], bbox: ArrayLike, **options: Any) -> Track:
+    """Follows a target through frames (T, H, W), or any iterable of frames (H, W), from its box (x, y, width, height), px, in the first.
+
+    Options are those of `GradientTracker`. The result has T entries.
+    """
+    rest = iter(frames)
+    try:
+        first = next(rest)
+    except StopIteration:
+        raise ValueError("frames: expected at least one frame, got none") from None
+    tracker = GradientTracker(first, bbox, **options)
+    return Track((tracker.result, *(tracker.update(frame) for frame in rest)))
+
+
+def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
+    """Beaudet's masks (value, along x, along y), three arrays (5, 5) [row, column] = [y, x]: value and slopes (1/px) at the middle of a least-squares polynomial of total degree `order`, 1 to 4."""
+    value, along_x, along_y = _derivative_kernels(order)
+    return value, along_x, along_y
+
+
+@dataclass(frozen=True, eq=False)
+class _Flow:
+    """Flow of single pixels."""
+
+    flow: Array
+    """(H, W, 2), px/frame."""
+    valid: NDArray[np.bool_]
+    """(H, W), where it is accepted."""
+
+
+def local_flow(
+    first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
+) -> _Flow:
+    """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa, equations (1) to (8).
+
+    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
+    levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
+    """
+    return _Flow(*_local_flow(np.asarray(first), np.asarray(second), False, window, order, cond_max, min_sigma, step_max))
+
+
+def refine_flow(
+    first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
+) -> _Flow:
+    """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
+    return _Flow(*_local_flow(np.asarray(first), np.asarray(second), True, window, order, cond_max, min_sigma, step_max))

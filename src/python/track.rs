@@ -1,0 +1,190 @@
+//! Trackers for Python: frames in, plain values out; the classes a user meets are in `jacoflow.track`.
+
+use super::arrays::{self, ColourRule};
+use crate::error::{Error, Result};
+use crate::track::gradient::{
+    CameraMotion, Control, GradientOptions, LocalFlow, LocalFlowOptions, Mode, RefineOptions, Shape, Start,
+    derivative_kernels, local_flow, refine_flow,
+};
+use crate::track::{GradientTracker, GreyLevels, Tracker};
+use crate::types::{Frame, TargetBox, TrackState};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, PoisonError};
+
+/// The compiled part of `jacoflow.track.GradientTracker`.
+#[pyclass(name = "_GradientTracker", module = "jacoflow._jacoflow", frozen)]
+pub struct PyGradientTracker {
+    tracker: Mutex<GradientTracker>,
+    levels: GreyLevels,
+}
+
+/// One of some words.
+fn word<T: Copy>(argument: &'static str, given: &str, known: &[(&str, T)]) -> Result<T> {
+    known.iter().find(|(name, _)| *name == given).map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<_> = known.iter().map(|(name, _)| format!("{name:?}")).collect();
+        Error::argument(argument, names.join(", "), format!("{given:?}"))
+    })
+}
+
+#[pymethods]
+impl PyGradientTracker {
+    #[new]
+    #[pyo3(signature = (frame, bbox, method, fov, control, model, camera, order, window, eps))]
+    fn new(
+        frame: &Bound<'_, PyAny>,
+        bbox: [f64; 4],
+        method: &str,
+        fov: usize,
+        control: &str,
+        model: &str,
+        camera: &str,
+        order: Option<usize>,
+        window: Option<usize>,
+        eps: Option<f64>,
+    ) -> PyResult<Self> {
+        let modes = Mode::ALL.map(|mode| (mode.name(), mode));
+        let options = GradientOptions {
+            mode: word("method", method, &modes)?,
+            fov,
+            control: word("control", control, &[("integer", Control::Integer), ("subpixel", Control::Subpixel)])?,
+            shape: word("model", model, &[("similarity", Shape::Similarity), ("affine", Shape::Affine)])?,
+            camera: word("camera", camera, &[("auto", CameraMotion::Auto), ("none", CameraMotion::None)])?,
+            order,
+            window,
+            eps,
+        };
+        let [x, y, width, height] = bbox;
+        let start = Start::Box(TargetBox { x, y, width, height });
+        let frame_of = arrays::frame("frame", frame, ColourRule::Refuse)?;
+        let levels = GreyLevels::decide(&frame_of);
+        let tracker = frame.py().detach(|| GradientTracker::new(&levels.convert(&frame_of), start, &options))?;
+        Ok(Self { tracker: Mutex::new(tracker), levels })
+    }
+
+    /// The target in the next frame, as a dictionary.
+    fn update<'py>(&self, frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        let py = frame.py();
+        let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+        let state = py.detach(|| {
+            let mut tracker = self.tracker.lock().unwrap_or_else(PoisonError::into_inner);
+            tracker.update(&self.levels.convert(&frame))
+        })?;
+        told(py, &state)
+    }
+
+    /// The target at the last frame, as a dictionary.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let tracker = self.tracker.lock().unwrap_or_else(PoisonError::into_inner);
+        told(py, tracker.state())
+    }
+}
+
+/// Everything a state says, by the names of `jacoflow.track.TrackResult`.
+fn told<'py>(py: Python<'py>, state: &TrackState) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let vectors = [
+        ("position", state.position),
+        ("velocity", state.velocity),
+        ("acceleration", state.acceleration),
+        ("scene_velocity", state.scene_velocity),
+        ("camera_motion", state.camera_motion),
+        ("displacement", state.displacement),
+        ("los", state.line_of_sight),
+    ];
+    for (name, value) in vectors {
+        out.set_item(name, arrays::owned::<f64>(py, &[2], value.to_vec())?)?;
+    }
+    let covariance = state.covariance.iter().flatten().flatten().copied().collect();
+    out.set_item("covariance", arrays::owned::<f64>(py, &[2, 3, 3], covariance)?)?;
+    let TargetBox { x, y, width, height } = state.bounds;
+    out.set_item("box", arrays::owned::<f64>(py, &[4], vec![x, y, width, height])?)?;
+    let numbers = [
+        ("scale", state.scale),
+        ("rotation", state.rotation),
+        ("visibility", state.visibility),
+        ("innovation", state.innovation),
+        ("gain", state.gain),
+    ];
+    for (name, value) in numbers {
+        out.set_item(name, value)?;
+    }
+    out.set_item("rotation_observable", state.rotation_observable)?;
+    out.set_item("reacquired", state.reacquired)?;
+    out.set_item("status", state.status.name())?;
+    out.set_item("reason", state.reason)?;
+    out.set_item("n_flow", state.flow_count)?;
+    Ok(out)
+}
+
+/// Masks (value, x, y) of `jacoflow.track.derivative_kernels`.
+#[pyfunction(name = "_derivative_kernels")]
+pub fn kernels(py: Python<'_>, order: usize) -> PyResult<Vec<Bound<'_, PyAny>>> {
+    if !(1..=4).contains(&order) {
+        return Err(Error::argument("order", "1, 2, 3 or 4", order).into());
+    }
+    let kernels = derivative_kernels(order);
+    [kernels.value, kernels.x, kernels.y]
+        .into_iter()
+        .map(|mask| Ok(arrays::owned::<f64>(py, &[5, 5], mask.as_flattened().to_vec())?.into_any()))
+        .collect()
+}
+
+/// Flow (H, W, 2) and where it is accepted, of `jacoflow.track.local_flow` and `refine_flow`.
+#[pyfunction(name = "_local_flow")]
+#[pyo3(signature = (first, second, refine, window, order, cond_max, min_sigma, step_max))]
+pub fn flow<'py>(
+    first: &Bound<'py, PyAny>,
+    second: &Bound<'py, PyAny>,
+    refine: bool,
+    window: usize,
+    order: usize,
+    cond_max: f64,
+    min_sigma: f64,
+    step_max: f64,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let py = first.py();
+    let options = LocalFlowOptions { window, order, cond_max, min_sigma, step_max };
+    check(&options)?;
+    let first = arrays::frame("first", first, ColourRule::Refuse)?;
+    let levels = GreyLevels::decide(&first);
+    let (first, second) =
+        (levels.convert(&first), levels.convert(&arrays::frame("second", second, ColourRule::Refuse)?));
+    if first.size() != second.size() {
+        let told = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
+        return Err(Error::argument(
+            "second",
+            format!("a frame as large as the first, {}", told(&first)),
+            told(&second),
+        )
+        .into());
+    }
+    let LocalFlow { flow, accepted } = py.detach(|| {
+        if refine {
+            refine_flow(&first, &second, &RefineOptions { local: options, ..RefineOptions::default() })
+        } else {
+            local_flow(&first, &second, &options)
+        }
+    });
+    let (width, height) = flow.size();
+    let values = flow.data().iter().flatten().copied().collect();
+    let flow = arrays::owned::<f64>(py, &[height, width, 2], values)?.into_any();
+    Ok((flow, arrays::owned::<bool>(py, &[height, width], accepted.into_data())?.into_any()))
+}
+
+fn check(options: &LocalFlowOptions) -> Result<()> {
+    if ![3, 5, 7].contains(&options.window) {
+        return Err(Error::argument("window", "3, 5 or 7 px", options.window));
+    }
+    if !(1..=4).contains(&options.order) {
+        return Err(Error::argument("order", "1, 2, 3 or 4", options.order));
+    }
+    for (name, value) in
+        [("cond_max", options.cond_max), ("min_sigma", options.min_sigma), ("step_max", options.step_max)]
+    {
+        if !(value >= 0.0) {
+            return Err(Error::argument(name, "a number that is not negative", value));
+        }
+    }
+    Ok(())
+}
