@@ -870,7 +870,8 @@ class _GradientTracker:
     def __new__(
         cls,
         frame: NDArray[Any],
-        bbox: list[float],
+        bbox: list[float] | None,
+        center: list[float] | None,
         method: str,
         fov: int,
         control: str,

@@ -104,6 +104,8 @@ class GradientTracker:
         The first frame, at least 16 x 16 px. Floats up to 1.5 are taken for shares of white.
     bbox : (x, y, width, height), px
         The target's box in it, with x = centre - width / 2; sides of at least 3 px; it may reach over the border.
+    center : (x, y), px
+        In place of a box: a point on the target; it is found as soon as it moves. With neither, the target is the first thing that moves; until then the status is "lost".
     method : "layered", "local" or "paper"
         "layered" (default): target and background as layers, one gradient step over the whole target from the filter's prediction. "local": the paper's loop (local flow in a window, its mean over what moves,
         a Gauss-Markov filter) with the repairs that it needs. "paper": its text to the letter, which loses targets on all but flat backgrounds.
@@ -133,8 +135,9 @@ class GradientTracker:
     def __init__(
         self,
         frame: ArrayLike,
-        bbox: ArrayLike,
+        bbox: ArrayLike | None = None,
         *,
+        center: ArrayLike | None = None,
         method: str = "layered",
         fov: int = 51,
         control: str = "integer",
@@ -144,11 +147,9 @@ class GradientTracker:
         window: int | None = None,
         eps: float | str = 0.5,
     ) -> None:
-        box = np.asarray(bbox, float)
-        if box.shape != (4,):
-            raise ValueError(f"bbox: expected (x, y, width, height), got shape {box.shape}")
+        box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
         slowest = None if eps == "auto" else float(eps)
-        self._tracker = _GradientTracker(np.asarray(frame), box.tolist(), method, fov, control, model, camera, order, window, slowest)
+        self._tracker = _GradientTracker(np.asarray(frame), box, point, method, fov, control, model, camera, order, window, slowest)
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
@@ -166,7 +167,17 @@ class GradientTracker:
         return TrackResult(**self._tracker.state())
 
 
-def track(frames: Iterable[ArrayLike], bbox: ArrayLike, **options: Any) -> Track:
+def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float] | None:
+    """A short list of numbers."""
+    if value is None:
+        return None
+    array = np.asarray(value, float)
+    if array.shape != (count,):
+        raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
+    return [float(number) for number in array]
+
+
+def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options: Any) -> Track:
     """Follows a target through frames (T, H, W), or any iterable of frames (H, W), from its box (x, y, width, height), px, in the first.
 
     Options are those of `GradientTracker`. The result has T entries.

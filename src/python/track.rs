@@ -30,10 +30,11 @@ fn word<T: Copy>(argument: &'static str, given: &str, known: &[(&str, T)]) -> Re
 #[pymethods]
 impl PyGradientTracker {
     #[new]
-    #[pyo3(signature = (frame, bbox, method, fov, control, model, camera, order, window, eps))]
+    #[pyo3(signature = (frame, bbox, center, method, fov, control, model, camera, order, window, eps))]
     fn new(
         frame: &Bound<'_, PyAny>,
-        bbox: [f64; 4],
+        bbox: Option<[f64; 4]>,
+        center: Option<[f64; 2]>,
         method: &str,
         fov: usize,
         control: &str,
@@ -54,8 +55,12 @@ impl PyGradientTracker {
             window,
             eps,
         };
-        let [x, y, width, height] = bbox;
-        let start = Start::Box(TargetBox { x, y, width, height });
+        let start = match (bbox, center) {
+            (Some(_), Some(_)) => return Err(Error::argument("center", "a box or a point, not both", "both").into()),
+            (Some([x, y, width, height]), None) => Start::Box(TargetBox { x, y, width, height }),
+            (None, Some(at)) => Start::Centre(at),
+            (None, None) => Start::Motion,
+        };
         let frame_of = arrays::frame("frame", frame, ColourRule::Refuse)?;
         let levels = GreyLevels::decide(&frame_of);
         let tracker = frame.py().detach(|| GradientTracker::new(&levels.convert(&frame_of), start, &options))?;

@@ -5,6 +5,7 @@
 //! Three systems follow the target ([`Mode`]): the paper's loop to the letter, the same with the repairs that it needs, and one that keeps its idea (the gradient equation, a
 //! prediction in place of iterations, a stopped background, a Gauss-Markov filter) but solves the equation once over the whole segmented target.
 
+mod detect;
 mod gauss_markov;
 mod kernels;
 mod layered;
@@ -13,6 +14,7 @@ mod local_flow;
 mod options;
 mod refine;
 
+pub use detect::{MovingTarget, detect_moving_target};
 pub use gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 pub use kernels::{DerivativeKernels, KernelMask, derivative_kernels};
 pub use local_flow::{LocalFlow, LocalFlowOptions, MeanFlow, local_flow};
@@ -21,7 +23,7 @@ pub use refine::{RefineOptions, refine_flow};
 
 use super::Tracker;
 use crate::error::{Error, Result};
-use crate::types::{Frame, TargetBox, TrackState};
+use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use layered::Layered;
 use local::LocalLoop;
 
@@ -33,8 +35,20 @@ const LEAST_BOX: f64 = 3.0;
 /// What follows the target.
 #[derive(Debug)]
 enum Engine {
+    /// Nothing has moved yet: the last frame, and where to look.
+    Waiting(Frame<f64>, Option<[f64; 2]>),
     Local(Box<LocalLoop>),
     Layered(Box<Layered>),
+}
+
+impl Engine {
+    /// Begins with a box in a frame.
+    fn new(frame: &Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+        match options.mode {
+            Mode::Layered => Self::Layered(Box::new(Layered::new(frame.clone(), bounds, options))),
+            Mode::Local | Mode::Paper => Self::Local(Box::new(LocalLoop::new(frame.clone(), bounds, options))),
+        }
+    }
 }
 
 /// Follows one target.
@@ -42,27 +56,63 @@ enum Engine {
 pub struct GradientTracker {
     state: TrackState,
     size: (usize, usize),
+    options: GradientOptions,
     engine: Engine,
 }
 
 impl GradientTracker {
-    /// Begins with the first frame.
+    /// Begins with the first frame. Without a box the target is what moves first ([`detect_moving_target`]): until then its status is lost and its box empty.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px, wholly outside, not finite), `center` (outside) or the option.
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
         options.check()?;
         check_frame(frame)?;
-        let bounds = match start {
-            Start::Box(bounds) => checked_box(bounds, frame.size())?,
-            _ => TargetBox::about([0.0; 2], 3.0, 3.0),
+        let (state, engine) = match start {
+            Start::Box(bounds) => {
+                let bounds = checked_box(bounds, frame.size())?;
+                (TrackState::at(bounds.centre(), bounds), Engine::new(frame, bounds, options))
+            }
+            Start::Centre(at) => {
+                (nothing_yet(checked_point(at, frame.size())?), Engine::Waiting(frame.clone(), Some(at)))
+            }
+            Start::Motion => {
+                let middle = [frame.width() as f64 / 2.0 - 0.5, frame.height() as f64 / 2.0 - 0.5];
+                (nothing_yet(middle), Engine::Waiting(frame.clone(), None))
+            }
         };
-        let engine = match options.mode {
-            Mode::Layered => Engine::Layered(Box::new(Layered::new(frame.clone(), bounds, options))),
-            Mode::Local | Mode::Paper => Engine::Local(Box::new(LocalLoop::new(frame.clone(), bounds, options))),
-        };
-        Ok(Self { state: TrackState::at(bounds.centre(), bounds), size: frame.size(), engine })
+        Ok(Self { state, size: frame.size(), options: options.clone(), engine })
     }
+
+    /// Looks for what moves first.
+    fn wait(&mut self, frame: &Frame<f64>) {
+        let Engine::Waiting(previous, near) = &mut self.engine else { return };
+        let found = detect_moving_target(previous, frame, *near).map(|found| found.bounds);
+        match found.and_then(|bounds| checked_box(bounds, self.size).ok()) {
+            Some(bounds) => {
+                let state = TrackState::at(bounds.centre(), bounds);
+                self.state = TrackState { frame: self.state.frame, reason: "the first thing that moves", ..state };
+                self.engine = Engine::new(frame, bounds, &self.options);
+            }
+            None => *previous = frame.clone(),
+        }
+    }
+}
+
+/// A target that has not moved yet.
+fn nothing_yet(at: [f64; 2]) -> TrackState {
+    let state = TrackState::at(at, TargetBox::about(at, 0.0, 0.0));
+    TrackState { status: TrackStatus::Lost, reason: "nothing has moved yet", visibility: 0.0, ..state }
+}
+
+/// A point in the frame.
+fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Result<[f64; 2]> {
+    let inside = |at: f64, length: usize| at >= 0.0 && at <= length as f64 - 1.0;
+    if inside(at[0], width) && inside(at[1], height) {
+        return Ok(at);
+    }
+    let expected = format!("a point (x, y) in the {width} x {height} frame");
+    Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])))
 }
 
 /// The first frame must be usable.
@@ -117,6 +167,8 @@ impl Tracker for GradientTracker {
         let usable = frame.data().iter().all(|value| value.is_finite());
         self.state.frame += 1;
         match &mut self.engine {
+            Engine::Waiting(..) if usable => self.wait(frame),
+            Engine::Waiting(..) => {}
             Engine::Local(engine) => engine.update(usable.then_some(frame), &mut self.state),
             Engine::Layered(engine) => engine.update(usable.then_some(frame), &mut self.state),
         }
