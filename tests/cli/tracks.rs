@@ -92,7 +92,6 @@ fn several_targets_become_rows_boxes_and_a_summary() {
 }
 
 #[test]
-#[ignore = "for the tracker itself to be there"]
 fn a_moving_square_is_followed() {
     let place = recorded(20);
     for start in [BOX, "--point 26,30", ""] {

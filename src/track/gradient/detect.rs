@@ -9,8 +9,8 @@ const CHANGE: f64 = 3.0;
 const LEAST_NOISE: f64 = 1.0;
 /// Changed pixels among the nine around a pixel that make it more than noise.
 const CROWD: usize = 4;
-/// Gap inside one object, px.
-const GAP: usize = 6;
+/// Gap inside one object, px: of an even target only what it uncovers and what it covers changes.
+const GAP: usize = 16;
 /// Fewest changed pixels of an object.
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.

@@ -53,7 +53,8 @@ fn refine_level(
     field: &mut Frame<[f64; 2]>,
 ) -> Frame<bool> {
     let (width, height) = first.size();
-    let (kernels, least) = (derivative_kernels(options.order), options.least(first, second));
+    // Frames that are far apart differ by motion: their difference says nothing of noise.
+    let (kernels, least) = (derivative_kernels(options.order), options.min_sigma);
     let mut best = Frame::filled(width, height, f64::INFINITY);
     let mut active = Frame::filled(width, height, true);
     let mut accepted = Frame::filled(width, height, false);
