@@ -15,8 +15,8 @@ const GAP: usize = 16;
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
 const REACH: isize = 10;
-/// Of displacements whose cost is within this factor of the best, the smallest is taken.
-const ALIKE: f64 = 1.05;
+/// Of displacements whose cost is within this factor of the best, and this share of the noise, the smallest is taken: larger ones explain an even target as well.
+const ALIKE: (f64, f64) = (1.05, 0.5);
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
 /// Smallest side of what is found, px.
@@ -50,7 +50,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
         };
         rank(a).total_cmp(&rank(b))
     })?;
-    let displacement = displacement(first, second, &object)?;
+    let displacement = displacement(first, second, &object, noise)?;
     let bounds = bounds(&object, displacement);
     (bounds.width >= LEAST_SIDE && bounds.height >= LEAST_SIDE)
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
@@ -103,7 +103,7 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
 }
 
 /// The smallest displacement that explains the changed pixels nearly best.
-fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize)]) -> Option<[isize; 2]> {
+fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize)], noise: f64) -> Option<[isize; 2]> {
     let read = |frame: &Frame<f64>, x: isize, y: isize| {
         let inside = x >= 0 && y >= 0 && (x as usize) < frame.width() && (y as usize) < frame.height();
         inside.then(|| frame.get(x as usize, y as usize))
@@ -128,7 +128,7 @@ fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize
         .collect();
     let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
     let size = |d: &[isize; 2]| d[0] * d[0] + d[1] * d[1];
-    all.into_iter().filter(|(cost, _)| *cost <= ALIKE * best).map(|(_, d)| d).min_by_key(size)
+    all.into_iter().filter(|(cost, _)| *cost <= ALIKE.0 * best + ALIKE.1 * noise).map(|(_, d)| d).min_by_key(size)
 }
 
 /// Extent of the changed pixels in the second frame.
@@ -162,7 +162,7 @@ mod tests {
         for (dx, dy) in [(3, 0), (0, -2), (-2, 1)] {
             let at = [(40 + dx) as usize, (30 + dy) as usize];
             let found = detect_moving_target(&scene([40, 30], 1), &scene(at, 2), None).unwrap();
-            assert_eq!(found.displacement, [f64::from(dx), f64::from(dy)]);
+            assert_eq!(found.displacement, [f64::from(dx), f64::from(dy)], "{found:?}");
             let truth = TargetBox { x: at[0] as f64 - 0.5, y: at[1] as f64 - 0.5, width: 13.0, height: 9.0 };
             assert!(found.bounds.overlap(&truth) > 0.85, "{found:?}");
         }

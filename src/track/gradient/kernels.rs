@@ -32,9 +32,11 @@ pub fn derivative_kernels(order: usize) -> DerivativeKernels {
     let monomials = DMatrix::from_fn(SIDE * SIDE, powers.len(), |p, k| {
         at(p % SIDE).powi(powers[k].0) * at(p / SIDE).powi(powers[k].1)
     });
-    let svd = monomials.svd(true, true);
+    let normal = monomials.tr_mul(&monomials);
     // 25 distinct points carry every polynomial of degree four: nothing is singular.
-    let fit = svd.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(powers.len(), SIDE * SIDE));
+    let fit = normal
+        .cholesky()
+        .map_or_else(|| DMatrix::zeros(powers.len(), SIDE * SIDE), |c| c.solve(&monomials.transpose()));
     let row = |power: (i32, i32), factor: f64| -> KernelMask {
         let k = powers.iter().position(|p| *p == power).unwrap_or(0);
         std::array::from_fn(|y| std::array::from_fn(|x| factor * fit[(k, y * SIDE + x)]))
