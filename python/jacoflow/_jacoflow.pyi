@@ -866,6 +866,7 @@ class FrameReader:
         """Frames per second, where the source says so, else None."""
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
+@final
 class _GradientTracker:
     def __new__(
         cls,

@@ -16,7 +16,7 @@ const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
 const REACH: isize = 10;
 /// Of displacements whose cost is within this factor of the best, and this share of the noise, the smallest is taken: larger ones explain an even target as well.
-const ALIKE: (f64, f64) = (1.05, 0.5);
+const ALIKE: (f64, f64) = (1.05, 0.25);
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
 /// Smallest side of what is found, px.
@@ -102,24 +102,18 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
     pixels.iter().map(far).sum::<f64>() / pixels.len() as f64
 }
 
-/// The smallest displacement that explains the changed pixels nearly best.
+/// The smallest displacement that explains the changed pixels nearly best: their extent less the displacement holds what was there in the first frame.
 fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize)], noise: f64) -> Option<[isize; 2]> {
-    let read = |frame: &Frame<f64>, x: isize, y: isize| {
-        let inside = x >= 0 && y >= 0 && (x as usize) < frame.width() && (y as usize) < frame.height();
-        inside.then(|| frame.get(x as usize, y as usize))
-    };
     let cost = |dx: isize, dy: isize| {
-        let off = |a: Option<f64>, b: f64| a.map_or(CAP, |a| (a - b).abs().min(CAP));
-        let sum: f64 = object
-            .iter()
-            .map(|&(x, y)| {
-                let (i, j) = (x as isize, y as isize);
-                // What came from there, or what went there.
-                off(read(first, i - dx, j - dy), second.get(x, y))
-                    .min(off(read(second, i + dx, j + dy), first.get(x, y)))
-            })
-            .sum();
-        sum / object.len() as f64
+        let TargetBox { x, y, width, height } = bounds(object, [dx, dy]);
+        let inside = |from: f64, length: f64| (from + 0.5) as isize..(from + length + 0.5) as isize;
+        let pixels = inside(y, height).flat_map(|j| inside(x, width).map(move |i| (i, j)));
+        let off = pixels.map(|(i, j)| match (read(second, i, j), read(first, i - dx, j - dy)) {
+            (Some(now), Some(before)) => (now - before).abs().min(CAP),
+            _ => CAP,
+        });
+        let (sum, count) = off.fold((0.0, 0), |(sum, count), off| (sum + off, count + 1));
+        if width < LEAST_SIDE || height < LEAST_SIDE { f64::INFINITY } else { sum / f64::from(count.max(1)) }
     };
     let all: Vec<_> = (-REACH..=REACH)
         .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)))
@@ -128,7 +122,13 @@ fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize
         .collect();
     let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
     let size = |d: &[isize; 2]| d[0] * d[0] + d[1] * d[1];
-    all.into_iter().filter(|(cost, _)| *cost <= ALIKE.0 * best + ALIKE.1 * noise).map(|(_, d)| d).min_by_key(size)
+    let alike = all.into_iter().filter(|(cost, _)| cost.is_finite() && *cost <= ALIKE.0 * best + ALIKE.1 * noise);
+    alike.map(|(_, d)| d).min_by_key(size)
+}
+
+fn read(frame: &Frame<f64>, x: isize, y: isize) -> Option<f64> {
+    let inside = x >= 0 && y >= 0 && (x as usize) < frame.width() && (y as usize) < frame.height();
+    inside.then(|| frame.get(x as usize, y as usize))
 }
 
 /// Extent of the changed pixels in the second frame.

@@ -156,8 +156,7 @@ impl Equations {
         let at = |plane: &Frame<f64>| plane.data()[at];
         let (xx, xy, yy, xt, yt) = (at(&self.xx), at(&self.xy), at(&self.yy), at(&self.xt), at(&self.yt));
         let determinant = xx * yy - xy * xy;
-        // Also false for NaN.
-        if !(determinant > 0.0) {
+        if determinant.is_nan() || determinant <= 0.0 {
             return None;
         }
         let step = [-(yy * xt - xy * yt) / determinant, -(xx * yt - xy * xt) / determinant];
@@ -177,7 +176,7 @@ impl LocalFlowOptions {
     }
 
     /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made.
-    pub(super) fn from_two_starts(&self, first: &Frame<f64>, second: &Frame<f64>, starts: &[[f64; 2]]) -> LocalFlow {
+    pub(super) fn flow_from(&self, first: &Frame<f64>, second: &Frame<f64>, starts: &[[f64; 2]]) -> LocalFlow {
         let (kernels, least) = (derivative_kernels(self.order), self.least(first, second));
         let equations: Vec<_> = starts
             .iter()
@@ -224,7 +223,7 @@ impl LocalFlow {
 
 /// Flow of single pixels from the first frame to the second, one step from rest (1)-(8).
 pub fn local_flow(first: &Frame<f64>, second: &Frame<f64>, options: &LocalFlowOptions) -> LocalFlow {
-    options.from_two_starts(first, second, &[[0.0; 2]])
+    options.flow_from(first, second, &[[0.0; 2]])
 }
 
 /// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the frame.
@@ -294,7 +293,7 @@ mod tests {
         let first = texture(60, 40);
         let moved = shifted(&first, [-3.0, 1.0]);
         let second = Frame::from_fn(60, 40, |x, y| if x < 30 { first.get(x, y) } else { moved.get(x, y) });
-        let found = LocalFlowOptions::default().from_two_starts(&first, &second, &[[0.0; 2], [2.9, -0.9]]);
+        let found = LocalFlowOptions::default().flow_from(&first, &second, &[[0.0; 2], [2.9, -0.9]]);
         let (still, moving) = (found.flow.get(12, 20), found.flow.get(46, 20));
         assert!(still[0].abs() < 1e-9 && (moving[0] - 3.0).abs() < 0.05 && (moving[1] + 1.0).abs() < 0.05);
     }

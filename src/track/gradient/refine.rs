@@ -67,7 +67,7 @@ fn refine_level(
             }
             let residual = equations.tt.data()[at];
             // Strictly: at a fixed point it would never fail otherwise (10).
-            if !(residual < best.data()[at]) {
+            if residual.is_nan() || residual >= best.data()[at] {
                 active.data_mut()[at] = false;
                 trial.data_mut()[at] = field.data()[at];
                 continue;

@@ -108,7 +108,7 @@ fn refine(a: &Frame<f64>, b: &Frame<f64>, hidden: &TargetBox, mut motion: [f64; 
         let [xx, xy, yy, xr, yr] = sums;
         let determinant = xx * yy - xy * xy;
         let least = (LEAST_INFORMATION * rows.len() as f64).powi(2);
-        if !(determinant > least) {
+        if determinant.is_nan() || determinant <= least {
             return None;
         }
         let step = [-(yy * xr - xy * yr) / determinant, -(xx * yr - xy * xr) / determinant];

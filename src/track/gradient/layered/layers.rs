@@ -152,7 +152,9 @@ impl Background {
         }
         let mean = known.iter().sum::<f64>() / known.len() as f64;
         let unknown: Vec<_> = pixels().filter(|(x, y)| !self.known.get(*x, *y)).collect();
-        unknown.into_iter().for_each(|(x, y)| self.picture.row_mut(y)[x] = mean);
+        for (x, y) in unknown {
+            self.picture.row_mut(y)[x] = mean;
+        }
     }
 
     /// Whether it is known at the pixel nearest to a place.

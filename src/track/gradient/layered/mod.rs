@@ -74,7 +74,6 @@ pub(super) struct Layered {
     before: Option<[f64; 2]>,
     missed: usize,
     hidden: bool,
-    started: bool,
     /// Angle turned, not wrapped, rad.
     turned: f64,
     gain: f64,
@@ -116,7 +115,6 @@ impl Layered {
             previous: frame,
             missed: 0,
             hidden: false,
-            started: false,
             turned: 0.0,
             gain: 1.0,
             rotation_told: true,
@@ -158,7 +156,7 @@ impl Layered {
 
     fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
         if motion == [0.0; 2] {
-            if self.started {
+            if self.age > 0 {
                 self.noise = learn::learn_noise(self.noise, &self.previous, frame);
             }
             return;
@@ -169,9 +167,9 @@ impl Layered {
 
     fn shift(&mut self, motion: [f64; 2]) {
         self.filter.shift(motion);
-        let shift = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
-        self.pose.p = shift(self.pose.p);
-        self.before = self.before.map(shift);
+        let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
+        self.before = self.before.map(shifted);
+        self.pose.p = shifted(self.pose.p);
     }
 
     /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
@@ -240,17 +238,16 @@ impl Layered {
     /// The target in the frame, if it is seen well enough to be measured.
     fn find(&self, frame: &Frame<f64>) -> Option<Finding> {
         let interrupted = self.hidden || self.missed > 0;
-        let levels = if self.started && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
+        let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
         let mut best = plain;
         let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
         if (doubted || interrupted) && self.age >= YOUNG {
             best = self.covered(frame, plain, levels).or(best);
         }
-        if let Some(found) = best.filter(|found| !found.occluded) {
-            if found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1 {
-                best = self.touched(frame, levels).or(best);
-            }
+        let touched = |found: &Finding| found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1;
+        if best.is_some_and(|found| !found.occluded && touched(&found)) {
+            best = self.touched(frame, levels).or(best);
         }
         if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
             best = self.searched(frame).or(best);
@@ -316,17 +313,17 @@ impl Layered {
             velocity: step.map(|step| (step, variance.map(|v| 2.0 * v))),
         });
         self.turn_to(&pose);
-        if !interrupted {
+        if interrupted {
+            self.rate = [0.0; 6];
+        } else {
             (2..6).for_each(|k| self.rate[k] += RATE * aligned.moved[k]);
             if !self.rotation_told {
                 let growth = 0.5 * (self.rate[2] + self.rate[5]);
                 self.rate = [0.0, 0.0, growth, 0.0, 0.0, growth];
             }
-        } else {
-            self.rate = [0.0; 6];
         }
         self.before = (!occluded).then_some(at);
-        (self.missed, self.hidden, self.started) = (0, occluded, true);
+        (self.missed, self.hidden) = (0, occluded);
         self.age += 1;
         let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
