@@ -15,8 +15,9 @@ const GAP: usize = 16;
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
 const REACH: isize = 10;
-/// Of displacements whose cost is within this factor of the best, and this share of the noise, the smallest is taken: larger ones explain an even target as well.
-const ALIKE: (f64, f64) = (1.05, 0.25);
+/// Of displacements whose cost is within this factor of the best, or that leave no more than so many times the noise, the smallest is taken: larger ones explain an even target as well.
+/// Noise alone leaves 1.13 times.
+const ALIKE: (f64, f64) = (1.05, 1.4);
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
 /// Smallest side of what is found, px.
@@ -122,7 +123,8 @@ fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize
         .collect();
     let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
     let size = |d: &[isize; 2]| d[0] * d[0] + d[1] * d[1];
-    let alike = all.into_iter().filter(|(cost, _)| cost.is_finite() && *cost <= ALIKE.0 * best + ALIKE.1 * noise);
+    let bar = (ALIKE.0 * best).max(ALIKE.1 * noise);
+    let alike = all.into_iter().filter(|(cost, _)| *cost <= bar);
     alike.map(|(_, d)| d).min_by_key(size)
 }
 

@@ -49,6 +49,16 @@ impl Engine {
             Mode::Local | Mode::Paper => Self::Local(Box::new(LocalLoop::new(frame.clone(), bounds, options))),
         }
     }
+
+    /// The target at the beginning.
+    fn begun(&self, bounds: TargetBox) -> TrackState {
+        let covariance = match self {
+            Self::Waiting(..) => [[[f64::NAN; 3]; 3]; 2],
+            Self::Local(engine) => engine.covariance(),
+            Self::Layered(engine) => engine.covariance(),
+        };
+        TrackState { covariance, ..TrackState::at(bounds.centre(), bounds) }
+    }
 }
 
 /// Follows one target.
@@ -71,7 +81,8 @@ impl GradientTracker {
         let (state, engine) = match start {
             Start::Box(bounds) => {
                 let bounds = checked_box(bounds, frame.size())?;
-                (TrackState::at(bounds.centre(), bounds), Engine::new(frame, bounds, options))
+                let engine = Engine::new(frame, bounds, options);
+                (engine.begun(bounds), engine)
             }
             Start::Centre(at) => {
                 (nothing_yet(checked_point(at, frame.size())?), Engine::Waiting(frame.clone(), Some(at)))
@@ -90,9 +101,10 @@ impl GradientTracker {
         let found = detect_moving_target(previous, frame, *near).map(|found| found.bounds);
         match found.and_then(|bounds| checked_box(bounds, self.size).ok()) {
             Some(bounds) => {
-                let state = TrackState::at(bounds.centre(), bounds);
+                let engine = Engine::new(frame, bounds, &self.options);
+                let state = engine.begun(bounds);
                 self.state = TrackState { frame: self.state.frame, reason: "the first thing that moves", ..state };
-                self.engine = Engine::new(frame, bounds, &self.options);
+                self.engine = engine;
             }
             None => *previous = frame.clone(),
         }
@@ -101,8 +113,13 @@ impl GradientTracker {
 
 /// A target that has not moved yet.
 fn nothing_yet(at: [f64; 2]) -> TrackState {
-    let state = TrackState::at(at, TargetBox::about(at, 0.0, 0.0));
-    TrackState { status: TrackStatus::Lost, reason: "nothing has moved yet", visibility: 0.0, ..state }
+    TrackState {
+        status: TrackStatus::Lost,
+        reason: "nothing has moved yet",
+        visibility: 0.0,
+        covariance: [[[f64::NAN; 3]; 3]; 2],
+        ..TrackState::at(at, TargetBox::about(at, 0.0, 0.0))
+    }
 }
 
 /// A point in the frame.

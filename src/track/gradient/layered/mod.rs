@@ -123,6 +123,11 @@ impl Layered {
         }
     }
 
+    /// Covariance of the filter along x and y.
+    pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
+        self.filter.covariance()
+    }
+
     /// The next frame; `None`: it cannot be used.
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
         let was_lost = matches!(state.status, TrackStatus::Lost | TrackStatus::Out);
