@@ -187,7 +187,7 @@ fn check(options: &LocalFlowOptions) -> Result<()> {
     for (name, value) in
         [("cond_max", options.cond_max), ("min_sigma", options.min_sigma), ("step_max", options.step_max)]
     {
-        if !(value >= 0.0) {
+        if value.is_nan() || value < 0.0 {
             return Err(Error::argument(name, "a number that is not negative", value));
         }
     }

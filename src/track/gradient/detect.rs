@@ -173,11 +173,11 @@ mod tests {
     #[test]
     fn nothing_is_found_where_nothing_moves_and_the_nearer_of_two_otherwise() {
         assert_eq!(detect_moving_target(&scene([40, 30], 1), &scene([40, 30], 2), None), None);
-        let both = |a: [usize; 2], b: [usize; 2]| {
-            let (one, two) = (scene(a, 3), scene(b, 4));
+        let both = |a: [usize; 2], b: [usize; 2], seed: u64| {
+            let (one, two) = (scene(a, seed), scene(b, seed + 1));
             Frame::from_fn(96, 80, |x, y| if x < 48 { one.get(x, y) } else { two.get(x, y) })
         };
-        let (first, second) = (both([10, 20], [70, 50]), both([12, 20], [70, 53]));
+        let (first, second) = (both([10, 20], [70, 50], 3), both([12, 20], [70, 53], 5));
         let found = detect_moving_target(&first, &second, Some([75.0, 55.0])).unwrap();
         assert_eq!(found.displacement, [0.0, 3.0]);
         assert_eq!(detect_moving_target(&first, &second, Some([15.0, 25.0])).unwrap().displacement, [2.0, 0.0]);
