@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _derivative_kernels, _GradientTracker, _local_flow
 
-__all__ = ["GradientTracker", "Track", "TrackResult", "derivative_kernels", "local_flow", "refine_flow", "track"]
+__all__ = ["GradientTracker", "PixelFlow", "Track", "TrackResult", "derivative_kernels", "local_flow", "refine_flow", "track"]
 
 Array = NDArray[np.float64]
 
@@ -198,8 +198,8 @@ def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Flow:
-    """Flow of single pixels."""
+class PixelFlow:
+    """Flow of single pixels of a frame (H, W), px/frame."""
 
     flow: Array
     """(H, W, 2), px/frame."""
@@ -209,17 +209,17 @@ class _Flow:
 
 def local_flow(
     first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
-) -> _Flow:
+) -> PixelFlow:
     """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa, equations (1) to (8).
 
     `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
     levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
     """
-    return _Flow(*_local_flow(np.asarray(first), np.asarray(second), False, window, order, cond_max, min_sigma, step_max))
+    return PixelFlow(*_local_flow(np.asarray(first), np.asarray(second), False, window, order, cond_max, min_sigma, step_max))
 
 
 def refine_flow(
     first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
-) -> _Flow:
+) -> PixelFlow:
     """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
-    return _Flow(*_local_flow(np.asarray(first), np.asarray(second), True, window, order, cond_max, min_sigma, step_max))
+    return PixelFlow(*_local_flow(np.asarray(first), np.asarray(second), True, window, order, cond_max, min_sigma, step_max))
