@@ -8,6 +8,9 @@ use std::sync::{Arc, Mutex, OnceLock};
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
 
+/// Values of a buffer up to which work outside every pool is not handed to one: waking its threads takes longer than the work.
+const SMALL: usize = 1 << 16;
+
 /// The environment variable that sets the number of threads.
 const VARIABLE: &str = "JACOFLOW_THREADS";
 
@@ -106,10 +109,15 @@ pub(crate) fn for_each_band_of<T: Send>(
         return;
     }
     let rows = buffer.len() / row_len;
-    buffer.par_chunks_mut(band_rows * row_len).enumerate().for_each(|(band, slice)| {
+    let one_band = |(band, slice): (usize, &mut [T])| {
         let start = band * band_rows;
         work(band, start..(start + band_rows).min(rows), slice);
-    });
+    };
+    if buffer.len() <= SMALL && rayon::current_thread_index().is_none() {
+        buffer.chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
+    } else {
+        buffer.par_chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
+    }
 }
 
 /// Told how far long work has come; may stop it.

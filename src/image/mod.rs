@@ -2,6 +2,7 @@
 
 mod blocks;
 mod border;
+mod cubic;
 #[allow(dead_code)] // offered to the estimators that warp
 mod fill;
 mod luminance;
@@ -22,6 +23,7 @@ pub use quantise::Quantiser;
 pub use sample::Interpolation;
 pub use smooth::GaussianSmoother;
 
+pub(crate) use cubic::{cubic_at, cubic_at_all};
 pub(crate) use fill::fill_holes;
 pub(crate) use pyramid::{halve_into, halve_mask, halved_noise, halved_size};
 #[allow(unused_imports)] // offered to the estimators that blur product planes

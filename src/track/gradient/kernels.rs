@@ -4,6 +4,7 @@
 //! are correlations with fixed masks.
 
 use nalgebra::DMatrix;
+use std::sync::OnceLock;
 
 /// Pixels on each side of the centre.
 pub const REACH: usize = 2;
@@ -21,6 +22,12 @@ pub struct DerivativeKernels {
     pub x: KernelMask,
     /// Derivative along y, 1/px: the transpose.
     pub y: KernelMask,
+}
+
+/// The masks of [`derivative_kernels`], made once.
+pub(super) fn kernels_of(order: usize) -> &'static DerivativeKernels {
+    static KERNELS: OnceLock<[DerivativeKernels; 4]> = OnceLock::new();
+    &KERNELS.get_or_init(|| [1, 2, 3, 4].map(derivative_kernels))[order.clamp(1, 4) - 1]
 }
 
 /// The masks for polynomials of total degree `order`, 1 to 4 (clamped).

@@ -87,27 +87,30 @@ pub(super) struct LocalLoop {
     size: [f64; 2],
     /// Centre of the window.
     sight: [f64; 2],
-    previous: Frame<f64>,
+    /// What the window showed in the frame before.
+    before: Frame<f64>,
     refused: usize,
     missed: usize,
 }
 
 impl LocalLoop {
-    pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+    pub fn new(frame: &Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
         let rules = Rules::of(options);
         let centre = bounds.centre();
-        Self {
+        let mut this = Self {
             fov: options.fov,
             control: options.control,
             eps: options.eps,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
             size: [bounds.width, bounds.height],
             sight: centre,
-            previous: frame,
+            before: Frame::default(),
             refused: 0,
             missed: 0,
             rules,
-        }
+        };
+        this.before = this.cut(frame);
+        this
     }
 
     /// Covariance of the filter along x and y.
@@ -145,17 +148,17 @@ impl LocalLoop {
         self.missed = if measured { 0 } else { self.missed + 1 };
         self.steer();
         if let Some(frame) = frame {
-            self.previous = frame.clone();
+            self.before = self.cut(frame);
         }
         self.tell(state, found, (innovation, measured, was_lost));
     }
 
     /// What moves in the window between the last frame and this one.
     fn measure(&self, frame: &Frame<f64>) -> MeanFlow {
-        let (first, second) = (self.cut(&self.previous), self.cut(frame));
+        let (first, second) = (&self.before, self.cut(frame));
         let velocity = self.filter.speed();
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
-        let mut flow = self.rules.flow.flow_from(&first, &second, starts);
+        let mut flow = self.rules.flow.flow_from(first, &second, starts);
         self.keep_window(&mut flow);
         let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
         let mut mean = flow.mean(eps);

@@ -1,6 +1,7 @@
 //! Flow of single pixels from the gradient equation in a small window: M. Chiba and S. Ozawa, equations (1) to (10).
 
-use super::kernels::{DerivativeKernels, KernelMask, REACH, derivative_kernels};
+use super::equations::Equations;
+use super::kernels::kernels_of;
 use crate::image::Interpolation;
 use crate::types::Frame;
 
@@ -51,10 +52,14 @@ pub struct MeanFlow {
     pub count: usize,
 }
 
+/// Pixels that the noise is told from, about.
+const NOISE_SAMPLES: usize = 2048;
+
 /// Noise of the frames from their difference: `1.4826 median|E(t+1) - E(t)| / sqrt 2`, grey levels; 0 where they have no common pixel.
 pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>) -> f64 {
-    let mut differences: Vec<f64> =
-        first.data().iter().zip(second.data()).map(|(a, b)| (b - a).abs()).filter(|d| d.is_finite()).collect();
+    let every = (first.data().len() / NOISE_SAMPLES).max(1) | 1;
+    let pairs = first.data().iter().zip(second.data()).step_by(every);
+    let mut differences: Vec<f64> = pairs.map(|(a, b)| (b - a).abs()).filter(|d| d.is_finite()).collect();
     MAD * median(&mut differences) / std::f64::consts::SQRT_2
 }
 
@@ -67,108 +72,6 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Correlation with a mask; NaN along the border and where a pixel is.
-fn correlate(frame: &Frame<f64>, mask: &KernelMask) -> Frame<f64> {
-    let (width, height) = frame.size();
-    let mut out = Frame::filled(width, height, f64::NAN);
-    if width <= 2 * REACH || height <= 2 * REACH {
-        return out;
-    }
-    for y in REACH..height - REACH {
-        let target = &mut out.row_mut(y)[REACH..width - REACH];
-        target.fill(0.0);
-        for (j, weights) in mask.iter().enumerate() {
-            let row = frame.row(y + j - REACH);
-            for (i, &w) in weights.iter().enumerate() {
-                if w != 0.0 {
-                    target.iter_mut().zip(&row[i..]).for_each(|(t, e)| *t += w * e);
-                }
-            }
-        }
-    }
-    out
-}
-
-/// Sums over a square window; NaN where the window reaches over the border or holds NaN.
-fn box_sum(plane: &Frame<f64>, window: usize) -> Frame<f64> {
-    let (width, height) = plane.size();
-    let reach = window / 2;
-    let mut out = Frame::filled(width, height, f64::NAN);
-    if width < window || height < window {
-        return out;
-    }
-    let mut line = vec![0.0; width];
-    for y in reach..height - reach {
-        line.fill(0.0);
-        for j in y - reach..=y + reach {
-            line.iter_mut().zip(plane.row(j)).for_each(|(l, e)| *l += e);
-        }
-        let target = &mut out.row_mut(y)[reach..width - reach];
-        target.fill(0.0);
-        for i in 0..window {
-            target.iter_mut().zip(&line[i..]).for_each(|(t, l)| *t += l);
-        }
-    }
-    out
-}
-
-/// The equations in the windows around all pixels, summed: `G'G`, `G'b` and `b'b`.
-pub(super) struct Equations {
-    xx: Frame<f64>,
-    xy: Frame<f64>,
-    yy: Frame<f64>,
-    xt: Frame<f64>,
-    yt: Frame<f64>,
-    /// Residual of no step at all.
-    pub tt: Frame<f64>,
-    /// Equations in a window.
-    count: f64,
-}
-
-impl Equations {
-    /// Of a frame and the next one, which was warped by what is known of the flow.
-    pub fn new(first: &Frame<f64>, warped: &Frame<f64>, kernels: &DerivativeKernels, window: usize) -> Self {
-        let (width, height) = first.size();
-        let combine = |f: &dyn Fn(f64, f64) -> f64| {
-            let data = first.data().iter().zip(warped.data()).map(|(a, b)| f(*a, *b)).collect();
-            Frame::new(width, height, data).unwrap_or_default()
-        };
-        let (mean, difference) = (combine(&|a, b| 0.5 * (a + b)), combine(&|a, b| b - a));
-        let (x, y, t) =
-            (correlate(&mean, &kernels.x), correlate(&mean, &kernels.y), correlate(&difference, &kernels.value));
-        let product = |a: &Frame<f64>, b: &Frame<f64>| {
-            let data = a.data().iter().zip(b.data()).map(|(a, b)| a * b).collect();
-            box_sum(&Frame::new(width, height, data).unwrap_or_default(), window)
-        };
-        Self {
-            xx: product(&x, &x),
-            xy: product(&x, &y),
-            yy: product(&y, &y),
-            xt: product(&x, &t),
-            yt: product(&y, &t),
-            tt: product(&t, &t),
-            count: (window * window) as f64,
-        }
-    }
-
-    /// The step at a pixel (7), and whether it is accepted; `least` is the weakest gradient that counts.
-    pub fn step(&self, at: usize, options: &LocalFlowOptions, least: f64) -> Option<([f64; 2], bool)> {
-        let at = |plane: &Frame<f64>| plane.data()[at];
-        let (xx, xy, yy, xt, yt) = (at(&self.xx), at(&self.xy), at(&self.yy), at(&self.xt), at(&self.yt));
-        let determinant = xx * yy - xy * xy;
-        if determinant.is_nan() || determinant <= 0.0 {
-            return None;
-        }
-        let step = [-(yy * xt - xy * yt) / determinant, -(xx * yt - xy * xt) / determinant];
-        let (middle, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
-        let (largest, smallest) = (middle + radius, determinant / (middle + radius));
-        let accepted = largest <= options.cond_max.powi(2) * smallest
-            && (smallest / self.count).sqrt() >= least
-            && step[0].hypot(step[1]) <= options.step_max;
-        step[0].is_finite().then_some((step, accepted && step[1].is_finite()))
-    }
-}
-
 impl LocalFlowOptions {
     /// The weakest gradient that counts between these frames.
     pub(super) fn least(&self, first: &Frame<f64>, second: &Frame<f64>) -> f64 {
@@ -177,16 +80,15 @@ impl LocalFlowOptions {
 
     /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made.
     pub(super) fn flow_from(&self, first: &Frame<f64>, second: &Frame<f64>, starts: &[[f64; 2]]) -> LocalFlow {
-        let (kernels, least) = (derivative_kernels(self.order), self.least(first, second));
+        let (kernels, least) = (kernels_of(self.order), self.least(first, second));
         let equations: Vec<_> = starts
             .iter()
-            .map(|start| (*start, Equations::new(first, &shifted(second, *start), &kernels, self.window)))
+            .map(|start| (*start, Equations::new(first, &shifted(second, *start), kernels, self.window)))
             .collect();
         let (width, height) = first.size();
         let mut out = LocalFlow::none(width, height);
         for at in 0..width * height {
-            let residual = |e: &Equations| if e.tt.data()[at].is_nan() { f64::INFINITY } else { e.tt.data()[at] };
-            let best = equations.iter().min_by(|a, b| residual(&a.1).total_cmp(&residual(&b.1)));
+            let best = equations.iter().min_by(|a, b| a.1.residual(at).total_cmp(&b.1.residual(at)));
             let Some((start, equations)) = best else { continue };
             if let Some((step, accepted)) = equations.step(at, self, least) {
                 out.flow.data_mut()[at] = [start[0] + step[0], start[1] + step[1]];
@@ -232,34 +134,57 @@ pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
         return frame.clone();
     }
     let (width, height) = frame.size();
-    let [sx, sy] = shift;
-    let (fx, fy) = (sx - sx.floor(), sy - sy.floor());
-    let (wx, wy) = (Interpolation::Bicubic.weights(fx), Interpolation::Bicubic.weights(fy));
-    let along = weighted(width, height, sx.floor() as isize, &wx, |x, y| frame.get(x, y));
-    // Columns in place of rows.
-    let turned = weighted(height, width, sy.floor() as isize, &wy, |y, x| along.get(x, y));
-    Frame::from_fn(width, height, |x, y| turned.get(y, x))
+    let (across, down) = (Taps::of(shift[0]), Taps::of(shift[1]));
+    let (columns, rows) = (across.range(width), down.range(height));
+    let mut along = Frame::filled(width, height, f64::NAN);
+    for y in 0..height {
+        let (source, target) = (frame.row(y), &mut along.row_mut(y)[columns.clone()]);
+        across.add(target, |k| &source[across.from(columns.start, k)..]);
+    }
+    let mut out = Frame::filled(width, height, f64::NAN);
+    for y in rows {
+        down.add(out.row_mut(y), |k| along.row(down.from(y, k)));
+    }
+    out
 }
 
-/// `sum_k w_k value(x + whole - 1 + k)`, NaN beyond the ends; values of weight zero are not needed.
-fn weighted(
-    length: usize,
-    lines: usize,
+/// Taps of a shift along one axis; those of weight zero are not needed.
+struct Taps {
     whole: isize,
-    weights: &[f64; 4],
-    value: impl Fn(usize, usize) -> f64,
-) -> Frame<f64> {
-    Frame::from_fn(length, lines, |x, line| {
-        let mut sum = 0.0;
-        for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            let at = x as isize + whole - 1 + k as isize;
-            if at < 0 || at >= length as isize {
-                return f64::NAN;
-            }
-            sum += w * value(at as usize, line);
+    weights: Vec<(usize, f64)>,
+}
+
+impl Taps {
+    fn of(shift: f64) -> Self {
+        let weights = Interpolation::Bicubic.weights(shift - shift.floor());
+        let weights = weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect();
+        Self { whole: shift.floor() as isize - 1, weights }
+    }
+
+    /// Pixels whose taps are all among `length`.
+    fn range(&self, length: usize) -> std::ops::Range<usize> {
+        let ends = [self.weights.first(), self.weights.last()].map(|tap| tap.map_or(0, |(k, _)| *k as isize));
+        let length = length as isize;
+        let first = (-self.whole - ends[0]).clamp(0, length);
+        let end = (length - self.whole - ends[1]).clamp(first, length);
+        first as usize..end as usize
+    }
+
+    /// Where the tap `k` of a pixel is.
+    fn from(&self, at: usize, k: usize) -> usize {
+        (at as isize + self.whole + k as isize).max(0) as usize
+    }
+
+    /// The weighted sum of the taps' rows of values.
+    fn add<'a>(&self, target: &mut [f64], row: impl Fn(usize) -> &'a [f64]) {
+        if target.is_empty() {
+            return;
         }
-        sum
-    })
+        target.fill(0.0);
+        for &(k, w) in &self.weights {
+            target.iter_mut().zip(row(k)).for_each(|(t, e)| *t += w * e);
+        }
+    }
 }
 
 #[cfg(test)]

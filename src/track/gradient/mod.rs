@@ -6,6 +6,7 @@
 //! prediction in place of iterations, a stopped background, a Gauss-Markov filter) but solves the equation once over the whole segmented target.
 
 mod detect;
+mod equations;
 mod gauss_markov;
 mod kernels;
 mod layered;
@@ -46,7 +47,7 @@ impl Engine {
     fn new(frame: &Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
         match options.mode {
             Mode::Layered => Self::Layered(Box::new(Layered::new(frame.clone(), bounds, options))),
-            Mode::Local | Mode::Paper => Self::Local(Box::new(LocalLoop::new(frame.clone(), bounds, options))),
+            Mode::Local | Mode::Paper => Self::Local(Box::new(LocalLoop::new(frame, bounds, options))),
         }
     }
 
@@ -139,10 +140,15 @@ fn check_frame(frame: &Frame<f64>) -> Result<()> {
         let expected = format!("a frame of at least {LEAST_FRAME} x {LEAST_FRAME} px");
         return Err(Error::argument("frame", expected, format!("{width} x {height}")));
     }
-    if frame.data().iter().any(|value| !value.is_finite()) {
+    if !all_finite(frame) {
         return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
     }
     Ok(())
+}
+
+/// Whether no sample is NaN or infinite; without a way out early, which lanes do not like.
+fn all_finite(frame: &Frame<f64>) -> bool {
+    frame.data().iter().fold(true, |all, value| all & value.is_finite())
 }
 
 /// A box that holds something of the frame.
@@ -181,7 +187,7 @@ impl Tracker for GradientTracker {
                 told(frame.size()),
             ));
         }
-        let usable = frame.data().iter().all(|value| value.is_finite());
+        let usable = all_finite(frame);
         self.state.frame += 1;
         match &mut self.engine {
             Engine::Waiting(..) if usable => self.wait(frame),

@@ -1,7 +1,8 @@
 //! Local flow refined by warping, (9), and from coarse pictures to fine ones.
 
-use super::kernels::derivative_kernels;
-use super::local_flow::{Equations, LocalFlow, LocalFlowOptions, median};
+use super::equations::Equations;
+use super::kernels::kernels_of;
+use super::local_flow::{LocalFlow, LocalFlowOptions, median};
 use crate::image::Interpolation;
 use crate::types::Frame;
 
@@ -54,20 +55,20 @@ fn refine_level(
 ) -> Frame<bool> {
     let (width, height) = first.size();
     // Frames that are far apart differ by motion: their difference says nothing of noise.
-    let (kernels, least) = (derivative_kernels(options.order), options.min_sigma);
+    let (kernels, least) = (kernels_of(options.order), options.min_sigma);
     let mut best = Frame::filled(width, height, f64::INFINITY);
     let mut active = Frame::filled(width, height, true);
     let mut accepted = Frame::filled(width, height, false);
     let mut trial = field.clone();
     for step in 0..=steps {
-        let equations = Equations::new(first, &warped(second, &trial), &kernels, options.window);
+        let equations = Equations::new(first, &warped(second, &trial), kernels, options.window);
         for at in 0..width * height {
             if !active.data()[at] {
                 continue;
             }
-            let residual = equations.tt.data()[at];
+            let residual = equations.residual(at);
             // Strictly: at a fixed point it would never fail otherwise (10).
-            if residual.is_nan() || residual >= best.data()[at] {
+            if residual >= best.data()[at] {
                 active.data_mut()[at] = false;
                 trial.data_mut()[at] = field.data()[at];
                 continue;

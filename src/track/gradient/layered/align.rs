@@ -1,26 +1,18 @@
 //! The gradient step over the whole target: equation (5) of the paper with the unknowns of an affine map.
 
-use super::layers::{Background, Target, is_inside};
-use super::patch::{Patch, bounds_about, smooth};
+use super::layers::{Background, Target};
+use super::level::{Level, STEP_MAX, Vote};
 use super::pose::{Increment, Pose};
 use crate::track::gradient::local_flow::{MAD, median};
 use crate::types::Frame;
 use nalgebra::{SMatrix, SVector};
 
-/// Longest step, px.
-const STEP_MAX: f64 = 3.0;
 /// Steps at a level.
 const STEPS: usize = 6;
 /// A level is left when a step is shorter, px.
 const SETTLED: f64 = 0.01;
 /// Least deviation of the residual, share of the range of the model.
 const LEAST_SHARE: f64 = 0.03;
-/// Limits of the brightness ratio.
-const GAIN: (f64, f64) = (0.8, 1.25);
-/// Support that the brightness ratio is measured on.
-const BRIGHT: f64 = 0.7;
-/// Support from which on a point must be the target, unless something covers it.
-const SOLID: f64 = 0.3;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
 const CORRELATED: f64 = 4.0;
 
@@ -49,7 +41,7 @@ impl Freedom {
 
     /// Derivatives by the unknowns, from the gradient and the place.
     #[inline(always)]
-    fn columns(self, [gx, gy]: [f64; 2], [xi, eta]: [f64; 2]) -> [f64; 6] {
+    pub fn columns(self, [gx, gy]: [f64; 2], [xi, eta]: [f64; 2]) -> [f64; 6] {
         match self {
             Self::Translation => [gx, gy, 0.0, 0.0, 0.0, 0.0],
             Self::Similarity => [gx, gy, xi * gx + eta * gy, xi * gy - eta * gx, 0.0, 0.0],
@@ -106,122 +98,6 @@ pub(super) struct Aligned {
     pub gain: f64,
 }
 
-/// One level: everything smoothed alike.
-struct Level<'a> {
-    task: Task<'a>,
-    sigma: f64,
-    frame: Patch,
-    behind: Patch,
-    support: Frame<f64>,
-    /// Support times brightness.
-    bright: Frame<f64>,
-}
-
-impl<'a> Level<'a> {
-    fn new(task: Task<'a>, pose: &Pose, sigma: f64) -> Self {
-        let reach = pose.reach(task.target.half()).map(|r| r + 2.0 * STEP_MAX + 3.0 * sigma + 2.0);
-        let bounds = bounds_about(pose.p, reach, task.frame.size());
-        let inner = sigma / pose.scale().max(0.1);
-        let target = task.target;
-        let product = target.a.data().iter().zip(target.t.data()).map(|(a, t)| a * t).collect();
-        let product = Frame::new(target.a.width(), target.a.height(), product).unwrap_or_default();
-        Self {
-            task,
-            sigma,
-            frame: Patch::cut(task.frame, bounds).smoothed(sigma),
-            behind: Patch::cut(&task.background.picture, bounds).smoothed(sigma),
-            support: smooth(&target.a, inner),
-            bright: smooth(&product, inner),
-        }
-    }
-}
-
-/// A point that votes.
-struct Vote {
-    residual: f64,
-    weight: f64,
-    columns: [f64; 6],
-}
-
-impl Level<'_> {
-    /// Votes of all points near the support, without the weights for outliers; and the range of the model among them.
-    fn votes(&self, pose: &Pose, gain: f64, (near, silent): (&Frame<bool>, Option<&Frame<bool>>)) -> (Vec<Vote>, f64) {
-        let Task { frame, target, background, .. } = self.task;
-        let (width, height) = target.a.size();
-        let (mut votes, mut range) = (Vec::with_capacity(width * height), (f64::INFINITY, f64::NEG_INFINITY));
-        for j in 1..height.saturating_sub(1) {
-            for i in (1..width.saturating_sub(1)).filter(|i| near.get(*i, j)) {
-                let xi = target.xi(i, j);
-                let place = pose.apply(xi);
-                if !is_inside(place, frame) {
-                    continue;
-                }
-                let (seen, behind) = (self.frame.at(place), self.behind.at(place));
-                let a = self.support.get(i, j);
-                let model = gain * self.bright.get(i, j) + (1.0 - a) * behind;
-                range = (range.0.min(model), range.1.max(model));
-                let weight = if background.is_known(place) { 1.0 } else { a.powi(4) };
-                if weight > 0.0 && !silent.is_some_and(|silent| silent.get(i, j)) {
-                    let slope = |plane: &Frame<f64>| {
-                        let (row, above, below) = (plane.row(j), plane.row(j - 1), plane.row(j + 1));
-                        [0.5 * (row[i + 1] - row[i - 1]), 0.5 * (below[i] - above[i])]
-                    };
-                    let (of_bright, of_support) = (slope(&self.bright), slope(&self.support));
-                    let gradient = [0, 1].map(|k| gain * of_bright[k] - behind * of_support[k]);
-                    let columns = self.task.freedom.columns(gradient, xi);
-                    votes.push(Vote { residual: seen - model, weight, columns });
-                }
-            }
-        }
-        (votes, (range.1 - range.0).max(0.0))
-    }
-
-    /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the target its support ends without the target ending.
-    fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
-        let Task { frame, target, silence, .. } = self.task;
-        let (width, height) = target.a.size();
-        let silent = Frame::from_fn(width, height, |i, j| {
-            let place = pose.apply(target.xi(i, j));
-            if !is_inside(place, frame) {
-                return false;
-            }
-            let (seen, behind, bright) = (self.frame.at(place), self.behind.at(place), gain * target.t.get(i, j));
-            let nearer_behind = (seen - behind).abs() < (seen - bright).abs();
-            match silence {
-                Silence::None => false,
-                Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
-                Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
-                Silence::Lookalike => !nearer_behind,
-            }
-        });
-        (silence != Silence::None).then(|| dilated(&silent, 1 + self.sigma.ceil() as usize))
-    }
-
-    /// Ratio of what is seen to the template.
-    fn gain(&self, pose: &Pose, before: f64) -> f64 {
-        let target = self.task.target;
-        let mut ratios = Vec::new();
-        for j in 0..target.a.height() {
-            for i in (0..target.a.width()).filter(|i| target.a.get(*i, j) > BRIGHT) {
-                let place = pose.apply(target.xi(i, j));
-                let (a, bright) = (self.support.get(i, j), self.bright.get(i, j));
-                if is_inside(place, self.task.frame) && bright > 1.0 {
-                    ratios.push((self.frame.at(place) - (1.0 - a) * self.behind.at(place)) / bright);
-                }
-            }
-        }
-        if ratios.is_empty() { before } else { median(&mut ratios).clamp(GAIN.0, GAIN.1) }
-    }
-}
-
-/// Everything within `reach` points along both axes.
-fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
-    let (width, height) = mask.size();
-    let wide = |at: usize, length: usize| at.saturating_sub(reach)..(at + reach + 1).min(length);
-    let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, width)].contains(&true));
-    Frame::from_fn(width, height, |i, j| wide(j, height).any(|k| along.get(i, k)))
-}
-
 /// The residual's deviation, robustly.
 fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
     let mut sizes: Vec<f64> = votes.iter().map(|vote| vote.residual.abs()).collect();
@@ -229,15 +105,15 @@ fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
 }
 
 /// Weighted normal equations `J'WJ` and `J'Wr`; outliers count little (S. Geman and D. McClure).
-fn normal_equations(votes: &[Vote], s: f64) -> (Matrix, Vector) {
+fn normal_equations(votes: &[Vote], s: f64, unknowns: usize) -> (Matrix, Vector) {
     let (mut matrix, mut right) = (Matrix::zeros(), Vector::zeros());
     for vote in votes {
         let outlying = 1.0 + (vote.residual / (3.0 * s)).powi(2);
         let weight = vote.weight / (outlying * outlying);
-        for i in 0..6 {
+        for i in 0..unknowns {
             let column = weight * vote.columns[i];
             right[i] += column * vote.residual;
-            for j in i..6 {
+            for j in i..unknowns {
                 matrix[(i, j)] += column * vote.columns[j];
             }
         }
@@ -253,15 +129,15 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
     let (mut pose, mut total, mut gain) = (*guess, Vector::zeros(), gain);
     let mut last = None;
     for &sigma in task.levels {
-        let level = Level::new(task, &pose, sigma);
+        let mut level = Level::new(task, &pose, sigma, &near);
         let silent = level.silent(&pose, gain);
         for _ in 0..STEPS {
-            let (votes, range) = level.votes(&pose, gain, (&near, silent.as_ref()));
-            if votes.len() < unknowns {
+            let range = level.vote(&pose, gain, silent.as_ref());
+            if level.votes.len() < unknowns {
                 return None;
             }
-            let s = deviation(&votes, task.noise, range);
-            let (mut matrix, right) = normal_equations(&votes, s);
+            let s = deviation(&level.votes, task.noise, range);
+            let (mut matrix, right) = normal_equations(&level.votes, s, unknowns);
             let mut prior = Vector::zeros();
             for k in 0..6 {
                 prior[k] = (s / task.prior[usize::from(k >= 2)]).powi(2);

@@ -1,9 +1,11 @@
 //! What moves and brightens the whole picture: the camera and the light.
 
-use super::layers::{Background, grown, holds};
-use super::patch::{cubic, smooth};
+use super::layers::{Background, grown, holds, is_inside};
+use super::patch::smooth;
+use crate::image::{Interpolation, cubic_at};
 use crate::track::gradient::local_flow::{MAD, median, shifted};
 use crate::types::{Frame, TargetBox};
+use std::cell::OnceCell;
 
 /// Pictures are reduced by these factors, one after the other.
 const FACTORS: [usize; 3] = [4, 2, 1];
@@ -13,12 +15,18 @@ const AROUND: f64 = 14.0;
 const SIGMA: f64 = 1.0;
 /// Steps at a level.
 const STEPS: usize = 8;
+/// A level is left when a step is shorter, reduced px.
+const SETTLED: f64 = 0.005;
 /// Shortest motion that is believed, px.
 const LEAST_MOTION: f64 = 0.05;
 /// By how much the capped residual must fall.
 const LESS: f64 = 0.9;
 /// Pixels used at a level, at most.
 const SAMPLES: usize = 4096;
+/// Every which of them the deviation of the residuals is told from.
+const EVERY: usize = 4;
+/// Pixels that the light is told from, at most.
+const LIGHT_SAMPLES: usize = 1024;
 /// Residual that all larger ones count as, grey levels.
 const CAP: f64 = 25.0;
 /// Smallest information of a step, grey^2/px^2 per pixel.
@@ -26,40 +34,63 @@ const LEAST_INFORMATION: f64 = 0.05;
 /// Brightness ratios nearer to 1 are none.
 const LEAST_LIGHT: f64 = 0.01;
 
+/// A frame and its reductions, made when they are first asked for: the next frame needs them again.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    pub frame: Frame<f64>,
+    quarter: OnceCell<Frame<f64>>,
+    half: OnceCell<Frame<f64>>,
+}
+
+impl Seen {
+    pub fn new(frame: Frame<f64>) -> Self {
+        Self { frame, ..Self::default() }
+    }
+
+    fn reduced(&self, factor: usize) -> &Frame<f64> {
+        match factor {
+            1 => &self.frame,
+            2 => self.half.get_or_init(|| reduced(&self.frame, 2)),
+            _ => self.quarter.get_or_init(|| reduced(&self.frame, 4)),
+        }
+    }
+}
+
 /// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better.
-pub(super) fn camera_motion(previous: &Frame<f64>, frame: &Frame<f64>, target: TargetBox, noise: f64) -> [f64; 2] {
+pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64) -> [f64; 2] {
     let mut motion = [0.0; 2];
+    let hidden = grown(target, (0.0, AROUND));
     for factor in FACTORS {
-        let (a, b) = (reduced(previous, factor), reduced(frame, factor));
-        let hidden = shrunk(grown(target, (0.0, AROUND)), factor);
-        let Some(found) = refine(&a, &b, &hidden, motion.map(|m| m / factor as f64), noise) else { return [0.0; 2] };
+        let samples = Samples::of(previous.reduced(factor), &shrunk(hidden, factor));
+        let start = motion.map(|m| m / factor as f64);
+        let Some(found) = samples.refine(now.reduced(factor), start, noise) else { return [0.0; 2] };
         motion = found.map(|m| m * factor as f64);
         if factor == FACTORS[0] && motion[0].hypot(motion[1]) < LEAST_MOTION {
             return [0.0; 2];
         }
     }
-    let hidden = grown(target, (0.0, AROUND));
-    let residual = |motion: [f64; 2]| {
-        let sizes: Vec<f64> = samples(previous, &hidden)
-            .filter_map(|(x, y)| Some((read(frame, x, y, motion)? - previous.get(x, y)).abs().min(CAP)))
-            .collect();
+    let samples = Samples::of(&previous.frame, &hidden);
+    let capped = |motion: [f64; 2]| {
+        let residuals = samples.residuals(&now.frame, motion);
+        let sizes: Vec<f64> = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan()).collect();
         sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
     };
     let far = motion[0].hypot(motion[1]) > LEAST_MOTION;
-    if far && residual(motion) < LESS * residual([0.0; 2]) { motion } else { [0.0; 2] }
+    if far && capped(motion) < LESS * capped([0.0; 2]) { motion } else { [0.0; 2] }
 }
 
 /// Means over squares of `factor` px, then a Gaussian.
 fn reduced(frame: &Frame<f64>, factor: usize) -> Frame<f64> {
-    if factor == 1 {
-        return frame.clone();
+    let (width, height) = (frame.width() / factor, frame.height() / factor);
+    let mut small = Frame::filled(width, height, 0.0);
+    for y in 0..height {
+        let target = small.row_mut(y);
+        for j in factor * y..factor * (y + 1) {
+            let squares = frame.row(j).chunks_exact(factor);
+            target.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square.iter().sum::<f64>());
+        }
+        target.iter_mut().for_each(|sum| *sum /= (factor * factor) as f64);
     }
-    let size = [frame.width() / factor, frame.height() / factor];
-    let small = Frame::from_fn(size[0], size[1], |x, y| {
-        let rows = factor * y..factor * (y + 1);
-        let sum: f64 = rows.map(|j| frame.row(j)[factor * x..factor * (x + 1)].iter().sum::<f64>()).sum();
-        sum / (factor * factor) as f64
-    });
     smooth(&small, SIGMA)
 }
 
@@ -70,60 +101,96 @@ fn shrunk(bounds: TargetBox, factor: usize) -> TargetBox {
     TargetBox { x: to(bounds.x), y: to(bounds.y), width: bounds.width / f, height: bounds.height / f }
 }
 
-/// Pixels outside the box, two from the border, spread evenly.
-fn samples(frame: &Frame<f64>, hidden: &TargetBox) -> impl Iterator<Item = (usize, usize)> {
-    let (width, height) = frame.size();
-    let step = ((width * height) as f64 / SAMPLES as f64).sqrt().ceil().max(1.0) as usize;
-    let hidden = *hidden;
+/// Pixels outside the box, two from the border, spread evenly; about so many at most.
+fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (width, height) = size;
+    let step = ((width * height) as f64 / most as f64).sqrt().ceil().max(1.0) as usize;
     (2..height.saturating_sub(2)).step_by(step).flat_map(move |y| {
         (2..width.saturating_sub(2)).step_by(step).filter(move |x| !holds(&hidden, *x, y)).map(move |x| (x, y))
     })
 }
 
-/// The frame at a moved pixel, if that is in it.
-fn read(frame: &Frame<f64>, x: usize, y: usize, motion: [f64; 2]) -> Option<f64> {
-    let (x, y) = (x as f64 + motion[0], y as f64 + motion[1]);
-    let inside = x >= 0.0 && y >= 0.0 && x <= frame.width() as f64 - 1.0 && y <= frame.height() as f64 - 1.0;
-    inside.then(|| cubic(frame, x, y))
+/// Pixels of a frame that its motion is told from.
+struct Samples {
+    places: Vec<(usize, usize)>,
+    values: Vec<f64>,
+    gradients: Vec<[f64; 2]>,
 }
 
-/// Gradient steps on all samples (5); `None` where the scene has no texture.
-fn refine(a: &Frame<f64>, b: &Frame<f64>, hidden: &TargetBox, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
-    for _ in 0..STEPS {
-        let rows: Vec<[f64; 3]> = samples(a, hidden)
-            .filter_map(|(x, y)| {
-                let gradient = [0.5 * (a.get(x + 1, y) - a.get(x - 1, y)), 0.5 * (a.get(x, y + 1) - a.get(x, y - 1))];
-                Some([gradient[0], gradient[1], read(b, x, y, motion)? - a.get(x, y)])
-            })
-            .collect();
-        let mut sizes: Vec<f64> = rows.iter().map(|row| row[2].abs()).collect();
-        let s = (MAD * median(&mut sizes)).max(noise);
-        let mut sums = [0.0; 5];
-        for [gx, gy, r] in &rows {
-            let weight = (1.0 + (r / (3.0 * s)).powi(2)).powi(-2);
-            for (sum, product) in sums.iter_mut().zip([gx * gx, gx * gy, gy * gy, gx * r, gy * r]) {
-                *sum += weight * product;
+impl Samples {
+    fn of(frame: &Frame<f64>, hidden: &TargetBox) -> Self {
+        let places: Vec<_> = spread(frame.size(), *hidden, SAMPLES).collect();
+        let gradient = |&(x, y): &(usize, usize)| {
+            let (row, above, below) = (frame.row(y), frame.row(y - 1), frame.row(y + 1));
+            [0.5 * (row[x + 1] - row[x - 1]), 0.5 * (below[x] - above[x])]
+        };
+        let values = places.iter().map(|&(x, y)| frame.get(x, y)).collect();
+        Self { values, gradients: places.iter().map(gradient).collect(), places }
+    }
+
+    /// What the next frame shows at the moved samples, less what they were; NaN where that is not in the frame.
+    fn residuals(&self, next: &Frame<f64>, motion: [f64; 2]) -> Vec<f64> {
+        let whole = motion.map(f64::floor);
+        // All samples lie alike between the pixels.
+        let [wx, wy] = [0, 1].map(|k| Interpolation::Bicubic.weights(motion[k] - whole[k]));
+        let whole = whole.map(|w| w as isize);
+        let (width, height) = (next.width() as isize, next.height() as isize);
+        let read = |x: usize, y: usize| {
+            let (i, j) = (x as isize + whole[0], y as isize + whole[1]);
+            if i >= 1 && j >= 1 && i + 2 < width && j + 2 < height {
+                let start = ((j - 1) * width + i - 1) as usize;
+                let mut sum = 0.0;
+                for (n, weight) in wy.iter().enumerate() {
+                    let row = &next.data()[start + n * next.width()..][..4];
+                    sum += weight * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
+                }
+                return sum;
+            }
+            let place = [x as f64 + motion[0], y as f64 + motion[1]];
+            if is_inside(place, next) { cubic_at(next, place[0], place[1]) } else { f64::NAN }
+        };
+        self.places.iter().zip(&self.values).map(|(&(x, y), value)| read(x, y) - value).collect()
+    }
+
+    /// Gradient steps on all samples (5); `None` where the scene has no texture.
+    fn refine(&self, next: &Frame<f64>, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
+        for _ in 0..STEPS {
+            let residuals = self.residuals(next, motion);
+            let mut sizes: Vec<f64> =
+                residuals.iter().step_by(EVERY).map(|r| r.abs()).filter(|r| !r.is_nan()).collect();
+            let s = (MAD * median(&mut sizes)).max(noise);
+            let (mut sums, mut count) = ([0.0; 5], 0.0);
+            for ([gx, gy], r) in self.gradients.iter().zip(&residuals) {
+                let outlying = 1.0 + (r / (3.0 * s)).powi(2);
+                let weight = 1.0 / (outlying * outlying);
+                if weight.is_nan() {
+                    continue;
+                }
+                count += 1.0;
+                for (sum, product) in sums.iter_mut().zip([gx * gx, gx * gy, gy * gy, gx * r, gy * r]) {
+                    *sum += weight * product;
+                }
+            }
+            let [xx, xy, yy, xr, yr] = sums;
+            let determinant = xx * yy - xy * xy;
+            let least = (LEAST_INFORMATION * count).powi(2);
+            if determinant.is_nan() || determinant <= least {
+                return None;
+            }
+            let step = [-(yy * xr - xy * yr) / determinant, -(xx * yr - xy * xr) / determinant];
+            motion = [motion[0] + step[0], motion[1] + step[1]];
+            if step[0].hypot(step[1]) < SETTLED {
+                break;
             }
         }
-        let [xx, xy, yy, xr, yr] = sums;
-        let determinant = xx * yy - xy * xy;
-        let least = (LEAST_INFORMATION * rows.len() as f64).powi(2);
-        if determinant.is_nan() || determinant <= least {
-            return None;
-        }
-        let step = [-(yy * xr - xy * yr) / determinant, -(xx * yr - xy * xr) / determinant];
-        motion = [motion[0] + step[0], motion[1] + step[1]];
-        if step[0].hypot(step[1]) < 0.005 {
-            break;
-        }
+        motion.iter().all(|m| m.abs() < next.width().max(next.height()) as f64 / 4.0).then_some(motion)
     }
-    motion.iter().all(|m| m.abs() < a.width().max(a.height()) as f64 / 4.0).then_some(motion)
 }
 
 /// Brightness of the frame over that of the background, where both are known: a robust ratio; 1 unless it explains the frame better.
 pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> f64 {
     let hidden = grown(target, (0.0, AROUND));
-    let pairs: Vec<[f64; 2]> = samples(frame, &hidden)
+    let pairs: Vec<[f64; 2]> = spread(frame.size(), hidden, LIGHT_SAMPLES)
         .filter(|(x, y)| background.known.get(*x, *y))
         .map(|(x, y)| [frame.get(x, y), background.picture.get(x, y)])
         .collect();
@@ -144,15 +211,28 @@ impl Background {
     pub(super) fn moved(&mut self, by: [f64; 2], frame: &Frame<f64>) {
         let back = by.map(|b| -b);
         let picture = shifted(&self.picture, back);
-        let known = Frame::from_fn(self.known.width(), self.known.height(), |x, y| {
-            let from = [x as f64 + back[0], y as f64 + back[1]];
-            let inside = (0..2).all(|k| from[k] >= 0.0 && from[k] <= [frame.width(), frame.height()][k] as f64 - 1.0);
-            inside && self.is_known(from) && picture.get(x, y).is_finite()
-        });
+        let (width, height) = self.known.size();
+        // The pixel nearest to where one comes from, if that is in the picture.
+        let from = |length: usize, back: f64| {
+            let last = length as f64 - 1.0;
+            let place = move |at: usize| at as f64 + back;
+            move |at: usize| (0.0..=last).contains(&place(at)).then(|| ((place(at) + 0.5) as usize).min(length - 1))
+        };
+        let columns: Vec<_> = (0..width).map(from(width, back[0])).collect();
+        let from_row = from(height, back[1]);
+        let mut known = Frame::filled(width, height, false);
+        for y in 0..height {
+            let Some(row) = from_row(y).map(|j| self.known.row(j)) else { continue };
+            let brightness = picture.row(y).iter().zip(&columns);
+            for (known, (value, column)) in known.row_mut(y).iter_mut().zip(brightness) {
+                *known = value.is_finite() && column.is_some_and(|i| row[i]);
+            }
+        }
         // What comes into view is taken as it is seen, but does not count as known.
-        let data = picture.data().iter().zip(frame.data());
-        let data = data.map(|(b, e)| if b.is_finite() { *b } else { *e }).collect();
-        self.picture = Frame::new(frame.width(), frame.height(), data).unwrap_or_default();
+        self.picture = picture;
+        for (b, e) in self.picture.data_mut().iter_mut().zip(frame.data()) {
+            *b = if b.is_finite() { *b } else { *e };
+        }
         self.known = known;
     }
 }

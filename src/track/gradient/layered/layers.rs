@@ -2,8 +2,9 @@
 //!
 //! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
 
-use super::patch::cubic;
+use super::nodes::Places;
 use super::pose::Pose;
+use crate::image::cubic_at;
 use crate::types::{Frame, TargetBox};
 
 /// Around the box, share of its sides, and least margin, px.
@@ -47,8 +48,9 @@ impl Target {
         let cover = |at: f64, side: f64| (side / 2.0 - at.abs() + 0.5).clamp(0.0, 1.0);
         let prior =
             Frame::from_fn(shape[0], shape[1], |i, j| cover(along(i, 0), size[0]) * cover(along(j, 1), size[1]));
-        let t =
-            Frame::from_fn(shape[0], shape[1], |i, j| cubic(frame, centre[0] + along(i, 0), centre[1] + along(j, 1)));
+        let t = Frame::from_fn(shape[0], shape[1], |i, j| {
+            cubic_at(frame, centre[0] + along(i, 0), centre[1] + along(j, 1))
+        });
         Self { a: prior.clone(), t, n: prior.map(|a| prior_weight * a), d: prior.map(|_| prior_weight), prior, size }
     }
 
@@ -102,16 +104,21 @@ impl Target {
     pub fn near(&self) -> Frame<bool> {
         let reach = NEAR as usize;
         let (width, height) = self.a.size();
-        let wide = |at: usize, length: usize| at.saturating_sub(reach)..(at + reach + 1).min(length);
-        let along = Frame::from_fn(width, height, |i, j| self.a.row(j)[wide(i, width)].iter().any(|a| *a > EDGE));
-        Frame::from_fn(width, height, |i, j| wide(j, height).any(|k| along.get(i, k)))
+        let along =
+            Frame::from_fn(width, height, |i, j| self.a.row(j)[wide(i, reach, width)].iter().any(|a| *a > EDGE));
+        Frame::from_fn(width, height, |i, j| wide(j, reach, height).any(|k| along.get(i, k)))
     }
 
     /// The places of all nodes in the picture.
-    pub fn places(&self, pose: &Pose) -> Vec<[f64; 2]> {
+    pub fn places(&self, pose: &Pose) -> Places {
         let (width, height) = self.a.size();
-        (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| pose.apply(self.xi(i, j))).collect()
+        Places::of(pose, (0..height).flat_map(|j| (0..width).map(move |i| self.xi(i, j))))
     }
+}
+
+/// Indices no farther than `reach` from one, of `length`.
+pub(super) fn wide(at: usize, reach: usize, length: usize) -> std::ops::Range<usize> {
+    at.saturating_sub(reach)..(at + reach + 1).min(length)
 }
 
 /// Whether a place is in the picture.

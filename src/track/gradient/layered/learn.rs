@@ -3,6 +3,7 @@
 use super::layers::{Background, Target, UNSEEN, grown, holds};
 use super::look::View;
 use super::patch::smooth_known;
+use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::track::gradient::local_flow::{MAD, median};
 use crate::types::{Frame, TargetBox};
 
@@ -89,15 +90,35 @@ pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, 
             let seen = &frame.row(y)[part.clone()];
             let known = &mut background.known.row_mut(y)[part.clone()];
             let picture = &mut background.picture.row_mut(y)[part];
-            for ((b, e), known) in picture.iter_mut().zip(seen).zip(known) {
-                let off = e - *b;
-                let mut step = BACKGROUND_RATE * off;
-                if off.abs() > sudden {
-                    step = step.clamp(-SUDDEN_STEP, SUDDEN_STEP);
-                }
-                *b = if *known { *b + step } else { *e };
-                *known = true;
-            }
+            dispatch(Level::detect(), Behind { picture, seen, known, sudden });
+            known.fill(true);
+        }
+    }
+}
+
+/// The step of the background at a row of pixels.
+struct Behind<'a> {
+    picture: &'a mut [f64],
+    seen: &'a [f64],
+    known: &'a [bool],
+    sudden: f64,
+}
+
+impl Kernel<f64> for Behind<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let all_known = self.known.iter().fold(true, |all, known| all & known);
+        if !all_known {
+            let unknown = self.picture.iter_mut().zip(self.seen).zip(self.known).filter(|(_, known)| !**known);
+            unknown.for_each(|((b, e), _)| *b = *e);
+        }
+        for (b, e) in self.picture.iter_mut().zip(self.seen) {
+            let off = e - *b;
+            let step = BACKGROUND_RATE * off;
+            let careful = step.clamp(-SUDDEN_STEP, SUDDEN_STEP);
+            *b += if off.abs() > self.sudden { careful } else { step };
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What is seen of the target at a pose, and what there is beside it that looks like it.
 
 use super::layers::{Background, CORE, Target, is_inside};
-use super::patch::cubic;
 use super::pose::Pose;
 use crate::types::Frame;
 
@@ -33,12 +32,18 @@ pub(super) struct Look {
 /// Reads the picture at the nodes.
 pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background, pose: &Pose) -> View {
     let places = target.places(pose);
-    let read = |place: &[f64; 2]| if is_inside(*place, frame) { cubic(frame, place[0], place[1]) } else { f64::NAN };
-    let behind = |place: &[f64; 2]| {
-        let known = is_inside(*place, frame) && background.is_known(*place);
-        if known { cubic(&background.picture, place[0], place[1]) } else { f64::NAN }
-    };
-    View { seen: places.iter().map(read).collect(), behind: places.iter().map(behind).collect() }
+    let (mut seen, mut behind) = (Vec::new(), Vec::new());
+    places.read(frame, [0.0; 2], &mut seen);
+    places.read(&background.picture, [0.0; 2], &mut behind);
+    for at in 0..seen.len() {
+        let place = places.get(at);
+        if !is_inside(place, frame) {
+            (seen[at], behind[at]) = (f64::NAN, f64::NAN);
+        } else if !background.is_known(place) {
+            behind[at] = f64::NAN;
+        }
+    }
+    View { seen, behind }
 }
 
 /// Whether the target is what is seen at a point; `contrast` is that to the background, where that is known.

@@ -7,7 +7,9 @@ mod align;
 mod camera;
 mod layers;
 mod learn;
+mod level;
 mod look;
+mod nodes;
 mod patch;
 mod pose;
 mod search;
@@ -16,6 +18,7 @@ use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::{Aligned, Freedom, Silence, Task, align};
+use camera::Seen;
 use layers::{Background, Target};
 use look::{Look, look, view};
 use pose::{Increment, Pose};
@@ -69,7 +72,9 @@ pub(super) struct Layered {
     noise: f64,
     /// Running mean of the visibility.
     usual: f64,
-    previous: Frame<f64>,
+    previous: Seen,
+    /// Memory of the frame before that.
+    spare: Vec<f64>,
     /// Measured position of the frame before, if that was seen without interruption.
     before: Option<[f64; 2]>,
     missed: usize,
@@ -112,7 +117,8 @@ impl Layered {
             noise: learn::LEAST_NOISE,
             usual: 1.0,
             before: Some(bounds.centre()),
-            previous: frame,
+            previous: Seen::new(frame),
+            spare: Vec::new(),
             missed: 0,
             hidden: false,
             turned: 0.0,
@@ -140,29 +146,41 @@ impl Layered {
         };
         let bounds = self.bounds(&self.pose);
         let light = camera::light(frame, &self.background, bounds);
-        let frame = frame.map(|value| value / light);
+        let seen = Seen::new(self.in_usual_light(frame, light));
         let motion = match self.camera {
-            CameraMotion::Auto => camera::camera_motion(&self.previous, &frame, bounds, self.noise),
+            CameraMotion::Auto => camera::camera_motion(&self.previous, &seen, bounds, self.noise),
             CameraMotion::None => [0.0; 2],
         };
-        self.follow_camera(motion, &frame);
+        self.follow_camera(motion, &seen.frame);
         self.filter.predict();
-        let finding = self.find_wherever_it_rides(&frame, motion);
+        let finding = self.find_wherever_it_rides(&seen.frame, motion);
         match &finding {
-            Some(found) => self.take(found, &frame),
+            Some(found) => self.take(found, &seen.frame),
             None => self.miss(),
         }
         self.tell(state, finding.as_ref(), motion);
         state.gain = self.gain * light;
         state.reacquired = was_lost && finding.is_some();
         self.hold_beyond_the_border(state, frame.size());
-        self.previous = frame;
+        self.spare = std::mem::replace(&mut self.previous, seen).frame.into_data();
+    }
+
+    /// The frame, so bright as if the light were what it was at first.
+    fn in_usual_light(&mut self, frame: &Frame<f64>, light: f64) -> Frame<f64> {
+        let mut data = std::mem::take(&mut self.spare);
+        data.clear();
+        if light == 1.0 {
+            data.extend_from_slice(frame.data());
+        } else {
+            data.extend(frame.data().iter().map(|value| value / light));
+        }
+        Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
     }
 
     fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
         if motion == [0.0; 2] {
             if self.age > 0 {
-                self.noise = learn::learn_noise(self.noise, &self.previous, frame);
+                self.noise = learn::learn_noise(self.noise, &self.previous.frame, frame);
             }
             return;
         }

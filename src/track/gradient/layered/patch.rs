@@ -1,6 +1,7 @@
 //! Parts of a picture, smoothed, and read between the pixels.
 
-use crate::image::{Border, GaussianSmoother, Interpolation};
+use super::nodes::Places;
+use crate::image::{Border, GaussianSmoother};
 use crate::types::Frame;
 
 /// Where Gaussians are cut off, standard deviations.
@@ -47,10 +48,9 @@ impl Patch {
         self
     }
 
-    /// Brightness at a place of the picture, by cubic convolution; at the patch's border its last pixels go on.
-    #[inline(always)]
-    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        cubic(&self.frame, x - self.corner[0] as f64, y - self.corner[1] as f64)
+    /// Brightness at places of the picture; at the patch's border its last pixels go on.
+    pub fn read(&self, places: &Places, out: &mut Vec<f64>) {
+        places.read(&self.frame, self.corner.map(|at| at as f64), out);
     }
 }
 
@@ -71,27 +71,6 @@ pub(super) fn smooth_known(frame: &Frame<f64>, sigma: f64) -> Frame<f64> {
     Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
 }
 
-/// Cubic convolution (R. Keys, 1981); positions beyond the border count as on it.
-#[inline(always)]
-pub(super) fn cubic(frame: &Frame<f64>, x: f64, y: f64) -> f64 {
-    let (width, height) = frame.size();
-    let (x, y) = (x.clamp(0.0, width as f64 - 1.0), y.clamp(0.0, height as f64 - 1.0));
-    let (x0, y0) = (x as usize, y as usize);
-    let (wx, wy) = (Interpolation::Bicubic.weights(x - x0 as f64), Interpolation::Bicubic.weights(y - y0 as f64));
-    if x0 >= 1 && y0 >= 1 && x0 + 2 < width && y0 + 2 < height {
-        let start = (y0 - 1) * width + x0 - 1;
-        let mut sum = 0.0;
-        for (j, weight) in wy.iter().enumerate() {
-            let row = &frame.data()[start + j * width..start + j * width + 4];
-            sum += weight * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
-        }
-        return sum;
-    }
-    let column = |i: usize| (x0 + i).saturating_sub(1).min(width - 1);
-    let line = |j: usize| (y0 + j).saturating_sub(1).min(height - 1);
-    (0..4).map(|j| wy[j] * (0..4).map(|i| wx[i] * frame.get(column(i), line(j))).sum::<f64>()).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,8 +80,10 @@ mod tests {
         let frame = Frame::from_fn(20, 15, |x, y| (3 * x + 5 * y) as f64);
         let patch = Patch::cut(&frame, bounds_about([10.0, 7.0], [4.0, 3.0], frame.size()));
         assert_eq!((patch.corner, patch.frame.size()), ([6, 4], (9, 7)));
-        assert!((patch.at([9.5, 6.25]) - (28.5 + 31.25)).abs() < 1e-12);
-        assert_eq!(patch.at([-5.0, -5.0]), frame.get(6, 4));
+        let mut read = Vec::new();
+        patch.read(&Places { x: vec![9.5, -5.0], y: vec![6.25, -5.0] }, &mut read);
+        assert!((read[0] - (28.5 + 31.25)).abs() < 1e-12);
+        assert_eq!(read[1], frame.get(6, 4));
         assert_eq!(bounds_about([-9.0, 40.0], [2.0, 2.0], (20, 15)), [[0, 1], [14, 15]]);
     }
 

@@ -1,8 +1,8 @@
 //! Looking for the target all around, in whole pixels.
 
 use super::layers::{Background, CORE, Target, is_inside};
-use super::patch::cubic;
 use super::pose::Pose;
+use crate::image::cubic_at;
 use crate::types::Frame;
 
 /// Difference beyond which brightness is simply different, grey levels.
@@ -70,5 +70,5 @@ fn cost(frame: &Frame<f64>, background: &Background, points: &[([f64; 2], f64)],
 /// Brightness at the nearest pixel, or between pixels where that is as far as it gets.
 fn nearest(frame: &Frame<f64>, [x, y]: [f64; 2]) -> f64 {
     let (i, j) = ((x + 0.5) as usize, (y + 0.5) as usize);
-    if i < frame.width() && j < frame.height() { frame.get(i, j) } else { cubic(frame, x, y) }
+    if i < frame.width() && j < frame.height() { frame.get(i, j) } else { cubic_at(frame, x, y) }
 }
