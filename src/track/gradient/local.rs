@@ -183,15 +183,16 @@ impl LocalLoop {
     /// The window with its margin; NaN outside the picture.
     fn cut(&self, frame: &Frame<f64>) -> Frame<f64> {
         let (corner, side) = (self.corner(), self.fov + 2 * MARGIN);
+        if self.control == Control::Integer {
+            return whole_pixels(frame, corner.map(|at| at as isize), side);
+        }
         let inside = |at: f64, length: usize| at >= 0.0 && at <= length as f64 - 1.0;
         Frame::from_fn(side, side, |x, y| {
             let (x, y) = (corner[0] + x as f64, corner[1] + y as f64);
-            if !inside(x, frame.width()) || !inside(y, frame.height()) {
-                f64::NAN
-            } else if self.control == Control::Integer {
-                frame.get(x as usize, y as usize)
-            } else {
+            if inside(x, frame.width()) && inside(y, frame.height()) {
                 Interpolation::Bilinear.at(frame, x, y)
+            } else {
+                f64::NAN
             }
         })
     }
@@ -264,4 +265,22 @@ impl LocalLoop {
         state.line_of_sight = self.line_of_sight();
         state.flow_count = count;
     }
+}
+
+/// A square of the frame from a corner on; NaN outside.
+fn whole_pixels(frame: &Frame<f64>, corner: [isize; 2], side: usize) -> Frame<f64> {
+    // Columns or rows of the square that are in the frame.
+    let within = |corner: isize, length: usize| {
+        let first = (-corner).clamp(0, side as isize);
+        let end = (length as isize - corner).clamp(first, side as isize);
+        first as usize..end as usize
+    };
+    let columns = within(corner[0], frame.width());
+    let mut out = Frame::filled(side, side, f64::NAN);
+    for y in within(corner[1], frame.height()).filter(|_| !columns.is_empty()) {
+        let from = (corner[0] + columns.start as isize) as usize;
+        let row = &frame.row((corner[1] + y as isize) as usize)[from..from + columns.len()];
+        out.row_mut(y)[columns.clone()].copy_from_slice(row);
+    }
+    out
 }

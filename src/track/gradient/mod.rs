@@ -24,6 +24,7 @@ pub use refine::{RefineOptions, refine_flow};
 
 use super::Tracker;
 use crate::error::{Error, Result};
+use crate::image::all_finite;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use layered::Layered;
 use local::LocalLoop;
@@ -144,11 +145,6 @@ fn check_frame(frame: &Frame<f64>) -> Result<()> {
         return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
     }
     Ok(())
-}
-
-/// Whether no sample is NaN or infinite; without a way out early, which lanes do not like.
-fn all_finite(frame: &Frame<f64>) -> bool {
-    frame.data().iter().fold(true, |all, value| all & value.is_finite())
 }
 
 /// A box that holds something of the frame.

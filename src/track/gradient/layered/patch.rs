@@ -1,7 +1,7 @@
 //! Parts of a picture, smoothed, and read between the pixels.
 
 use super::nodes::Places;
-use crate::image::{Border, GaussianSmoother};
+use crate::image::{Border, GaussianSmoother, all_finite};
 use crate::types::Frame;
 
 /// Where Gaussians are cut off, standard deviations.
@@ -34,17 +34,15 @@ pub(super) fn bounds_about(centre: [f64; 2], reach: [f64; 2], (width, height): (
 impl Patch {
     /// A rectangle of the picture as it is.
     pub fn cut(frame: &Frame<f64>, [[x0, x1], [y0, y1]]: Bounds) -> Self {
-        let data = (y0..y1).flat_map(|y| frame.row(y)[x0..x1].iter().copied()).collect();
+        let mut data = Vec::with_capacity((x1 - x0) * (y1 - y0));
+        (y0..y1).for_each(|y| data.extend_from_slice(&frame.row(y)[x0..x1]));
         Self { frame: Frame::new(x1 - x0, y1 - y0, data).unwrap_or_default(), corner: [x0, y0] }
     }
 
     /// The same, smoothed. Where samples are NaN, the mean of those that are not; NaN where there are none near.
     pub fn smoothed(mut self, sigma: f64) -> Self {
-        self.frame = if self.frame.data().iter().any(|v| v.is_nan()) {
-            smooth_known(&self.frame, sigma)
-        } else {
-            smooth(&self.frame, sigma)
-        };
+        self.frame =
+            if all_finite(&self.frame) { smooth(&self.frame, sigma) } else { smooth_known(&self.frame, sigma) };
         self
     }
 
