@@ -43,10 +43,13 @@ __all__ = [
     "_write_pfm",
     "_write_flow",
     "_write_frames",
+    "_GaussMarkovFilter",
     "_GradientTracker",
     "_classify",
     "_derivative_kernels",
+    "_detect_moving_target",
     "_local_flow",
+    "_mean_flow",
     "_observability",
     "Scene",
     "Sensor",
@@ -887,10 +890,26 @@ class _GradientTracker:
     def state(self) -> dict[str, Any]:
         """The target at the last frame, as a dictionary."""
 
+@final
+class _GaussMarkovFilter:
+    def __new__(cls, position: list[float], alpha: float, q: float, start: list[float], measures: str) -> _GaussMarkovFilter: ...
+    def predict(self) -> None:
+        """To the next frame."""
+    def update(self, position: tuple[list[float], list[float]] | None, velocity: tuple[list[float], list[float]] | None) -> float:
+        """Takes a measurement: values and variances along x and y; returns its normalised innovation squared."""
+    def state(self) -> NDArray[np.float64]:
+        """Position, velocity and acceleration along x and along y, (2, 3), px and frames."""
+    def covariance(self) -> NDArray[np.float64]:
+        """Their covariances along x and along y, (2, 3, 3)."""
+
 def _derivative_kernels(order: int) -> list[NDArray[np.float64]]: ...
 def _local_flow(
     first: NDArray[Any], second: NDArray[Any], refine: bool, window: int, order: int, cond_max: float, min_sigma: float, step_max: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
+def _mean_flow(flow: NDArray[np.float64], accepted: NDArray[np.bool_], eps: float) -> tuple[list[float], list[float], int]: ...
+def _detect_moving_target(
+    first: NDArray[Any], second: NDArray[Any], center: list[float] | None
+) -> tuple[list[float], list[float]] | None: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

@@ -23,9 +23,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _derivative_kernels, _GradientTracker, _local_flow
+from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
 
-__all__ = ["GradientTracker", "PixelFlow", "Track", "TrackResult", "derivative_kernels", "local_flow", "refine_flow", "track"]
+__all__ = [
+    "GaussMarkovFilter",
+    "GradientTracker",
+    "MeanFlow",
+    "MovingTarget",
+    "PixelFlow",
+    "Track",
+    "TrackResult",
+    "derivative_kernels",
+    "detect_moving_target",
+    "local_flow",
+    "mean_flow",
+    "refine_flow",
+    "track",
+]
 
 Array = NDArray[np.float64]
 
@@ -223,3 +237,137 @@ def refine_flow(
 ) -> PixelFlow:
     """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
     return PixelFlow(*_local_flow(np.asarray(first), np.asarray(second), True, window, order, cond_max, min_sigma, step_max))
+
+
+@dataclass(frozen=True, eq=False)
+class MeanFlow:
+    """What moves in a frame, and where to: M. Chiba and S. Ozawa, equation (11)."""
+
+    velocity: Array
+    """Mean flow (u, v) over the pixels that move, px/frame; zero where nothing does."""
+    centroid: Array
+    """Their mean place (x, y), px; NaN where nothing moves."""
+    count: int
+    """How many they are, no unit."""
+
+
+def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
+    """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `eps` px/frame: one set for both axes (11).
+
+    Raises `ValueError` for a negative `eps`.
+    """
+    velocity, centroid, count = _mean_flow(np.ascontiguousarray(flow.flow, float), np.ascontiguousarray(flow.valid, bool), eps)
+    return MeanFlow(np.array(velocity), np.array(centroid), count)
+
+
+@dataclass(frozen=True, eq=False)
+class MovingTarget:
+    """The first thing that moves."""
+
+    box: Array
+    """Its box (x, y, width, height) in the second frame, px."""
+    displacement: Array
+    """How far it moved, (2,), whole px."""
+
+
+def detect_moving_target(first: ArrayLike, second: ArrayLike, center: ArrayLike | None = None) -> MovingTarget | None:
+    """Finds what moves between two frames (H, W) of a still scene: the largest thing, or that nearest to `center` (x, y), px; None where nothing moves.
+
+    Changed pixels differ by more than three deviations of the noise; the displacement, at most 10 px along each axis, is the smallest that explains them nearly best.
+
+    Raises `ValueError` for frames of different size.
+    """
+    found = _detect_moving_target(np.asarray(first), np.asarray(second), _numbers("center", center, "(x, y)", 2))
+    return None if found is None else MovingTarget(*(np.array(part) for part in found))
+
+
+class GaussMarkovFilter:
+    """Position, velocity and acceleration of a point, each axis by itself; the acceleration is a first-order Gauss-Markov sequence.
+
+    Source: M. Chiba and S. Ozawa, equations (12) to (24): F = [1 1 1/2; 0 1 1; 0 0 alpha], Q = diag(0, 0, q), one frame a step.
+
+    Parameters
+    ----------
+    position : (x, y), px
+        Where the point is at first; it is taken to be at rest.
+    alpha : float
+        Correlation of the acceleration from frame to frame, above 0 and at most 1; default 0.8.
+    q : float, (px/frame^2)^2
+        Variance of what drives the acceleration; default 0.5.
+    start : three variances, px and frames
+        Of position, velocity and acceleration at first; default (1, 4, 1).
+    measures : "mean" or "instant"
+        What is measured as velocity: the mean since the frame before, x' - x''/(2 alpha) (default, what optical flow tells), or the velocity at the frame, as (24) is printed.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range; the message names the argument.
+
+    Examples
+    --------
+    >>> point = GaussMarkovFilter((10, 5))
+    >>> for t in range(1, 30):
+    ...     point.predict()
+    ...     nis = point.update(position=(10 + 2 * t, 5), velocity=(2, 0))
+    >>> point.velocity.round(2).tolist()
+    [2.0, 0.0]
+    """
+
+    def __init__(
+        self, position: ArrayLike, *, alpha: float = 0.8, q: float = 0.5, start: ArrayLike = (1.0, 4.0, 1.0), measures: str = "mean"
+    ) -> None:
+        place, variances = _numbers("position", position, "(x, y)", 2), _numbers("start", start, "three variances", 3)
+        assert place is not None and variances is not None
+        self._filter = _GaussMarkovFilter(place, alpha, q, variances, measures)
+
+    def predict(self) -> None:
+        """Goes to the next frame (19)(20)."""
+        self._filter.predict()
+
+    def update(
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        *,
+        position_variance: ArrayLike = 1.0,
+        velocity_variance: ArrayLike = 0.25,
+    ) -> float:
+        """Takes what was measured (16)-(18): a position (x, y), px, a velocity, px/frame, or both, with their variances (one number or one an axis).
+
+        Returns the normalised innovation squared, both axes together: chi squared with as many degrees of freedom as numbers were measured.
+        Raises `ValueError` for numbers that are not finite and variances that are not above 0.
+        """
+        return self._filter.update(
+            _measured("position", position, position_variance), _measured("velocity", velocity, velocity_variance)
+        )
+
+    @property
+    def position(self) -> Array:
+        """Position (x, y), (2,), px."""
+        return self._filter.state()[:, 0]
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity, (2,), px/frame."""
+        return self._filter.state()[:, 1]
+
+    @property
+    def acceleration(self) -> Array:
+        """Acceleration, (2,), px/frame^2."""
+        return self._filter.state()[:, 2]
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of position, velocity and acceleration along x and along y, (2, 3, 3), px and frames."""
+        return self._filter.covariance()
+
+
+def _measured(name: str, value: ArrayLike | None, variance: ArrayLike) -> tuple[list[float], list[float]] | None:
+    """Values and variances of both axes."""
+    values = _numbers(name, value, "one number an axis", 2)
+    if values is None:
+        return None
+    variances = _numbers(f"{name}_variance", np.broadcast_to(np.asarray(variance, float), np.shape(variance) or (2,)), "one variance, or one an axis", 2)
+    assert variances is not None
+    return values, variances

@@ -10,6 +10,7 @@ mod estimate;
 mod field;
 mod filters;
 mod flow_filter;
+mod gauss_markov;
 mod image;
 mod io;
 mod keywords;
@@ -42,6 +43,8 @@ mod _jacoflow {
     #[pymodule_export]
     use super::flow_filter::{FlowFilter, restore_filter};
     #[pymodule_export]
+    use super::gauss_markov::PyGaussMarkovFilter;
+    #[pymodule_export]
     use super::image::{luminance, quantise, smooth};
     #[pymodule_export]
     use super::io::{
@@ -52,7 +55,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
     #[pymodule_export]
-    use super::track::{PyGradientTracker, flow, kernels};
+    use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name of the attribute")]

@@ -3,11 +3,12 @@
 use super::arrays::{self, ColourRule};
 use crate::error::{Error, Result};
 use crate::track::gradient::{
-    CameraMotion, Control, GradientOptions, LocalFlow, LocalFlowOptions, Mode, RefineOptions, Shape, Start,
-    derivative_kernels, local_flow, refine_flow,
+    CameraMotion, Control, GradientOptions, LocalFlow, LocalFlowOptions, MeanFlow, Mode, MovingTarget, RefineOptions,
+    Shape, Start, derivative_kernels, detect_moving_target, local_flow, refine_flow,
 };
 use crate::track::{GradientTracker, GreyLevels, Tracker};
 use crate::types::{Frame, TargetBox, TrackState};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
@@ -122,6 +123,61 @@ fn told<'py>(py: Python<'py>, state: &TrackState) -> PyResult<Bound<'py, PyDict>
     Ok(out)
 }
 
+/// What moves of a field (H, W, 2), of `jacoflow.track.mean_flow`: velocity, centroid and how many pixels.
+#[pyfunction(name = "_mean_flow")]
+pub fn mean_flow(
+    flow: PyReadonlyArray3<'_, f64>,
+    accepted: PyReadonlyArray2<'_, bool>,
+    eps: f64,
+) -> PyResult<([f64; 2], [f64; 2], usize)> {
+    if eps.is_nan() || eps < 0.0 {
+        return Err(Error::argument("eps", "a speed in px/frame, at least 0", eps).into());
+    }
+    let ([height, width, 2], [rows, columns]) = (flow.shape(), accepted.shape()) else {
+        return Err(Error::argument("flow", "an array (H, W, 2)", format!("shape {:?}", flow.shape())).into());
+    };
+    if (height, width) != (rows, columns) {
+        let expected = format!("an array ({height}, {width}) like the flow");
+        return Err(Error::argument("valid", expected, format!("({rows}, {columns})")).into());
+    }
+    let (flow, accepted) = (flow.as_array(), accepted.as_array());
+    let field = LocalFlow {
+        flow: Frame::from_fn(*width, *height, |x, y| [flow[[y, x, 0]], flow[[y, x, 1]]]),
+        accepted: Frame::from_fn(*width, *height, |x, y| accepted[[y, x]]),
+    };
+    let MeanFlow { velocity, centroid, count } = field.mean(eps);
+    Ok((velocity, centroid, count))
+}
+
+/// Box and displacement of what moves, of `jacoflow.track.detect_moving_target`.
+#[pyfunction(name = "_detect_moving_target")]
+#[pyo3(signature = (first, second, center))]
+pub fn detect(
+    first: &Bound<'_, PyAny>,
+    second: &Bound<'_, PyAny>,
+    center: Option<[f64; 2]>,
+) -> PyResult<Option<([f64; 4], [f64; 2])>> {
+    let (first, second) = pair(first, second)?;
+    let found = detect_moving_target(&first, &second, center);
+    Ok(found.map(|MovingTarget { bounds: TargetBox { x, y, width, height }, displacement }| {
+        ([x, y, width, height], displacement)
+    }))
+}
+
+/// Two frames of one size in grey levels.
+fn pair(first: &Bound<'_, PyAny>, second: &Bound<'_, PyAny>) -> PyResult<(Frame<f64>, Frame<f64>)> {
+    let first = arrays::frame("first", first, ColourRule::Refuse)?;
+    let levels = GreyLevels::decide(&first);
+    let (first, second) =
+        (levels.convert(&first), levels.convert(&arrays::frame("second", second, ColourRule::Refuse)?));
+    if first.size() != second.size() {
+        let told = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
+        let expected = format!("a frame as large as the first, {}", told(&first));
+        return Err(Error::argument("second", expected, told(&second)).into());
+    }
+    Ok((first, second))
+}
+
 /// Masks (value, x, y) of `jacoflow.track.derivative_kernels`.
 #[pyfunction(name = "_derivative_kernels")]
 pub fn kernels(py: Python<'_>, order: usize) -> PyResult<Vec<Bound<'_, PyAny>>> {
@@ -151,19 +207,7 @@ pub fn flow<'py>(
     let py = first.py();
     let options = LocalFlowOptions { window, order, cond_max, min_sigma, step_max };
     check(&options)?;
-    let first = arrays::frame("first", first, ColourRule::Refuse)?;
-    let levels = GreyLevels::decide(&first);
-    let (first, second) =
-        (levels.convert(&first), levels.convert(&arrays::frame("second", second, ColourRule::Refuse)?));
-    if first.size() != second.size() {
-        let told = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
-        return Err(Error::argument(
-            "second",
-            format!("a frame as large as the first, {}", told(&first)),
-            told(&second),
-        )
-        .into());
-    }
+    let (first, second) = pair(first, second)?;
     let LocalFlow { flow, accepted } = py.detach(|| {
         if refine {
             refine_flow(&first, &second, &RefineOptions { local: options, ..RefineOptions::default() })

@@ -5,6 +5,7 @@
 
 mod align;
 mod camera;
+mod find;
 mod layers;
 mod learn;
 mod level;
@@ -13,44 +14,22 @@ mod nodes;
 mod patch;
 mod pose;
 mod search;
+mod tell;
 
 use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
-use align::{Aligned, Freedom, Silence, Task, align};
+use align::Freedom;
 use camera::Seen;
+use find::{DOUBT, Finding, LEAST, WELL, YOUNG};
 use layers::{Background, Target};
-use look::{Look, look, view};
+use look::view;
 use pose::{Increment, Pose};
 
-/// Deviations of the increment from the prediction: of the position, px, and of size and angle.
-const PRIOR: [f64; 2] = [3.0, 0.02];
-/// Levels of a frame like the one before, and of one after an interruption; px.
-const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
-/// Least visibility of a target that is seen well.
-const WELL: f64 = 0.75;
-/// Below this visibility it is looked for all around.
-const BADLY: f64 = 0.6;
-/// Least visibility that is measured; and after a miss.
-const LEAST: [f64; 2] = [0.35, 0.5];
-/// Innovation squared from which on a measurement is doubted.
-const DOUBT: f64 = 12.0;
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 const SURE: f64 = 4.0;
-/// Frames in which the support is still adapting to what the box holds.
-const YOUNG: usize = 6;
-/// Part of the target's area that may look like it beside it.
-const LEAK: f64 = 0.06;
-/// The same from which on, on one side, a look-alike touches.
-const TOUCH: (f64, f64) = (0.08, 0.6);
-/// Loss of visibility that is one.
-const DROP: f64 = 0.08;
 /// Least information about the rotation, of all there could be.
 const TOLD: f64 = 0.88;
-/// Reach of the search, px: at first, and at most.
-const REACH: (usize, usize) = (12, 36);
-/// Frames without a measurement after which the target is lost.
-const LOST_AFTER: usize = 15;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Rate of the filtered change of size and angle.
@@ -87,17 +66,6 @@ pub(super) struct Layered {
     with_camera: bool,
     /// Frames measured.
     age: usize,
-}
-
-/// What a frame says of the target.
-#[derive(Debug, Clone, Copy)]
-struct Finding {
-    aligned: Aligned,
-    look: Look,
-    /// Normalised innovation squared.
-    nis: f64,
-    occluded: bool,
-    reason: &'static str,
 }
 
 impl Layered {
@@ -234,83 +202,6 @@ impl Layered {
         pose.apply(self.target.centroid())
     }
 
-    fn nis(&self, pose: &Pose) -> f64 {
-        let (at, expected) = (self.position(pose), self.filter.position());
-        (0..2).map(|k| (at[k] - expected[k]).powi(2) / (self.filter.p[k][(0, 0)] + 0.02)).sum()
-    }
-
-    /// Aligns and judges.
-    fn try_at(&self, frame: &Frame<f64>, guess: &Pose, how: (Freedom, Silence, [f64; 2], &[f64])) -> Option<Finding> {
-        let (freedom, silence, prior, levels) = how;
-        let task = Task {
-            frame,
-            target: &self.target,
-            background: &self.background,
-            noise: self.noise,
-            freedom,
-            silence,
-            prior,
-            levels,
-        };
-        let aligned = align(task, guess, 1.0)?;
-        let view = view(frame, &self.target, &self.background, &aligned.pose);
-        let look = look(&self.target, &view, aligned.gain, self.noise);
-        Some(Finding { nis: self.nis(&aligned.pose), aligned, look, occluded: false, reason: "" })
-    }
-
-    /// The target in the frame, if it is seen well enough to be measured.
-    fn find(&self, frame: &Frame<f64>) -> Option<Finding> {
-        let interrupted = self.hidden || self.missed > 0;
-        let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
-        let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
-        let mut best = plain;
-        let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
-        if (doubted || interrupted) && self.age >= YOUNG {
-            best = self.covered(frame, plain, levels).or(best);
-        }
-        let touched = |found: &Finding| found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1;
-        if best.is_some_and(|found| !found.occluded && touched(&found)) {
-            best = self.touched(frame, levels).or(best);
-        }
-        if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
-            best = self.searched(frame).or(best);
-        }
-        let least = LEAST[usize::from(self.missed > 0)];
-        best.filter(|found| found.look.visibility >= least)
-    }
-
-    /// Something known covers the target: only its position is looked for, where it is not covered.
-    fn covered(&self, frame: &Frame<f64>, plain: Option<Finding>, levels: &[f64]) -> Option<Finding> {
-        let how = (Freedom::Translation, Silence::Covered, [self.spread(), PRIOR[1]], levels);
-        let found = self.try_at(frame, &self.expected(false), how)?;
-        let dropped = |look: &Look| look.visibility < self.usual - DROP;
-        let also = plain.is_none_or(|plain| dropped(&plain.look) || plain.nis > DOUBT);
-        let taken = found.look.leak < LEAK && dropped(&found.look) && also;
-        taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
-    }
-
-    /// Something that looks like the target touches it.
-    fn touched(&self, frame: &Frame<f64>, levels: &[f64]) -> Option<Finding> {
-        let how = (Freedom::Translation, Silence::Lookalike, [self.spread(), PRIOR[1]], levels);
-        let found = self.try_at(frame, &self.expected(false), how)?;
-        Some(Finding { occluded: true, reason: "something like the target touches it", ..found })
-    }
-
-    /// All around, in whole pixels, and then as usual.
-    fn searched(&self, frame: &Frame<f64>) -> Option<Finding> {
-        let reach = (REACH.0 + self.missed).min(REACH.1);
-        let guess = self.expected(false);
-        let place = search::search(frame, &self.target, &self.background, (&guess, 1.0), reach)?;
-        let how = (Freedom::Translation, Silence::None, PRIOR, &LEVELS[1..]);
-        let found = self.try_at(frame, &place, how)?;
-        (found.look.visibility >= WELL).then_some(Finding { reason: "found by looking all around", ..found })
-    }
-
-    /// Deviation of the expected position, px.
-    fn spread(&self) -> f64 {
-        (0.5 * (self.filter.p[0][(0, 0)] + self.filter.p[1][(0, 0)])).sqrt().clamp(0.2, 3.0)
-    }
-
     /// A measurement.
     fn take(&mut self, found: &Finding, frame: &Frame<f64>) {
         let Finding { aligned, look, occluded, .. } = *found;
@@ -375,63 +266,5 @@ impl Layered {
         self.before = None;
         self.rate = [0.0; 6];
         self.pose = self.placed(self.pose, self.filter.position());
-    }
-
-    /// Upright box of the target at a pose.
-    fn bounds(&self, pose: &Pose) -> TargetBox {
-        let [width, height] = self.target.extent();
-        let columns = [pose.a[0][0].hypot(pose.a[1][0]), pose.a[0][1].hypot(pose.a[1][1])];
-        TargetBox::about(self.position(pose), width * columns[0], height * columns[1])
-    }
-
-    /// A target that has left the picture waits at its border.
-    fn hold_beyond_the_border(&mut self, state: &mut TrackState, (width, height): (usize, usize)) {
-        if self.missed == 0 {
-            return;
-        }
-        let bounds = self.bounds(&self.pose);
-        let half = [0.5 * bounds.width, 0.5 * bounds.height];
-        let lengths = [width as f64, height as f64];
-        let position = self.filter.position();
-        let outside = (0..2).any(|k| position[k] < -half[k] || position[k] > lengths[k] - 1.0 + half[k]);
-        if !outside {
-            return;
-        }
-        for k in 0..2 {
-            self.filter.x[k][0] = position[k].clamp(-half[k], lengths[k] - 1.0 + half[k]);
-            (self.filter.x[k][1], self.filter.x[k][2]) = (0.0, 0.0);
-        }
-        self.pose = self.placed(self.pose, self.filter.position());
-        state.position = self.filter.position();
-        (state.status, state.reason) = if self.missed >= LOST_AFTER {
-            (TrackStatus::Lost, "out of the picture for long")
-        } else {
-            (TrackStatus::Out, "out of the picture")
-        };
-    }
-
-    fn tell(&self, state: &mut TrackState, found: Option<&Finding>, motion: [f64; 2]) {
-        (state.status, state.reason) = match found {
-            Some(found) if found.occluded => (TrackStatus::Occluded, found.reason),
-            Some(found) => (TrackStatus::Tracking, found.reason),
-            None if self.missed >= LOST_AFTER => (TrackStatus::Lost, "not seen for long"),
-            None => (TrackStatus::Coasting, "the target is not seen"),
-        };
-        state.position = self.filter.position();
-        state.scene_velocity = self.filter.speed();
-        state.velocity = [0, 1].map(|k| state.scene_velocity[k] + motion[k]);
-        state.acceleration = self.filter.acceleration();
-        state.camera_motion = motion;
-        let measured = self.position(&self.pose);
-        let before = state.bounds.centre();
-        state.displacement = if found.is_some() { [0, 1].map(|k| measured[k] - before[k]) } else { [f64::NAN; 2] };
-        state.covariance = self.filter.covariance();
-        state.bounds = self.bounds(&self.pose);
-        (state.scale, state.rotation) = (self.pose.scale(), self.turned);
-        state.rotation_observable = self.rotation_told;
-        state.visibility = found.map_or(0.0, |found| found.look.visibility);
-        state.innovation = found.map_or(f64::NAN, |found| found.nis);
-        state.line_of_sight = state.position;
-        state.flow_count = 0;
     }
 }

@@ -1,0 +1,70 @@
+//! The trackers' filter for Python; the class that a user meets is `jacoflow.track.GaussMarkovFilter`.
+
+use super::arrays;
+use crate::error::{Error, Result};
+use crate::track::gradient::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
+use pyo3::prelude::*;
+
+/// The compiled part of `jacoflow.track.GaussMarkovFilter`.
+#[pyclass(name = "_GaussMarkovFilter", module = "jacoflow._jacoflow")]
+pub struct PyGaussMarkovFilter(GaussMarkovFilter);
+
+/// A number of one kind.
+fn checked(name: &'static str, value: f64, expected: &'static str, holds: impl Fn(f64) -> bool) -> Result<f64> {
+    if value.is_finite() && holds(value) { Ok(value) } else { Err(Error::argument(name, expected, value)) }
+}
+
+#[pymethods]
+impl PyGaussMarkovFilter {
+    #[new]
+    #[pyo3(signature = (position, alpha, q, start, measures))]
+    fn new(position: [f64; 2], alpha: f64, q: f64, start: [f64; 3], measures: &str) -> PyResult<Self> {
+        for value in position {
+            checked("position", value, "two finite numbers, px", |_| true)?;
+        }
+        let alpha = checked("alpha", alpha, "a correlation above 0 and at most 1", |a| a > 0.0 && a <= 1.0)?;
+        let q = checked("q", q, "a variance, at least 0", |q| q >= 0.0)?;
+        for variance in start {
+            checked("start", variance, "three variances, at least 0", |v| v >= 0.0)?;
+        }
+        let velocity = match measures {
+            "mean" => Velocity::Mean,
+            "instant" => Velocity::AsPrinted,
+            other => return Err(Error::argument("measures", "\"mean\" or \"instant\"", other).into()),
+        };
+        Ok(Self(GaussMarkovFilter::new(position, Dynamics { alpha, q, start }, velocity)))
+    }
+
+    /// To the next frame.
+    fn predict(&mut self) {
+        self.0.predict();
+    }
+
+    /// Takes a measurement: values and variances along x and y; returns its normalised innovation squared.
+    #[pyo3(signature = (position, velocity))]
+    fn update(
+        &mut self,
+        position: Option<([f64; 2], [f64; 2])>,
+        velocity: Option<([f64; 2], [f64; 2])>,
+    ) -> PyResult<f64> {
+        for (value, variance) in [("position", &position), ("velocity", &velocity)] {
+            for (z, r) in variance.iter().flat_map(|(z, r)| z.iter().zip(r)) {
+                checked(value, *z, "finite numbers", |_| true)?;
+                checked("variance", *r, "a variance above 0", |r| r > 0.0)?;
+            }
+        }
+        Ok(self.0.update(&Measurement { position, velocity }))
+    }
+
+    /// Position, velocity and acceleration along x and along y, (2, 3), px and frames.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let values = self.0.x.iter().flat_map(|x| x.iter().copied()).collect();
+        Ok(arrays::owned::<f64>(py, &[2, 3], values)?.into_any())
+    }
+
+    /// Their covariances along x and along y, (2, 3, 3).
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let values = self.0.covariance().iter().flatten().flatten().copied().collect();
+        Ok(arrays::owned::<f64>(py, &[2, 3, 3], values)?.into_any())
+    }
+}

@@ -1,0 +1,125 @@
+//! Finding the target in a frame: where the filter expects it, beside what covers or touches it, or all around.
+
+use super::Layered;
+use super::align::{Aligned, Freedom, Silence, Task, align};
+use super::look::{Look, look, view};
+use super::pose::Pose;
+use super::search;
+use crate::types::Frame;
+
+/// Deviations of the increment from the prediction: of the position, px, and of size and angle.
+const PRIOR: [f64; 2] = [3.0, 0.02];
+/// Levels of a frame like the one before, and of one after an interruption; px.
+const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
+/// Least visibility of a target that is seen well.
+pub(super) const WELL: f64 = 0.75;
+/// Below this visibility it is looked for all around.
+const BADLY: f64 = 0.6;
+/// Least visibility that is measured; and after a miss.
+pub(super) const LEAST: [f64; 2] = [0.35, 0.5];
+/// Innovation squared from which on a measurement is doubted.
+pub(super) const DOUBT: f64 = 12.0;
+/// Frames in which the support is still adapting to what the box holds.
+pub(super) const YOUNG: usize = 6;
+/// Part of the target's area that may look like it beside it.
+const LEAK: f64 = 0.06;
+/// The same from which on, on one side, a look-alike touches.
+const TOUCH: (f64, f64) = (0.08, 0.6);
+/// Loss of visibility that is one.
+const DROP: f64 = 0.08;
+/// Loss of visibility that noise alone may make.
+const SLIGHT: f64 = 0.03;
+/// Reach of the search, px: at first, and at most.
+const REACH: (usize, usize) = (12, 36);
+
+/// What a frame says of the target.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Finding {
+    pub aligned: Aligned,
+    pub look: Look,
+    /// Normalised innovation squared.
+    pub nis: f64,
+    pub occluded: bool,
+    pub reason: &'static str,
+}
+
+impl Layered {
+    fn nis(&self, pose: &Pose) -> f64 {
+        let (at, expected) = (self.position(pose), self.filter.position());
+        (0..2).map(|k| (at[k] - expected[k]).powi(2) / (self.filter.p[k][(0, 0)] + 0.02)).sum()
+    }
+
+    /// Aligns and judges.
+    fn try_at(&self, frame: &Frame<f64>, guess: &Pose, how: (Freedom, Silence, [f64; 2], &[f64])) -> Option<Finding> {
+        let (freedom, silence, prior, levels) = how;
+        let task = Task {
+            frame,
+            target: &self.target,
+            background: &self.background,
+            noise: self.noise,
+            freedom,
+            silence,
+            prior,
+            levels,
+        };
+        let aligned = align(task, guess, 1.0)?;
+        let view = view(frame, &self.target, &self.background, &aligned.pose);
+        let look = look(&self.target, &view, aligned.gain, self.noise);
+        Some(Finding { nis: self.nis(&aligned.pose), aligned, look, occluded: false, reason: "" })
+    }
+
+    /// The target in the frame, if it is seen well enough to be measured.
+    pub(super) fn find(&self, frame: &Frame<f64>) -> Option<Finding> {
+        let interrupted = self.hidden || self.missed > 0;
+        let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
+        let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
+        let mut best = plain;
+        let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
+        if (doubted || interrupted) && self.age >= YOUNG {
+            best = self.covered(frame, plain, levels).or(best);
+        }
+        let touched = |found: &Finding| found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1;
+        if best.is_some_and(|found| !found.occluded && touched(&found)) {
+            best = self.touched(frame, levels).or(best);
+        }
+        if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
+            best = self.searched(frame).or(best);
+        }
+        let least = LEAST[usize::from(self.missed > 0)];
+        best.filter(|found| found.look.visibility >= least)
+    }
+
+    /// Something known covers the target: only its position is looked for, where it is not covered.
+    fn covered(&self, frame: &Frame<f64>, plain: Option<Finding>, levels: &[f64]) -> Option<Finding> {
+        let how = (Freedom::Translation, Silence::Covered, [self.spread(), PRIOR[1]], levels);
+        let found = self.try_at(frame, &self.expected(false), how)?;
+        let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
+        // What is seen as well as ever in a place that nobody expected has made a turn.
+        let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT);
+        let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, DROP) || plain.nis > DOUBT));
+        let taken = found.look.leak < LEAK && dropped(&found.look, DROP) && also;
+        taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
+    }
+
+    /// Something that looks like the target touches it.
+    fn touched(&self, frame: &Frame<f64>, levels: &[f64]) -> Option<Finding> {
+        let how = (Freedom::Translation, Silence::Lookalike, [self.spread(), PRIOR[1]], levels);
+        let found = self.try_at(frame, &self.expected(false), how)?;
+        Some(Finding { occluded: true, reason: "something like the target touches it", ..found })
+    }
+
+    /// All around, in whole pixels, and then as usual.
+    fn searched(&self, frame: &Frame<f64>) -> Option<Finding> {
+        let reach = (REACH.0 + self.missed).min(REACH.1);
+        let guess = self.expected(false);
+        let place = search::search(frame, &self.target, &self.background, (&guess, 1.0), reach)?;
+        let how = (Freedom::Translation, Silence::None, PRIOR, &LEVELS[1..]);
+        let found = self.try_at(frame, &place, how)?;
+        (found.look.visibility >= WELL).then_some(Finding { reason: "found by looking all around", ..found })
+    }
+
+    /// Deviation of the expected position, px.
+    fn spread(&self) -> f64 {
+        (0.5 * (self.filter.p[0][(0, 0)] + self.filter.p[1][(0, 0)])).sqrt().clamp(0.2, 3.0)
+    }
+}

@@ -1,0 +1,69 @@
+//! What the tracker says of the target.
+
+use super::Layered;
+use super::find::Finding;
+use super::pose::Pose;
+use crate::types::{TargetBox, TrackState, TrackStatus};
+
+/// Frames without a measurement after which the target is lost.
+const LOST_AFTER: usize = 15;
+
+impl Layered {
+    /// Upright box of the target at a pose.
+    pub(super) fn bounds(&self, pose: &Pose) -> TargetBox {
+        let [width, height] = self.target.extent();
+        let columns = [pose.a[0][0].hypot(pose.a[1][0]), pose.a[0][1].hypot(pose.a[1][1])];
+        TargetBox::about(self.position(pose), width * columns[0], height * columns[1])
+    }
+
+    /// A target that has left the picture waits at its border.
+    pub(super) fn hold_beyond_the_border(&mut self, state: &mut TrackState, (width, height): (usize, usize)) {
+        if self.missed == 0 {
+            return;
+        }
+        let bounds = self.bounds(&self.pose);
+        let half = [0.5 * bounds.width, 0.5 * bounds.height];
+        let lengths = [width as f64, height as f64];
+        let position = self.filter.position();
+        let outside = (0..2).any(|k| position[k] < -half[k] || position[k] > lengths[k] - 1.0 + half[k]);
+        if !outside {
+            return;
+        }
+        for k in 0..2 {
+            self.filter.x[k][0] = position[k].clamp(-half[k], lengths[k] - 1.0 + half[k]);
+            (self.filter.x[k][1], self.filter.x[k][2]) = (0.0, 0.0);
+        }
+        self.pose = self.placed(self.pose, self.filter.position());
+        state.position = self.filter.position();
+        (state.status, state.reason) = if self.missed >= LOST_AFTER {
+            (TrackStatus::Lost, "out of the picture for long")
+        } else {
+            (TrackStatus::Out, "out of the picture")
+        };
+    }
+
+    pub(super) fn tell(&self, state: &mut TrackState, found: Option<&Finding>, motion: [f64; 2]) {
+        (state.status, state.reason) = match found {
+            Some(found) if found.occluded => (TrackStatus::Occluded, found.reason),
+            Some(found) => (TrackStatus::Tracking, found.reason),
+            None if self.missed >= LOST_AFTER => (TrackStatus::Lost, "not seen for long"),
+            None => (TrackStatus::Coasting, "the target is not seen"),
+        };
+        state.position = self.filter.position();
+        state.scene_velocity = self.filter.speed();
+        state.velocity = [0, 1].map(|k| state.scene_velocity[k] + motion[k]);
+        state.acceleration = self.filter.acceleration();
+        state.camera_motion = motion;
+        let measured = self.position(&self.pose);
+        let before = state.bounds.centre();
+        state.displacement = if found.is_some() { [0, 1].map(|k| measured[k] - before[k]) } else { [f64::NAN; 2] };
+        state.covariance = self.filter.covariance();
+        state.bounds = self.bounds(&self.pose);
+        (state.scale, state.rotation) = (self.pose.scale(), self.turned);
+        state.rotation_observable = self.rotation_told;
+        state.visibility = found.map_or(0.0, |found| found.look.visibility);
+        state.innovation = found.map_or(f64::NAN, |found| found.nis);
+        state.line_of_sight = state.position;
+        state.flow_count = 0;
+    }
+}
