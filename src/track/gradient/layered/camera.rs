@@ -61,22 +61,17 @@ pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, nois
     let mut motion = [0.0; 2];
     let hidden = grown(target, (0.0, AROUND));
     for factor in FACTORS {
+        let (f, next) = (factor as f64, now.reduced(factor));
         let samples = Samples::of(previous.reduced(factor), &shrunk(hidden, factor));
-        let start = motion.map(|m| m / factor as f64);
-        let Some(found) = samples.refine(now.reduced(factor), start, noise) else { return [0.0; 2] };
-        motion = found.map(|m| m * factor as f64);
-        if factor == FACTORS[0] && motion[0].hypot(motion[1]) < LEAST_MOTION {
+        let Some(found) = samples.refine(next, motion.map(|m| m / f), noise) else { return [0.0; 2] };
+        motion = found.map(|m| m * f);
+        // Most cameras stand still: the coarsest pictures, which have the least noise, tell it already.
+        let last = factor == FACTORS[FACTORS.len() - 1];
+        if (factor == FACTORS[0] || last) && !(motion[0].hypot(motion[1]) > LEAST_MOTION && samples.tell(next, found)) {
             return [0.0; 2];
         }
     }
-    let samples = Samples::of(&previous.frame, &hidden);
-    let capped = |motion: [f64; 2]| {
-        let residuals = samples.residuals(&now.frame, motion);
-        let sizes: Vec<f64> = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan()).collect();
-        sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
-    };
-    let far = motion[0].hypot(motion[1]) > LEAST_MOTION;
-    if far && capped(motion) < LESS * capped([0.0; 2]) { motion } else { [0.0; 2] }
+    motion
 }
 
 /// Means over squares of `factor` px, then a Gaussian.
@@ -150,6 +145,16 @@ impl Samples {
             if is_inside(place, next) { cubic_at(next, place[0], place[1]) } else { f64::NAN }
         };
         self.places.iter().zip(&self.values).map(|(&(x, y), value)| read(x, y) - value).collect()
+    }
+
+    /// Whether a motion explains the next frame clearly better than none.
+    fn tell(&self, next: &Frame<f64>, motion: [f64; 2]) -> bool {
+        let capped = |motion: [f64; 2]| {
+            let residuals = self.residuals(next, motion);
+            let sizes: Vec<f64> = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan()).collect();
+            sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
+        };
+        capped(motion) < LESS * capped([0.0; 2])
     }
 
     /// Gradient steps on all samples (5); `None` where the scene has no texture.

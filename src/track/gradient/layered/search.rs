@@ -7,13 +7,15 @@ use crate::types::Frame;
 
 /// Difference beyond which brightness is simply different, grey levels.
 const CAP: f64 = 30.0;
+/// Weight of the difference from the background.
+const LIKE_BEHIND: f64 = 0.5;
 /// Least share of the target's points that must be in the picture.
 const LEAST_SHARE: f64 = 0.4;
 /// Most points that are compared at each place.
 const POINTS: usize = 400;
 
 /// The pose within `reach` px whose picture is most like the target and least like the background:
-/// least `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`.
+/// least `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are given up as soon as they cannot be the best.
 pub(super) fn search(
     frame: &Frame<f64>,
     target: &Target,
@@ -33,7 +35,8 @@ pub(super) fn search(
     for dy in -reach..=reach {
         for dx in -reach..=reach {
             let p = [(guess.p[0] + dx as f64).round(), (guess.p[1] + dy as f64).round()];
-            let Some(cost) = cost(frame, background, &points, p) else { continue };
+            let least = best.map_or(f64::INFINITY, |(least, _)| least);
+            let Some(cost) = cost(frame, background, &points, (p, least)) else { continue };
             // Of equals the nearest to the guess wins, so that nothing depends on the order.
             let cost = cost + 1e-6 * (dx * dx + dy * dy) as f64;
             if best.is_none_or(|(least, _)| cost < least) {
@@ -44,9 +47,15 @@ pub(super) fn search(
     best.map(|(_, pose)| pose)
 }
 
-/// The figure that is least at the target; `None` where too little of it would be in the picture.
-fn cost(frame: &Frame<f64>, background: &Background, points: &[([f64; 2], f64)], p: [f64; 2]) -> Option<f64> {
+/// The figure that is least at the target; `None` where too little of it would be in the picture, or where it cannot be less than `least`.
+fn cost(
+    frame: &Frame<f64>,
+    background: &Background,
+    points: &[([f64; 2], f64)],
+    (p, least): ([f64; 2], f64),
+) -> Option<f64> {
     let (mut own, mut behind, mut count, mut known) = (0.0, 0.0, 0, 0);
+    let too_much = (least + LIKE_BEHIND * CAP) * points.len() as f64;
     for (offset, bright) in points {
         let place = [p[0] + offset[0], p[1] + offset[1]];
         if !is_inside(place, frame) {
@@ -56,6 +65,9 @@ fn cost(frame: &Frame<f64>, background: &Background, points: &[([f64; 2], f64)],
         let seen = nearest(frame, place);
         own += (seen - bright).abs().min(CAP);
         count += 1;
+        if own > too_much {
+            return None;
+        }
         if background.is_known(place) {
             behind += (seen - nearest(&background.picture, place)).abs().min(CAP);
             known += 1;
@@ -64,7 +76,7 @@ fn cost(frame: &Frame<f64>, background: &Background, points: &[([f64; 2], f64)],
     if (count as f64) < LEAST_SHARE * points.len() as f64 || count == 0 {
         return None;
     }
-    Some(own / count as f64 - 0.5 * if known > 0 { behind / known as f64 } else { 0.0 })
+    Some(own / count as f64 - LIKE_BEHIND * if known > 0 { behind / known as f64 } else { 0.0 })
 }
 
 /// Brightness at the nearest pixel, or between pixels where that is as far as it gets.
