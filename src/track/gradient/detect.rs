@@ -8,7 +8,7 @@ const CHANGE: f64 = 3.0;
 /// Least noise, grey levels.
 const LEAST_NOISE: f64 = 1.0;
 /// Changed pixels among the nine around a pixel that make it more than noise.
-const CROWD: usize = 4;
+const CROWD: usize = 3;
 /// Gap inside one object, px: of an even target only what it uncovers and what it covers changes.
 const GAP: usize = 16;
 /// Fewest changed pixels of an object.
@@ -105,12 +105,13 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
 
 /// The smallest displacement that explains the changed pixels nearly best: their extent less the displacement holds what was there in the first frame.
 fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize)], noise: f64) -> Option<[isize; 2]> {
+    let between = half_a_pixel_around(first);
     let cost = |dx: isize, dy: isize| {
         let TargetBox { x, y, width, height } = bounds(object, [dx, dy]);
         let inside = |from: f64, length: f64| (from + 0.5) as isize..(from + length + 0.5) as isize;
         let pixels = inside(y, height).flat_map(|j| inside(x, width).map(move |i| (i, j)));
-        let off = pixels.map(|(i, j)| match (read(second, i, j), read(first, i - dx, j - dy)) {
-            (Some(now), Some(before)) => (now - before).abs().min(CAP),
+        let off = pixels.map(|(i, j)| match (read(second, i, j), read(&between, i - dx, j - dy)) {
+            (Some(now), Some([low, high])) => (low - now).max(now - high).clamp(0.0, CAP),
             _ => CAP,
         });
         let (sum, count) = off.fold((0.0, 0), |(sum, count), off| (sum + off, count + 1));
@@ -128,7 +129,21 @@ fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize
     alike.map(|(_, d)| d).min_by_key(size)
 }
 
-fn read(frame: &Frame<f64>, x: isize, y: isize) -> Option<f64> {
+/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels, objects do not move by those.
+fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
+    let (width, height) = frame.size();
+    Frame::from_fn(width, height, |x, y| {
+        let own = frame.get(x, y);
+        let columns = [x.saturating_sub(1), (x + 1).min(width - 1)].map(|i| frame.get(i, y));
+        let rows = [y.saturating_sub(1), (y + 1).min(height - 1)].map(|j| frame.get(x, j));
+        columns.into_iter().chain(rows).fold([own; 2], |[low, high], beside| {
+            let half = 0.5 * (own + beside);
+            [low.min(half), high.max(half)]
+        })
+    })
+}
+
+fn read<T: Copy>(frame: &Frame<T>, x: isize, y: isize) -> Option<T> {
     let inside = x >= 0 && y >= 0 && (x as usize) < frame.width() && (y as usize) < frame.height();
     inside.then(|| frame.get(x as usize, y as usize))
 }

@@ -3,7 +3,7 @@
 use super::layers::{Background, grown, holds, is_inside};
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
-use crate::track::gradient::local_flow::{MAD, median, shifted};
+use crate::track::gradient::local_flow::{median, shifted};
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
 
@@ -25,6 +25,8 @@ const LESS: f64 = 0.9;
 const SAMPLES: usize = 4096;
 /// Every which of them the deviation of the residuals is told from.
 const EVERY: usize = 4;
+/// Lower quartile of the absolute value of a standard normal number.
+const QUARTILE: f64 = 0.3186;
 /// Pixels that the light is told from, at most.
 const LIGHT_SAMPLES: usize = 1024;
 /// Residual that all larger ones count as, grey levels.
@@ -56,19 +58,27 @@ impl Seen {
     }
 }
 
-/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better.
-pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64) -> [f64; 2] {
-    let mut motion = [0.0; 2];
+/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better. `before` is that of the frame before.
+pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64, before: [f64; 2]) -> [f64; 2] {
     let hidden = grown(target, (0.0, AROUND));
+    let swinging = before != [0.0; 2];
+    let mut motion = [0.0; 2];
     for factor in FACTORS {
         let (f, next) = (factor as f64, now.reduced(factor));
         let samples = Samples::of(previous.reduced(factor), &shrunk(hidden, factor));
-        let Some(found) = samples.refine(next, motion.map(|m| m / f), noise) else { return [0.0; 2] };
-        motion = found.map(|m| m * f);
+        let reduced = |m: f64| m / f;
+        let mut found = samples.refine(next, motion.map(reduced), noise);
+        let finest = factor == 1;
+        if finest && swinging {
+            found = samples.better(next, samples.refine(next, before, noise), found);
+        }
+        let believed = |m: [f64; 2]| m[0].hypot(m[1]) > LEAST_MOTION / f && samples.tell(next, m);
         // Most cameras stand still: the coarsest pictures, which have the least noise, tell it already.
-        let last = factor == FACTORS[FACTORS.len() - 1];
-        if (factor == FACTORS[0] || last) && !(motion[0].hypot(motion[1]) > LEAST_MOTION && samples.tell(next, found)) {
-            return [0.0; 2];
+        let asked = finest || factor == FACTORS[0] && !swinging;
+        match found.filter(|m| !asked || believed(*m)) {
+            Some(found) => motion = found.map(|m| m * f),
+            None if finest || !swinging => return [0.0; 2],
+            None => {}
         }
     }
     motion
@@ -149,21 +159,28 @@ impl Samples {
 
     /// Whether a motion explains the next frame clearly better than none.
     fn tell(&self, next: &Frame<f64>, motion: [f64; 2]) -> bool {
-        let capped = |motion: [f64; 2]| {
-            let residuals = self.residuals(next, motion);
-            let sizes: Vec<f64> = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan()).collect();
-            sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
-        };
-        capped(motion) < LESS * capped([0.0; 2])
+        self.capped(next, motion) < LESS * self.capped(next, [0.0; 2])
+    }
+
+    /// What continues the motion before, unless something else explains the next frame clearly better: where two things move, the camera is what it was.
+    fn better(&self, next: &Frame<f64>, going_on: Option<[f64; 2]>, other: Option<[f64; 2]>) -> Option<[f64; 2]> {
+        let left = |motion: Option<[f64; 2]>| motion.map_or(f64::INFINITY, |m| self.capped(next, m));
+        if left(other) < LESS * left(going_on) { other } else { going_on.or(other) }
+    }
+
+    /// Mean residual, large ones counting alike.
+    fn capped(&self, next: &Frame<f64>, motion: [f64; 2]) -> f64 {
+        let residuals = self.residuals(next, motion);
+        let sizes = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan());
+        let (sum, count) = sizes.fold((0.0, 0usize), |(sum, count), size| (sum + size, count + 1));
+        sum / count.max(1) as f64
     }
 
     /// Gradient steps on all samples (5); `None` where the scene has no texture.
     fn refine(&self, next: &Frame<f64>, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
         for _ in 0..STEPS {
             let residuals = self.residuals(next, motion);
-            let mut sizes: Vec<f64> =
-                residuals.iter().step_by(EVERY).map(|r| r.abs()).filter(|r| !r.is_nan()).collect();
-            let s = (MAD * median(&mut sizes)).max(noise);
+            let s = deviation_of_the_better_half(&residuals).max(noise);
             let (mut sums, mut count) = ([0.0; 5], 0.0);
             for ([gx, gy], r) in self.gradients.iter().zip(&residuals) {
                 let outlying = 1.0 + (r / (3.0 * s)).powi(2);
@@ -190,6 +207,16 @@ impl Samples {
         }
         motion.iter().all(|m| m.abs() < next.width().max(next.height()) as f64 / 4.0).then_some(motion)
     }
+}
+
+/// Deviation of the residuals by their lower quartile: where half of the scene moves otherwise it is that of the other half, so that steps end in one motion and not between the two.
+fn deviation_of_the_better_half(residuals: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = residuals.iter().step_by(EVERY).map(|r| r.abs()).filter(|r| !r.is_nan()).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let quarter = sizes.len() / 4;
+    *sizes.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTILE
 }
 
 /// Brightness of the frame over that of the background, where both are known: a robust ratio; 1 unless it explains the frame better.

@@ -51,6 +51,8 @@ pub(super) struct Layered {
     noise: f64,
     /// Running mean of the visibility.
     usual: f64,
+    /// Motion of the camera at the last frame.
+    swung: [f64; 2],
     previous: Seen,
     /// Memory of the frame before that.
     spare: Vec<f64>,
@@ -85,6 +87,7 @@ impl Layered {
             noise: learn::LEAST_NOISE,
             usual: 1.0,
             before: Some(bounds.centre()),
+            swung: [0.0; 2],
             previous: Seen::new(frame),
             spare: Vec::new(),
             missed: 0,
@@ -116,9 +119,10 @@ impl Layered {
         let light = camera::light(frame, &self.background, bounds);
         let seen = Seen::new(self.in_usual_light(frame, light));
         let motion = match self.camera {
-            CameraMotion::Auto => camera::camera_motion(&self.previous, &seen, bounds, self.noise),
+            CameraMotion::Auto => camera::camera_motion(&self.previous, &seen, bounds, self.noise, self.swung),
             CameraMotion::None => [0.0; 2],
         };
+        self.swung = motion;
         self.follow_camera(motion, &seen.frame);
         self.filter.predict();
         let finding = self.find_wherever_it_rides(&seen.frame, motion);

@@ -31,17 +31,19 @@ pub(super) fn search(
     let points: Vec<_> =
         core.iter().step_by(every).map(|&(i, j)| (guess.turn(target.xi(i, j)), gain * target.t.get(i, j))).collect();
     let reach = reach as isize;
+    let mut offsets: Vec<_> = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| [dx, dy])).collect();
+    // From the guess outwards: a good place that is found early spares most of the others.
+    let far = |[dx, dy]: [isize; 2]| dx * dx + dy * dy;
+    offsets.sort_by_key(|offset| far(*offset));
     let mut best: Option<(f64, Pose)> = None;
-    for dy in -reach..=reach {
-        for dx in -reach..=reach {
-            let p = [(guess.p[0] + dx as f64).round(), (guess.p[1] + dy as f64).round()];
-            let least = best.map_or(f64::INFINITY, |(least, _)| least);
-            let Some(cost) = cost(frame, background, &points, (p, least)) else { continue };
-            // Of equals the nearest to the guess wins, so that nothing depends on the order.
-            let cost = cost + 1e-6 * (dx * dx + dy * dy) as f64;
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, Pose { p, ..*guess }));
-            }
+    for offset in offsets {
+        let p = [0, 1].map(|k| (guess.p[k] + offset[k] as f64).round());
+        let least = best.map_or(f64::INFINITY, |(least, _)| least);
+        let Some(cost) = cost(frame, background, &points, (p, least)) else { continue };
+        // Of equals the nearest to the guess wins, so that nothing depends on the order.
+        let cost = cost + 1e-6 * far(offset) as f64;
+        if cost < least {
+            best = Some((cost, Pose { p, ..*guess }));
         }
     }
     best.map(|(_, pose)| pose)
@@ -80,6 +82,7 @@ fn cost(
 }
 
 /// Brightness at the nearest pixel, or between pixels where that is as far as it gets.
+#[inline(always)]
 fn nearest(frame: &Frame<f64>, [x, y]: [f64; 2]) -> f64 {
     let (i, j) = ((x + 0.5) as usize, (y + 0.5) as usize);
     if i < frame.width() && j < frame.height() { frame.get(i, j) } else { cubic_at(frame, x, y) }
