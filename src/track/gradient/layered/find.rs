@@ -1,10 +1,10 @@
 //! Finding the target in a frame: where the filter expects it, beside what covers or touches it, or all around.
 
-use super::Layered;
 use super::align::{Aligned, Freedom, Silence, Task, align};
 use super::look::{Look, look, view};
 use super::pose::Pose;
 use super::search;
+use super::{Layered, SURE};
 use crate::types::Frame;
 
 /// Deviations of the increment from the prediction: of the position, px, and of size and angle.
@@ -25,6 +25,10 @@ pub(super) const YOUNG: usize = 6;
 const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
 const TOUCH: (f64, f64) = (0.08, 0.6);
+/// What is said then.
+pub(super) const TOUCHED: &str = "something like the target touches it";
+/// Growth from one frame to the next that a look-alike makes.
+const GROWN: f64 = 0.04;
 /// Loss of visibility that is one.
 const DROP: f64 = 0.08;
 /// Loss of visibility that noise alone may make.
@@ -78,8 +82,7 @@ impl Layered {
         if (doubted || interrupted) && self.age >= YOUNG {
             best = self.covered(frame, plain, levels).or(best);
         }
-        let touched = |found: &Finding| found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1;
-        if best.is_some_and(|found| !found.occluded && touched(&found)) {
+        if best.is_some_and(|found| !found.occluded && self.is_touched(&found)) {
             best = self.touched(frame, levels).or(best);
         }
         if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
@@ -101,11 +104,18 @@ impl Layered {
         taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
     }
 
+    /// Whether something that looks like the target touches it: much of it beside the target, on one side. While that is so, or was a moment ago, what pulls the target out of its way or makes it grow
+    /// is the look-alike too.
+    fn is_touched(&self, found: &Finding) -> bool {
+        let grown = (found.aligned.pose.scale() / self.pose.scale() - 1.0).abs() > GROWN;
+        found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1 || self.wary > 0 && (found.nis > SURE || grown)
+    }
+
     /// Something that looks like the target touches it.
     fn touched(&self, frame: &Frame<f64>, levels: &[f64]) -> Option<Finding> {
         let how = (Freedom::Translation, Silence::Lookalike, [self.spread(), PRIOR[1]], levels);
         let found = self.try_at(frame, &self.expected(false), how)?;
-        Some(Finding { occluded: true, reason: "something like the target touches it", ..found })
+        Some(Finding { occluded: true, reason: TOUCHED, ..found })
     }
 
     /// All around, in whole pixels, and then as usual.

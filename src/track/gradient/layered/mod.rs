@@ -21,13 +21,15 @@ use super::options::{CameraMotion, GradientOptions, Shape};
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{DOUBT, Finding, LEAST, WELL, YOUNG};
+use find::{DOUBT, Finding, LEAST, TOUCHED, WELL, YOUNG};
 use layers::{Background, Target};
 use look::view;
 use pose::{Increment, Pose};
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 const SURE: f64 = 4.0;
+/// Frames after a look-alike touched for which it is reckoned with.
+const WARY: usize = 8;
 /// Least information about the rotation, of all there could be.
 const TOLD: f64 = 0.88;
 /// Least deviation of a measured position, px.
@@ -60,6 +62,8 @@ pub(super) struct Layered {
     before: Option<[f64; 2]>,
     missed: usize,
     hidden: bool,
+    /// Frames for which a look-alike is still reckoned with.
+    wary: usize,
     /// Angle turned, not wrapped, rad.
     turned: f64,
     gain: f64,
@@ -92,6 +96,7 @@ impl Layered {
             spare: Vec::new(),
             missed: 0,
             hidden: false,
+            wary: 0,
             turned: 0.0,
             gain: 1.0,
             rotation_told: true,
@@ -242,6 +247,7 @@ impl Layered {
         }
         self.before = (!occluded).then_some(at);
         (self.missed, self.hidden) = (0, occluded);
+        self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
         let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
