@@ -16,6 +16,7 @@ Frames are arrays (H, W) of uint8, uint16, float32 or float64; positions are (x,
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any
@@ -86,6 +87,8 @@ class TrackResult:
     """Line of sight: middle of the window that is looked at, (2,), px."""
     n_flow: int
     """How many pixels' flow was used ("local" and "paper"), no unit."""
+    frame: int
+    """Index of the frame, counted from the one the tracker began with (no unit)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,16 +118,16 @@ class GradientTracker:
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
-        The first frame, at least 16 x 16 px. Floats up to 1.5 are taken for shares of white.
+        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats up to 1.5 are taken for shares of white.
     bbox : (x, y, width, height), px
-        The target's box in it, with x = centre - width / 2; sides of at least 3 px; it may reach over the border.
+        The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the frame's; it may reach over the border.
     center : (x, y), px
         In place of a box: a point on the target; it is found as soon as it moves. With neither, the target is the first thing that moves; until then the status is "lost".
     method : "layered", "local" or "paper"
         "layered" (default): target and background as layers, one gradient step over the whole target from the filter's prediction. "local": the paper's loop (local flow in a window, its mean over what moves,
         a Gauss-Markov filter) with the repairs that it needs. "paper": its text to the letter, which loses targets on all but flat backgrounds.
     fov : int, px
-        Side of the window that is looked at ("local", "paper"); default 51.
+        Side of the window that is looked at ("local", "paper"), made odd; default 51.
     control : "integer" or "subpixel"
         Whether that window moves in whole pixels (default) or not.
     model : "similarity" or "affine"
@@ -162,8 +165,12 @@ class GradientTracker:
         eps: float | str = 0.5,
     ) -> None:
         box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
+        if isinstance(eps, str) and eps != "auto":
+            raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
+        if operator.index(fov) < 0:
+            raise ValueError(f"fov: expected at least 15 px, got {fov}")
         slowest = None if eps == "auto" else float(eps)
-        self._tracker = _GradientTracker(np.asarray(frame), box, point, method, fov, control, model, camera, order, window, slowest)
+        self._tracker = _GradientTracker(_frame(frame), box, point, method, fov, control, model, camera, order, window, slowest)
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
@@ -173,12 +180,17 @@ class GradientTracker:
         ValueError
             For a frame of another size, naming `frame`.
         """
-        return TrackResult(**self._tracker.update(np.asarray(frame)))
+        return TrackResult(**self._tracker.update(_frame(frame)))
 
     @property
     def result(self) -> TrackResult:
         """The target at the last frame; lengths in px."""
         return TrackResult(**self._tracker.state())
+
+
+def _frame(frame: ArrayLike) -> NDArray[Any]:
+    """A frame as an array; a masked one stays what it is, and is refused."""
+    return frame if isinstance(frame, np.ndarray) else np.asarray(frame)
 
 
 def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float] | None:
@@ -229,14 +241,14 @@ def local_flow(
     `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
     levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
     """
-    return PixelFlow(*_local_flow(np.asarray(first), np.asarray(second), False, window, order, cond_max, min_sigma, step_max))
+    return PixelFlow(*_local_flow(_frame(first), _frame(second), False, window, order, cond_max, min_sigma, step_max))
 
 
 def refine_flow(
     first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
 ) -> PixelFlow:
     """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
-    return PixelFlow(*_local_flow(np.asarray(first), np.asarray(second), True, window, order, cond_max, min_sigma, step_max))
+    return PixelFlow(*_local_flow(_frame(first), _frame(second), True, window, order, cond_max, min_sigma, step_max))
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +289,7 @@ def detect_moving_target(first: ArrayLike, second: ArrayLike, center: ArrayLike 
 
     Raises `ValueError` for frames of different size.
     """
-    found = _detect_moving_target(np.asarray(first), np.asarray(second), _numbers("center", center, "(x, y)", 2))
+    found = _detect_moving_target(_frame(first), _frame(second), _numbers("center", center, "(x, y)", 2))
     return None if found is None else MovingTarget(*(np.array(part) for part in found))
 
 

@@ -6,9 +6,10 @@ use crate::types::TrackState;
 use std::path::Path;
 
 /// Columns before the covariance.
-const NUMBERS: [&str; 30] = [
+const NUMBERS: [&str; 31] = [
     "target",
     "frame",
+    "time",
     "status",
     "reason",
     "reacquired",
@@ -49,6 +50,7 @@ const ENTRIES: [(&str, usize, usize); 6] =
 /// |---|---|
 /// | `target` | number of the target, from 1 |
 /// | `frame` | index of the frame in the input, from 0 |
+/// | `time` | s from the first frame of the input; `nan` where the frame rate is not known |
 /// | `status`, `reason` | words, as [`TrackStatus::name`](crate::types::TrackStatus::name) and [`TrackState::reason`] |
 /// | `reacquired`, `rotation_observable` | `true` or `false` |
 /// | `x`, `y`, `line_of_sight_x`, `line_of_sight_y` | px, centres of pixels at integers, x right, y down |
@@ -82,14 +84,15 @@ impl TrackTable {
         Ok(Self { table: TableWriter::create(path, &Self::columns())? })
     }
 
-    /// Adds the row of target number `target` (from 1) at frame `frame` of the input.
+    /// Adds the row of target number `target` (from 1) at frame `frame` of the input, and its time, s, if that is known.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.
-    pub fn write(&mut self, target: usize, frame: usize, state: &TrackState) -> Result<()> {
+    pub fn write(&mut self, target: usize, (frame, time): (usize, Option<f64>), state: &TrackState) -> Result<()> {
         let mut cells = vec![
             target.to_string(),
             frame.to_string(),
+            cell(time.unwrap_or(f64::NAN)),
             state.status.name().to_string(),
             state.reason.to_string(),
             state.reacquired.to_string(),
@@ -180,19 +183,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.csv");
         let mut table = TrackTable::create(&path).unwrap();
-        table.write(2, 31, &numbered()).unwrap();
+        table.write(2, (31, Some(1.24)), &numbered()).unwrap();
         table.flush().unwrap();
         assert!(!path.exists());
         table.finish().unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let mut lines = csv::ReaderBuilder::new().from_reader(text.as_bytes());
         let names: Vec<String> = lines.headers().unwrap().iter().map(String::from).collect();
-        assert_eq!((names.len(), &names), (42, &TrackTable::columns()));
+        assert_eq!((names.len(), &names), (43, &TrackTable::columns()));
         let row = lines.records().next().unwrap().unwrap();
         let cell = |name: &str| &row[names.iter().position(|known| known == name).unwrap()];
         for (name, value) in [
             ("target", "2"),
             ("frame", "31"),
+            ("time", "1.24"),
             ("status", "occluded"),
             ("reason", "something, in front"),
             ("reacquired", "true"),
@@ -228,7 +232,7 @@ mod tests {
     fn rows_of_a_run_that_was_stopped_have_another_name() {
         let folder = tempfile::tempdir().unwrap();
         let mut table = TrackTable::create(folder.path().join("t.csv")).unwrap();
-        table.write(1, 0, &numbered()).unwrap();
+        table.write(1, (0, None), &numbered()).unwrap();
         table.finish_as(folder.path().join("part.csv")).unwrap();
         drop(TrackTable::create(folder.path().join("u.csv")).unwrap());
         let names: Vec<_> = folder.path().read_dir().unwrap().map(|e| e.unwrap().file_name()).collect();

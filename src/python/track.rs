@@ -120,6 +120,7 @@ fn told<'py>(py: Python<'py>, state: &TrackState) -> PyResult<Bound<'py, PyDict>
     out.set_item("status", state.status.name())?;
     out.set_item("reason", state.reason)?;
     out.set_item("n_flow", state.flow_count)?;
+    out.set_item("frame", state.frame)?;
     Ok(out)
 }
 
@@ -153,12 +154,18 @@ pub fn mean_flow(
 #[pyfunction(name = "_detect_moving_target")]
 #[pyo3(signature = (first, second, center))]
 pub fn detect(
+    py: Python<'_>,
     first: &Bound<'_, PyAny>,
     second: &Bound<'_, PyAny>,
     center: Option<[f64; 2]>,
 ) -> PyResult<Option<([f64; 4], [f64; 2])>> {
     let (first, second) = pair(first, second)?;
-    let found = detect_moving_target(&first, &second, center);
+    let (width, height) = first.size();
+    if let Some(at) = center.filter(|at| !at.iter().all(|at| at.is_finite())) {
+        let expected = format!("a point (x, y) in the {width} x {height} frames");
+        return Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])).into());
+    }
+    let found = py.detach(|| detect_moving_target(&first, &second, center));
     Ok(found.map(|MovingTarget { bounds: TargetBox { x, y, width, height }, displacement }| {
         ([x, y, width, height], displacement)
     }))

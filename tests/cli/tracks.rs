@@ -225,7 +225,7 @@ fn rows_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
     let mut out = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
     out.read_line(&mut line).unwrap();
-    assert!(line.starts_with("target,frame,status"));
+    assert!(line.starts_with("target,frame,time,status"));
     line.clear();
     // The first row is there although the input is not at its end.
     out.read_line(&mut line).unwrap();

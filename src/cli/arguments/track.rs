@@ -37,7 +37,7 @@ pub struct TrackerArguments {
     /// gradient: which system follows the target
     #[arg(long, value_enum, value_name = "NAME", default_value = "layered")]
     pub mode: ModeWord,
-    /// Side of the window that is looked at, px (local, paper, and the search for what moves) [default: 51]
+    /// Side of the window that is looked at, px (local, paper), made odd [default: 51]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,
     /// How the window follows the target (local)

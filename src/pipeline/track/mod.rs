@@ -26,6 +26,8 @@ use std::time::Instant;
 pub struct TrackStep<'a> {
     /// Index of the frame in the input.
     pub frame_index: usize,
+    /// Its time, s from the first frame of the input; `None` where the frame rate is not known.
+    pub time: Option<f64>,
     /// The frame as it came.
     pub frame: &'a AnyFrame,
     /// The targets; number `k + 1` is at `k`.
@@ -175,7 +177,9 @@ impl TrackRun {
     }
 
     fn deliver(&mut self, frame: &AnyFrame, states: &[TrackState]) -> Result<()> {
-        let step = TrackStep { frame_index: self.numbering.index(self.summary.frames), frame, states };
+        let frame_index = self.numbering.index(self.summary.frames);
+        let time = self.numbering.rate.map(|rate| frame_index as f64 / rate);
+        let step = TrackStep { frame_index, time, frame, states };
         for sink in &mut self.sinks {
             sink.accept(&step)?;
         }

@@ -62,9 +62,9 @@ impl Writer {
             TrackFormat::Mot => Self::Mot(MotTable::create(path)?),
         })
     }
-    fn write(&mut self, target: usize, frame: usize, state: &TrackState) -> Result<()> {
+    fn write(&mut self, target: usize, (frame, time): (usize, Option<f64>), state: &TrackState) -> Result<()> {
         match self {
-            Self::Csv(table) => table.write(target, frame, state),
+            Self::Csv(table) => table.write(target, (frame, time), state),
             Self::Mot(table) => table.write(target, frame, state),
         }
     }
@@ -109,7 +109,7 @@ impl TrackSink for TrackRows {
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()> {
         let Some(writer) = &mut self.writer else { return Ok(()) };
         for (index, state) in step.states.iter().enumerate() {
-            writer.write(index + 1, step.frame_index, state)?;
+            writer.write(index + 1, (step.frame_index, step.time), state)?;
         }
         self.frames += 1;
         if self.target == TableTarget::StandardOutput { writer.flush() } else { Ok(()) }

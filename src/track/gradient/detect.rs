@@ -7,10 +7,16 @@ use crate::types::{Frame, TargetBox};
 const CHANGE: f64 = 3.0;
 /// Least noise, grey levels.
 const LEAST_NOISE: f64 = 1.0;
+/// Noise that a still camera has at most, grey levels: all that a moving one changes is not noise.
+const MOST_NOISE: f64 = 5.0;
+/// Share of the frame that changes when the camera moves.
+const MUCH: f64 = 0.1;
 /// Changed pixels among the nine around a pixel that make it more than noise.
 const CROWD: usize = 3;
-/// Gap inside one object, px: of an even target only what it uncovers and what it covers changes.
-const GAP: usize = 16;
+/// Side of the squares that pixels are gathered in, px.
+const CELL: usize = 8;
+/// Share of the longer one's extent that two ends of an object have in common.
+const SAME_EXTENT: f64 = 0.7;
 /// Fewest changed pixels of an object.
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
@@ -41,57 +47,92 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
         return None;
     }
     let noise = noise_of(first, second).max(LEAST_NOISE);
-    let bar = CHANGE * noise * std::f64::consts::SQRT_2;
-    let changed =
-        Frame::from_fn(first.width(), first.height(), |x, y| (second.get(x, y) - first.get(x, y)).abs() > bar);
-    let object = objects(&crowded(&changed)).into_iter().filter(|pixels| pixels.len() >= FEWEST).min_by(|a, b| {
-        let rank = |pixels: &[(usize, usize)]| match near {
-            Some(at) => distance(pixels, at),
-            None => -(pixels.len() as f64),
-        };
-        rank(a).total_cmp(&rank(b))
-    })?;
-    let displacement = displacement(first, second, &object, noise)?;
+    let changed = changed(first, second, noise);
+    let mut objects = objects(&crowded(&changed));
+    objects.retain(|pixels| pixels.len() >= FEWEST);
+    let rank = |pixels: &[(usize, usize)]| near.map_or(-(pixels.len() as f64), |at| distance(pixels, at));
+    let chosen = (0..objects.len()).min_by(|a, b| rank(&objects[*a]).total_cmp(&rank(&objects[*b])))?;
+    let object = objects.swap_remove(chosen);
+    let between = half_a_pixel_around(first);
+    let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
+    // What an even target uncovers and what it covers lie apart, as far as it is long: together they are explained without a rest.
+    let whole = objects.iter().filter(|other| are_ends(&object, other)).map(|other| [&object[..], other].concat());
+    let whole =
+        whole.map(|both| (explain(&both), both)).filter(|(found, _)| found.is_some_and(|f| f.0 <= ALIKE.1 * noise));
+    let whole = whole.min_by_key(|(_, both)| both.len());
+    let (found, object) = whole.unwrap_or_else(|| (explain(&object), object));
+    let displacement = found?.1;
     let bounds = bounds(&object, displacement);
     (bounds.width >= LEAST_SIDE && bounds.height >= LEAST_SIDE)
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
 }
 
-/// Changed pixels with enough changed neighbours.
-fn crowded(changed: &Frame<bool>) -> Frame<bool> {
-    let (width, height) = changed.size();
-    let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
-    Frame::from_fn(width, height, |x, y| {
-        let count = || {
-            around(y, height).map(|j| changed.row(j)[around(x, width)].iter().filter(|c| **c).count()).sum::<usize>()
-        };
-        changed.get(x, y) && count() >= CROWD
-    })
+/// Pixels that differ by more than noise makes them.
+fn changed(first: &Frame<f64>, second: &Frame<f64>, noise: f64) -> Frame<bool> {
+    let bar = CHANGE * noise * std::f64::consts::SQRT_2;
+    Frame::from_fn(first.width(), first.height(), |x, y| (second.get(x, y) - first.get(x, y)).abs() > bar)
 }
 
-/// Pixels that belong together, gaps of a few pixels included.
+/// Whether so much changes that the camera must have moved: one target alone changes little.
+pub(super) fn much_changes(first: &Frame<f64>, second: &Frame<f64>) -> bool {
+    let changed = changed(first, second, LEAST_NOISE.max(noise_of(first, second).min(MOST_NOISE)));
+    let count = changed.data().iter().filter(|changed| **changed).count();
+    count as f64 > MUCH * changed.data().len() as f64
+}
+
+/// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along x or along y.
+fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
+    let (a, b) = (bounds(a, [0, 0]), bounds(b, [0, 0]));
+    let alike = |a: [f64; 2], b: [f64; 2]| {
+        let common = (a[0] + a[1]).min(b[0] + b[1]) - a[0].max(b[0]);
+        common >= SAME_EXTENT * a[1].max(b[1])
+    };
+    alike([a.x, a.width], [b.x, b.width]) || alike([a.y, a.height], [b.y, b.height])
+}
+
+/// Indices next to one, and itself, of `length`.
+fn around(at: usize, length: usize) -> std::ops::Range<usize> {
+    at.saturating_sub(1)..(at + 2).min(length)
+}
+
+/// Changed pixels with enough changed neighbours, and those beside such.
+fn crowded(changed: &Frame<bool>) -> Frame<bool> {
+    let (width, height) = changed.size();
+    let count = |mask: &Frame<bool>, x: usize, y: usize| {
+        around(y, height).map(|j| mask.row(j)[around(x, width)].iter().filter(|c| **c).count()).sum::<usize>()
+    };
+    let middle = Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(changed, x, y) >= CROWD);
+    Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(&middle, x, y) > 0)
+}
+
+/// Pixels that belong together, gaps of a few pixels included: squares of pixels that hold changed ones, and at most one empty square between them.
 fn objects(changed: &Frame<bool>) -> Vec<Vec<(usize, usize)>> {
     let (width, height) = changed.size();
-    let mut left = changed.clone();
-    let mut found = Vec::new();
+    let (columns, rows) = (width.div_ceil(CELL), height.div_ceil(CELL));
+    let mut cells: Frame<Vec<(usize, usize)>> = Frame::from_fn(columns, rows, |_, _| Vec::new());
     for y in 0..height {
-        for x in 0..width {
-            if !left.get(x, y) {
-                continue;
-            }
-            left.row_mut(y)[x] = false;
-            let (mut object, mut next) = (vec![(x, y)], 0);
-            while let Some(&(i, j)) = object.get(next) {
-                next += 1;
-                for b in j.saturating_sub(GAP)..(j + GAP + 1).min(height) {
-                    for a in i.saturating_sub(GAP)..(i + GAP + 1).min(width) {
-                        if left.get(a, b) {
-                            left.row_mut(b)[a] = false;
-                            object.push((a, b));
-                        }
+        for x in (0..width).filter(|x| changed.get(*x, y)) {
+            cells.row_mut(y / CELL)[x / CELL].push((x, y));
+        }
+    }
+    let near = |at: usize, length: usize| at.saturating_sub(2)..(at + 3).min(length);
+    let mut found = Vec::new();
+    for start in 0..columns * rows {
+        let mut object = std::mem::take(&mut cells.data_mut()[start]);
+        let mut next = if object.is_empty() { Vec::new() } else { vec![start] };
+        while let Some(at) = next.pop() {
+            for j in near(at / columns, rows) {
+                for i in near(at % columns, columns) {
+                    let cell = &mut cells.row_mut(j)[i];
+                    if !cell.is_empty() {
+                        object.append(cell);
+                        next.push(j * columns + i);
                     }
                 }
             }
+        }
+        if !object.is_empty() {
+            object.sort_unstable_by_key(|(x, y)| (*y, *x));
             found.push(object);
         }
     }
@@ -103,14 +144,19 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
     pixels.iter().map(far).sum::<f64>() / pixels.len() as f64
 }
 
-/// The smallest displacement that explains the changed pixels nearly best: their extent less the displacement holds what was there in the first frame.
-fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize)], noise: f64) -> Option<[isize; 2]> {
-    let between = half_a_pixel_around(first);
+/// The smallest displacement that explains the changed pixels nearly best, and what is left then, grey levels: their extent less the displacement holds what was there in the first frame, `between` these
+/// levels within half a pixel.
+fn displacement(
+    between: &Frame<[f64; 2]>,
+    second: &Frame<f64>,
+    object: &[(usize, usize)],
+    noise: f64,
+) -> Option<(f64, [isize; 2])> {
     let cost = |dx: isize, dy: isize| {
         let TargetBox { x, y, width, height } = bounds(object, [dx, dy]);
         let inside = |from: f64, length: f64| (from + 0.5) as isize..(from + length + 0.5) as isize;
         let pixels = inside(y, height).flat_map(|j| inside(x, width).map(move |i| (i, j)));
-        let off = pixels.map(|(i, j)| match (read(second, i, j), read(&between, i - dx, j - dy)) {
+        let off = pixels.map(|(i, j)| match (read(second, i, j), read(between, i - dx, j - dy)) {
             (Some(now), Some([low, high])) => (low - now).max(now - high).clamp(0.0, CAP),
             _ => CAP,
         });
@@ -126,7 +172,7 @@ fn displacement(first: &Frame<f64>, second: &Frame<f64>, object: &[(usize, usize
     let size = |d: &[isize; 2]| d[0] * d[0] + d[1] * d[1];
     let bar = (ALIKE.0 * best).max(ALIKE.1 * noise);
     let alike = all.into_iter().filter(|(cost, _)| *cost <= bar);
-    alike.map(|(_, d)| d).min_by_key(size)
+    alike.min_by_key(|(_, d)| size(d))
 }
 
 /// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels, objects do not move by those.

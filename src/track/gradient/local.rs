@@ -98,7 +98,8 @@ impl LocalLoop {
         let rules = Rules::of(options);
         let centre = bounds.centre();
         let mut this = Self {
-            fov: options.fov,
+            // Beyond the frame there is nothing, and a window has a middle.
+            fov: options.fov.min(2 * frame.width().max(frame.height())) | 1,
             control: options.control,
             eps: options.eps,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
@@ -140,6 +141,7 @@ impl LocalLoop {
             }
             Some(_) if self.rules.careful => {
                 // Nothing moves: the target has stopped, or is hidden.
+                self.refused = 0;
                 self.filter
                     .update(&Measurement { position: None, velocity: Some(([0.0; 2], [self.rules.variances[1]; 2])) });
             }

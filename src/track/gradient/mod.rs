@@ -34,6 +34,9 @@ const LEAST_FRAME: usize = 16;
 /// Smallest side of a target, px.
 const LEAST_BOX: f64 = 3.0;
 
+/// Largest box, in sides of the frame.
+const LARGEST_BOX: f64 = 2.0;
+
 /// What follows the target.
 #[derive(Debug)]
 enum Engine {
@@ -100,7 +103,11 @@ impl GradientTracker {
     /// Looks for what moves first.
     fn wait(&mut self, frame: &Frame<f64>) {
         let Engine::Waiting(previous, near) = &mut self.engine else { return };
-        let found = detect_moving_target(previous, frame, *near).map(|found| found.bounds);
+        let still = match self.options.camera {
+            CameraMotion::Auto if detect::much_changes(previous, frame) => layered::stilled(previous, frame),
+            CameraMotion::Auto | CameraMotion::None => None,
+        };
+        let found = detect_moving_target(still.as_ref().unwrap_or(previous), frame, *near).map(|found| found.bounds);
         match found.and_then(|bounds| checked_box(bounds, self.size).ok()) {
             Some(bounds) => {
                 let engine = Engine::new(frame, bounds, &self.options);
@@ -158,7 +165,12 @@ fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<Tar
             told(),
         ));
     }
-    let apart = |from: f64, length: f64, whole: usize| from + length <= 0.0 || from >= whole as f64;
+    if w > LARGEST_BOX * width as f64 || h > LARGEST_BOX * height as f64 {
+        let expected = format!("a box at most {LARGEST_BOX} times as large as the {width} x {height} frame");
+        return Err(Error::argument("bbox", expected, told()));
+    }
+    // Pixels reach half a pixel beyond their centres.
+    let apart = |from: f64, length: f64, whole: usize| from + length <= -0.5 || from >= whole as f64 - 0.5;
     if apart(x, w, width) || apart(y, h, height) {
         return Err(Error::argument(
             "bbox",

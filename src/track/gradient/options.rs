@@ -76,7 +76,7 @@ pub enum Start {
 pub struct GradientOptions {
     /// Which system.
     pub mode: Mode,
-    /// Side of the window that is looked at, px (`local`, `paper`, and the search for what moves first); default 51.
+    /// Side of the window that is looked at, px (`local`, `paper`), made odd; default 51.
     pub fov: usize,
     /// How that window moves; default whole pixels.
     pub control: Control,

@@ -13,6 +13,8 @@ const STEPS: usize = 6;
 const SETTLED: f64 = 0.01;
 /// Least deviation of the residual, share of the range of the model.
 const LEAST_SHARE: f64 = 0.03;
+/// What turning a target changes of its picture, over what growing does, squared, below which it is round: that much is noise. A square has a third.
+const ROUND: f64 = 0.1;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
 const CORRELATED: f64 = 4.0;
 
@@ -144,6 +146,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
                 // Unknowns that there are not.
                 matrix[(k, k)] += if k < unknowns { prior[k] } else { 1.0 };
             }
+            let round = matrix[(3, 3)] - prior[3] < ROUND * (matrix[(2, 2)] - prior[2]);
             let inverse = matrix.cholesky()?.inverse();
             let mut delta = -(inverse * (right + prior.component_mul(&total)));
             let length = delta[0].hypot(delta[1]);
@@ -152,14 +155,14 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
             }
             pose = pose.moved(&task.freedom.increment(&delta));
             total += delta;
-            last = Some((inverse, s));
+            last = Some((inverse, s, round));
             if length < SETTLED {
                 break;
             }
         }
         gain = level.gain(&pose, gain);
     }
-    let (inverse, s) = last?;
+    let (inverse, s, round) = last?;
     if !pose.p.iter().chain(pose.a.as_flattened()).all(|value| value.is_finite()) {
         return None;
     }
@@ -171,6 +174,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
         })
     });
     let rotation_told = match task.freedom {
+        Freedom::Similarity if round => 0.0,
         Freedom::Similarity => 1.0 - s * s * inverse[(3, 3)] / task.prior[1].powi(2),
         _ => 1.0,
     };

@@ -21,12 +21,16 @@ pub(super) const LEAST: [f64; 2] = [0.35, 0.5];
 pub(super) const DOUBT: f64 = 12.0;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const YOUNG: usize = 6;
+/// Least difference of the target from what is behind it, over the noise.
+const VISIBLE: f64 = 1.0;
 /// Part of the target's area that may look like it beside it.
 const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
 const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said then.
 pub(super) const TOUCHED: &str = "something like the target touches it";
+/// What is said of a target that was looked for.
+pub(super) const SEARCHED: &str = "found by looking all around";
 /// Growth from one frame to the next that a look-alike makes.
 const GROWN: f64 = 0.04;
 /// Loss of visibility that is one.
@@ -89,7 +93,7 @@ impl Layered {
             best = self.searched(frame).or(best);
         }
         let least = LEAST[usize::from(self.missed > 0)];
-        best.filter(|found| found.look.visibility >= least)
+        best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
     }
 
     /// Something known covers the target: only its position is looked for, where it is not covered.
@@ -125,7 +129,7 @@ impl Layered {
         let place = search::search(frame, &self.target, &self.background, (&guess, 1.0), reach)?;
         let how = (Freedom::Translation, Silence::None, PRIOR, &LEVELS[1..]);
         let found = self.try_at(frame, &place, how)?;
-        (found.look.visibility >= WELL).then_some(Finding { reason: "found by looking all around", ..found })
+        (found.look.visibility >= WELL).then_some(Finding { reason: SEARCHED, ..found })
     }
 
     /// Deviation of the expected position, px.

@@ -123,11 +123,11 @@ impl Kernel<f64> for Behind<'_> {
     }
 }
 
-/// The noise of the frames, from how the still scene differs from one to the next; grey levels.
-pub(super) fn learn_noise(noise: f64, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
+/// The noise of the frames, from how the still scene differs from one to the next; grey levels. `noise`: what it was before, if that is known.
+pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
     let every = (frame.data().len() / SAMPLES).max(1) | 1;
     let pairs = frame.data().iter().zip(previous.data()).step_by(every);
     let mut off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
     let now = MAD * median(&mut off) / std::f64::consts::SQRT_2;
-    (noise + NOISE_RATE * (now - noise)).max(LEAST_NOISE)
+    noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(LEAST_NOISE)
 }

@@ -16,6 +16,8 @@ pub(super) struct View {
     pub seen: Vec<f64>,
     /// Background; NaN where it was never seen, or outside the picture.
     pub behind: Vec<f64>,
+    /// The same with a guess where it was never seen.
+    pub guess: Vec<f64>,
 }
 
 /// What a view amounts to.
@@ -23,6 +25,8 @@ pub(super) struct View {
 pub(super) struct Look {
     /// Share of the target that is seen, weighed by its contrast.
     pub visibility: f64,
+    /// Mean difference of the target from what is known or thought to be behind it, grey levels.
+    pub contrast: f64,
     /// Points beside the target that look like it, over its area.
     pub leak: f64,
     /// How far those lie on one side, 0 to 1.
@@ -35,6 +39,7 @@ pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background,
     let (mut seen, mut behind) = (Vec::new(), Vec::new());
     places.read(frame, [0.0; 2], &mut seen);
     places.read(&background.picture, [0.0; 2], &mut behind);
+    let guess = behind.clone();
     for at in 0..seen.len() {
         let place = places.get(at);
         if !is_inside(place, frame) {
@@ -43,7 +48,7 @@ pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background,
             behind[at] = f64::NAN;
         }
     }
-    View { seen, behind }
+    View { seen, behind, guess }
 }
 
 /// Whether the target is what is seen at a point; `contrast` is that to the background, where that is known.
@@ -58,6 +63,7 @@ fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
 pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look {
     let near = target.near();
     let (mut hit, mut all, mut area) = (0.0, 0.0, 0.0);
+    let (mut difference, mut count) = (0.0, 0.0);
     let (mut alike, mut sum, mut lengths) = (0.0, [0.0; 2], 0.0);
     for (at, (&a, &t)) in target.a.data().iter().zip(target.t.data()).enumerate() {
         let (seen, behind, bright) = (view.seen[at], view.behind[at], gain * t);
@@ -66,6 +72,8 @@ pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look 
             let contrast = if behind.is_nan() { UNKNOWN } else { (bright - behind).abs() };
             let counts = contrast.min(CONTRAST) * if contrast < 2.5 * noise { 0.1 } else { 1.0 };
             all += counts;
+            difference += (bright - view.guess[at]).abs();
+            count += 1.0;
             // Outside the picture nothing is seen.
             if is_hit(seen, bright, behind, noise) {
                 hit += counts;
@@ -82,6 +90,7 @@ pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look 
         }
     }
     Look {
+        contrast: if count > 0.0 { difference / count } else { 0.0 },
         visibility: if all > 0.0 { hit / all } else { 0.0 },
         leak: if area > 0.0 { alike / area } else { 0.0 },
         one_sided: if lengths > 0.0 { sum[0].hypot(sum[1]) / lengths } else { 0.0 },

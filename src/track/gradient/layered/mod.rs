@@ -18,16 +18,19 @@ mod tell;
 
 use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
+use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{DOUBT, Finding, LEAST, TOUCHED, WELL, YOUNG};
+use find::{DOUBT, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use layers::{Background, Target};
 use look::view;
 use pose::{Increment, Pose};
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 const SURE: f64 = 4.0;
+/// Innovation squared of a target found by looking all around from which on its velocity says nothing.
+const JUMPED: f64 = 100.0;
 /// Frames after a look-alike touched for which it is reckoned with.
 const WARY: usize = 8;
 /// Least information about the rotation, of all there could be.
@@ -74,9 +77,22 @@ pub(super) struct Layered {
     age: usize,
 }
 
+/// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
+pub(super) fn stilled(frame: &Frame<f64>, next: &Frame<f64>) -> Option<Frame<f64>> {
+    let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
+    let seen = [frame, next].map(|frame| Seen::new(frame.clone()));
+    let motion = camera::camera_motion(&seen[0], &seen[1], nowhere, learn::LEAST_NOISE, [0.0; 2]);
+    (motion != [0.0; 2]).then(|| shifted(frame, motion.map(|m| -m)))
+}
+
+/// The filter of a target that is at rest, as far as is known.
+fn begun(at: [f64; 2]) -> GaussMarkovFilter {
+    let dynamics = Dynamics { start: [0.25, 9.0, 1.0], ..Dynamics::default() };
+    GaussMarkovFilter::new(at, dynamics, Velocity::Mean)
+}
+
 impl Layered {
     pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
-        let dynamics = Dynamics { start: [0.25, 9.0, 1.0], ..Dynamics::default() };
         Self {
             freedom: match options.shape {
                 Shape::Similarity => Freedom::Similarity,
@@ -86,7 +102,7 @@ impl Layered {
             target: Target::new(&frame, bounds, learn::PRIOR),
             background: Background::new(&frame, bounds),
             pose: Pose::at(bounds.centre()),
-            filter: GaussMarkovFilter::new(bounds.centre(), dynamics, Velocity::Mean),
+            filter: begun(bounds.centre()),
             rate: [0.0; 6],
             noise: learn::LEAST_NOISE,
             usual: 1.0,
@@ -117,7 +133,9 @@ impl Layered {
             self.filter.predict();
             self.miss();
             self.tell(state, None, [0.0; 2]);
-            state.reason = "the frame cannot be used";
+            (state.reason, state.reacquired) = ("the frame cannot be used", false);
+            let size = self.previous.frame.size();
+            self.hold_beyond_the_border(state, size);
             return;
         };
         let bounds = self.bounds(&self.pose);
@@ -156,9 +174,7 @@ impl Layered {
 
     fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
         if motion == [0.0; 2] {
-            if self.age > 0 {
-                self.noise = learn::learn_noise(self.noise, &self.previous.frame, frame);
-            }
+            self.noise = learn::learn_noise((self.age > 0).then_some(self.noise), &self.previous.frame, frame);
             return;
         }
         self.background.moved(motion, frame);
@@ -228,6 +244,10 @@ impl Layered {
             own + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
         });
         let step = self.before.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
+        if found.reason == SEARCHED && found.nis > JUMPED {
+            // Nobody moves like that: it is begun anew where it was found.
+            self.filter = begun(at);
+        }
         if occluded && !self.hidden {
             self.filter.x.iter_mut().for_each(|x| x[2] *= 0.3);
         }

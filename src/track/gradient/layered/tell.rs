@@ -25,7 +25,8 @@ impl Layered {
         let half = [0.5 * bounds.width, 0.5 * bounds.height];
         let lengths = [width as f64, height as f64];
         let position = self.filter.position();
-        let outside = (0..2).any(|k| position[k] < -half[k] || position[k] > lengths[k] - 1.0 + half[k]);
+        // One that waits there is still out.
+        let outside = (0..2).any(|k| position[k] <= -half[k] || position[k] >= lengths[k] - 1.0 + half[k]);
         if !outside {
             return;
         }
@@ -34,7 +35,7 @@ impl Layered {
             (self.filter.x[k][1], self.filter.x[k][2]) = (0.0, 0.0);
         }
         self.pose = self.placed(self.pose, self.filter.position());
-        state.position = self.filter.position();
+        self.tell_motion(state);
         (state.status, state.reason) = if self.missed >= LOST_AFTER {
             (TrackStatus::Lost, "out of the picture for long")
         } else {
@@ -49,21 +50,31 @@ impl Layered {
             None if self.missed >= LOST_AFTER => (TrackStatus::Lost, "not seen for long"),
             None => (TrackStatus::Coasting, "the target is not seen"),
         };
-        state.position = self.filter.position();
-        state.scene_velocity = self.filter.speed();
-        state.velocity = [0, 1].map(|k| state.scene_velocity[k] + motion[k]);
-        state.acceleration = self.filter.acceleration();
         state.camera_motion = motion;
         let measured = self.position(&self.pose);
         let before = state.bounds.centre();
         state.displacement = if found.is_some() { [0, 1].map(|k| measured[k] - before[k]) } else { [f64::NAN; 2] };
-        state.covariance = self.filter.covariance();
-        state.bounds = self.bounds(&self.pose);
+        self.tell_motion(state);
         (state.scale, state.rotation) = (self.pose.scale(), self.turned);
         state.rotation_observable = self.rotation_told;
         state.visibility = found.map_or(0.0, |found| found.look.visibility);
         state.innovation = found.map_or(f64::NAN, |found| found.nis);
-        state.line_of_sight = state.position;
         state.flow_count = 0;
+    }
+
+    /// What the filter says, and the box there.
+    fn tell_motion(&self, state: &mut TrackState) {
+        let (speed, motion) = (self.filter.speed(), state.camera_motion);
+        // The filter's velocity is relative to the scene, or to the picture for a target that the camera follows.
+        (state.velocity, state.scene_velocity) = if self.with_camera {
+            (speed, [0, 1].map(|k| speed[k] - motion[k]))
+        } else {
+            ([0, 1].map(|k| speed[k] + motion[k]), speed)
+        };
+        state.position = self.filter.position();
+        state.line_of_sight = state.position;
+        state.acceleration = self.filter.acceleration();
+        state.covariance = self.filter.covariance();
+        state.bounds = self.bounds(&self.pose);
     }
 }
