@@ -71,9 +71,8 @@ impl<T: SimdReal> Places<'_, T> {
         let least = self.origin.map(|o| T::from_f64(o + 1.0));
         let most = [self.frame.width(), self.frame.height()];
         let most: [T; 2] = std::array::from_fn(|k| T::from_f64(self.origin[k] + most[k] as f64 - 2.0));
-        x.iter()
-            .zip(y)
-            .fold(true, |all, (&x, &y)| all & (x >= least[0]) & (x < most[0]) & (y >= least[1]) & (y < most[1]))
+        let deep = |at: T, k: usize| at >= least[k] && at < most[k];
+        x.iter().zip(y).all(|(&x, &y)| deep(x, 0) && deep(y, 1))
     }
 
     /// One vector of places of which [`Self::all_deep`] holds.

@@ -17,11 +17,10 @@ impl<T: SimdReal> Kernel<T> for AllFinite<'_, T> {
     fn run<V: Lanes<Scalar = T>>(self) -> bool {
         let vectors = self.0.chunks_exact(V::LANES);
         let mut rest = vectors.remainder().iter();
-        // A finite sample less itself is zero, any other is NaN; and NaN stays.
+        // A finite sample times zero is zero, any other is NaN; and NaN stays.
         let mut sum = V::zero();
         for vector in vectors {
-            let samples = V::load(vector);
-            sum = sum + (samples - samples);
+            sum = sum + V::load(vector) * V::zero();
         }
         let mut lanes = vec![T::nan(); V::LANES];
         sum.store(&mut lanes);

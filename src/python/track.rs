@@ -161,9 +161,9 @@ pub fn detect(
 ) -> PyResult<Option<([f64; 4], [f64; 2])>> {
     let (first, second) = pair(first, second)?;
     let (width, height) = first.size();
-    if let Some(at) = center.filter(|at| !at.iter().all(|at| at.is_finite())) {
+    if let Some([x, y]) = center.filter(|at| !at.iter().all(|at| at.is_finite())) {
         let expected = format!("a point (x, y) in the {width} x {height} frames");
-        return Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])).into());
+        return Err(Error::argument("center", expected, format!("({x}, {y})")).into());
     }
     let found = py.detach(|| detect_moving_target(&first, &second, center));
     Ok(found.map(|MovingTarget { bounds: TargetBox { x, y, width, height }, displacement }| {

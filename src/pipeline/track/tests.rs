@@ -77,9 +77,9 @@ fn every_target_has_a_row_a_frame_numbered_as_in_the_input() {
     let text = std::fs::read_to_string(folder.path().join("t.csv")).unwrap();
     let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 8);
-    assert_eq!(rows[0][..3], ["1", "5", "tracking"]);
-    assert_eq!(rows[5][..3], ["2", "9", "lost"]);
-    assert_eq!((rows[7][0], rows[7][1], rows[7][5], rows[7][26]), ("2", "11", "15", "40"));
+    assert_eq!(rows[0][..4], ["1", "5", "nan", "tracking"]);
+    assert_eq!(rows[5][..4], ["2", "9", "nan", "lost"]);
+    assert_eq!((rows[7][0], rows[7][1], rows[7][6], rows[7][27]), ("2", "11", "15", "40"));
     let boxes = read_mot(folder.path().join("t.txt")).unwrap();
     assert_eq!(boxes.len(), 6, "without the frame where both are lost");
     assert_eq!((boxes[0].frame, boxes[0].bounds.x), (5, 3.5));

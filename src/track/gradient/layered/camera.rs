@@ -94,7 +94,9 @@ fn reduced(frame: &Frame<f64>, factor: usize) -> Frame<f64> {
             let squares = frame.row(j).chunks_exact(factor);
             target.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square.iter().sum::<f64>());
         }
-        target.iter_mut().for_each(|sum| *sum /= (factor * factor) as f64);
+        for sum in target {
+            *sum /= (factor * factor) as f64;
+        }
     }
     smooth(&small, SIGMA)
 }
