@@ -253,7 +253,7 @@ def refine_flow(
 
 @dataclass(frozen=True, eq=False)
 class MeanFlow:
-    """What moves in a frame, and where to: M. Chiba and S. Ozawa, equation (11)."""
+    """What moves in a frame, px/frame, and where: M. Chiba and S. Ozawa, equation (11)."""
 
     velocity: Array
     """Mean flow (u, v) over the pixels that move, px/frame; zero where nothing does."""
@@ -274,7 +274,7 @@ def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
 
 @dataclass(frozen=True, eq=False)
 class MovingTarget:
-    """The first thing that moves."""
+    """The first thing that moves; lengths in px."""
 
     box: Array
     """Its box (x, y, width, height) in the second frame, px."""
@@ -334,7 +334,7 @@ class GaussMarkovFilter:
         self._filter = _GaussMarkovFilter(place, alpha, q, variances, measures)
 
     def predict(self) -> None:
-        """Goes to the next frame (19)(20)."""
+        """Goes to the next frame (19)(20); the unit of time is the frame, lengths are in px."""
         self._filter.predict()
 
     def update(
