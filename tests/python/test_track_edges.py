@@ -218,3 +218,8 @@ def test_every_frame_size_is_followed_alike():
         found = track.track(frames, (*corner, 6, 6))
         assert found.status[-1] == "tracking"
         np.testing.assert_allclose(found.position[-1] - corner, (3 + 7, 3), atol=0.5)
+
+
+def test_an_ellipse_that_breathes_is_held_by_the_affine_model():
+    scene = tracking_hard_scenes.breathing_ellipse()
+    assert success(scene, follow(scene, model="affine")) >= 0.98

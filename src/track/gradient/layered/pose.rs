@@ -41,6 +41,14 @@ impl Pose {
         (a * d - b * c).abs().sqrt()
     }
 
+    /// How much longer than at first it is along the picture's axes, turning apart: the diagonal of `S` in `A = S R`, `S` being the root of `A A'`.
+    pub fn stretch(&self) -> [f64; 2] {
+        let square = self.a.map(|row| row[0] * row[0] + row[1] * row[1]);
+        let root = self.scale().powi(2);
+        let norm = (square[0] + square[1] + 2.0 * root).sqrt();
+        square.map(|s| if norm > 0.0 { (s + root) / norm } else { 0.0 })
+    }
+
     /// Angle turned, rad in (-pi, pi], from x towards y: that of the nearest similarity.
     pub fn angle(&self) -> f64 {
         let [[a, b], [c, d]] = self.a;
@@ -78,5 +86,9 @@ mod tests {
         let upright = turned.upright();
         assert!(upright.angle().abs() < 1e-12 && (upright.scale() - 2.0).abs() < 1e-12);
         assert_eq!(turned.reach([3.0, 1.0]), [2.0, 6.0]);
+        assert_eq!(turned.stretch(), [2.0, 2.0]);
+        // Turned by a right angle and then stretched along y.
+        let stretched = Pose { p: [0.0; 2], a: [[0.0, -1.0], [3.0, 0.0]] };
+        assert!((stretched.stretch()[0] - 1.0).abs() < 1e-12 && (stretched.stretch()[1] - 3.0).abs() < 1e-12);
     }
 }

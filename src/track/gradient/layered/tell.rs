@@ -12,8 +12,8 @@ impl Layered {
     /// Upright box of the target at a pose.
     pub(super) fn bounds(&self, pose: &Pose) -> TargetBox {
         let [width, height] = self.target.extent();
-        let columns = [pose.a[0][0].hypot(pose.a[1][0]), pose.a[0][1].hypot(pose.a[1][1])];
-        TargetBox::about(self.position(pose), width * columns[0], height * columns[1])
+        let [across, down] = pose.stretch();
+        TargetBox::about(self.position(pose), width * across, height * down)
     }
 
     /// A target that has left the picture waits at its border.
