@@ -195,3 +195,7 @@ def test_one_step_has_the_published_gain_and_refining_removes_it():
         for order, want in ((4, four), (2, two)):
             flow = track.local_flow(first, second, window=5, order=order, min_sigma=0.0, cond_max=1e9, step_max=1e9)
             assert np.nanmean(flow.flow[inside][..., 0]) == pytest.approx(want, abs=0.01), (step, order)
+    for step, most in tracking_flow.REFINED.items():
+        refined = track.refine_flow(*tracking_flow.shifted_texture(step), window=5, min_sigma=0.0, cond_max=1e9, step_max=1e9)
+        wrong = refined.flow[14:-14, 14:-14] - (step, -step / 2)
+        assert np.sqrt(np.mean(wrong**2)) <= most, step

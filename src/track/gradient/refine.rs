@@ -1,9 +1,10 @@
 //! Local flow refined by warping, (9), and from coarse pictures to fine ones.
 
 use super::equations::Equations;
-use super::kernels::kernels_of;
+use super::kernels::{REACH, kernels_of};
 use super::local_flow::{LocalFlow, LocalFlowOptions, median};
-use crate::image::Interpolation;
+use crate::image::Spline;
+use crate::simd::Level;
 use crate::types::Frame;
 
 /// How flow is refined.
@@ -26,7 +27,7 @@ impl Default for RefineOptions {
 /// Side of the square that the median of the field is taken over between levels, px.
 const MEDIAN: usize = 5;
 
-/// Flow of single pixels from the first frame to the second, refined by warping with cubic convolution (9)(10), coarse to fine; motions up to about 3 px.
+/// Flow of single pixels from the first frame to the second, refined by warping with cubic splines (9)(10), coarse to fine; motions up to about 3 px.
 ///
 /// At a level a pixel goes on as long as the residual of its window strictly falls. Pixels without a solution keep what the level before found.
 pub fn refine_flow(first: &Frame<f64>, second: &Frame<f64>, options: &RefineOptions) -> LocalFlow {
@@ -39,7 +40,9 @@ pub fn refine_flow(first: &Frame<f64>, second: &Frame<f64>, options: &RefineOpti
         let local = LocalFlowOptions { window, ..options.local };
         accepted = refine_level(&a, &b, &local, options.steps, &mut field);
         if n + 1 < options.levels.len() {
-            field = median_field(&field);
+            // Of the mean, the masks, the window, and of what the median takes from beyond.
+            let margin = side / 2 + REACH + window / 2 + MEDIAN / 2;
+            field = continued(&median_field(&field), margin + REACH);
         }
     }
     LocalFlow { flow: field, accepted }
@@ -60,8 +63,9 @@ fn refine_level(
     let mut active = Frame::filled(width, height, true);
     let mut accepted = Frame::filled(width, height, false);
     let mut trial = field.clone();
+    let second = Between::new(second);
     for step in 0..=steps {
-        let equations = Equations::new(first, &warped(second, &trial), kernels, options.window);
+        let equations = Equations::new(first, &second.warped(&trial), kernels, options.window);
         for at in 0..width * height {
             if !active.data()[at] {
                 continue;
@@ -87,12 +91,57 @@ fn refine_level(
     accepted
 }
 
-/// `frame(p + flow(p))` by cubic convolution.
-fn warped(frame: &Frame<f64>, field: &Frame<[f64; 2]>) -> Frame<f64> {
-    Frame::from_fn(frame.width(), frame.height(), |x, y| {
-        let [u, v] = field.get(x, y);
-        Interpolation::Bicubic.at(frame, x as f64 + u, y as f64 + v)
-    })
+/// A frame that is read between its pixels: as a cubic spline, whose error is far below that of cubic convolution on fine texture.
+struct Between<'a> {
+    frame: &'a Frame<f64>,
+    spline: Spline<f64>,
+    whole: bool,
+}
+
+impl<'a> Between<'a> {
+    fn new(frame: &'a Frame<f64>) -> Self {
+        let known: Vec<f64> = frame.data().iter().copied().filter(|v| v.is_finite()).collect();
+        // What is not known must not spread over the spline.
+        let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        let mut spline = Spline::default();
+        spline.refill(Level::detect(), &frame.map(|v| if v.is_finite() { *v } else { mean }));
+        Self { frame, spline, whole: known.len() == frame.data().len() }
+    }
+
+    /// `frame(p + flow(p))`; NaN beyond the border and where any of the sixteen pixels around is not known.
+    fn warped(&self, field: &Frame<[f64; 2]>) -> Frame<f64> {
+        let (width, height) = self.frame.size();
+        let mut out = Frame::filled(width, height, f64::NAN);
+        for y in 0..height {
+            let along: Vec<f64> = field.row(y).iter().enumerate().map(|(x, w)| x as f64 + w[0]).collect();
+            let down: Vec<f64> = field.row(y).iter().map(|w| y as f64 + w[1]).collect();
+            self.spline.sample_row(Level::detect(), &along, &down, out.row_mut(y));
+            for (value, (x, y)) in out.row_mut(y).iter_mut().zip(along.iter().zip(&down)) {
+                if !self.is_known(*x, *y) {
+                    *value = f64::NAN;
+                }
+            }
+        }
+        out
+    }
+
+    fn is_known(&self, x: f64, y: f64) -> bool {
+        let (width, height) = self.frame.size();
+        let inside = x >= 0.0 && y >= 0.0 && x <= width as f64 - 1.0 && y <= height as f64 - 1.0;
+        let near = |at: f64, length: usize| (at as usize).saturating_sub(1)..(at as usize + 3).min(length);
+        inside
+            && (self.whole || near(y, height).all(|j| self.frame.row(j)[near(x, width)].iter().all(|v| v.is_finite())))
+    }
+}
+
+/// The field goes on towards the border, where windows reach over it, as it is `margin` px from there: what stayed at rest there would pull its neighbours back.
+fn continued(field: &Frame<[f64; 2]>, margin: usize) -> Frame<[f64; 2]> {
+    let (width, height) = field.size();
+    if width <= 2 * margin || height <= 2 * margin {
+        return field.clone();
+    }
+    let within = |at: usize, length: usize| at.clamp(margin, length - 1 - margin);
+    Frame::from_fn(width, height, |x, y| field.get(within(x, width), within(y, height)))
 }
 
 /// Mean over a square of `side` px (odd); NaN where it reaches over the border.
