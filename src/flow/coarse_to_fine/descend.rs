@@ -94,8 +94,9 @@ impl Plan {
         }
         space.keep(old);
         let scale = step.scale;
-        // The data term itself is not kept: what comes next needs the memory.
-        Found { motion, data: summary(space, &data), scale }
+        let summary = summary(space, &data);
+        space.keep_small(data);
+        Found { motion, data: summary, scale }
     }
 }
 

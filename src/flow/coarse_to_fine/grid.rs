@@ -32,8 +32,16 @@ impl<T: SimdReal> Planes<T> {
         (self.width, self.height, self.count) = (width, height, count);
         let len = self.row_len() * height;
         if len > self.data.len() {
+            // A new vector instead of a longer one: the content need not be copied.
+            self.data.clear();
             self.data.resize(len, T::from_f64(0.0));
         }
+    }
+
+    /// Lets go of memory beyond the content.
+    pub fn shrink(&mut self) {
+        self.data.truncate(self.row_len() * self.height);
+        self.data.shrink_to_fit();
     }
 
     /// Samples that there is memory for.

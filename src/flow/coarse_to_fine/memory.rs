@@ -34,6 +34,13 @@ impl<T: SimdReal> Space<T> {
         }
     }
 
+    /// Takes planes back that are most of an estimate's memory: of large frames they are let go of, since what comes next needs the memory.
+    pub fn keep_small(&self, planes: Planes<T>) {
+        if planes.room() * size_of::<T>() <= LIMIT / 4 {
+            self.keep(planes);
+        }
+    }
+
     /// Samples that are free.
     fn room(&self) -> usize {
         lock(&self.free).iter().map(Planes::room).sum()
@@ -50,15 +57,26 @@ pub(super) struct Workspace<T> {
 }
 
 impl<T: SimdReal> Workspace<T> {
-    /// Lets go of what is free, where there is much: results need memory of their own.
-    pub fn trim(&self) {
+    /// Lets go of all memory but what is `needed`, where there is much: the motion is found, and results need memory of their own.
+    pub fn trim<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
         if self.bytes() > LIMIT {
-            lock(&self.space.free).clear();
+            *self = Self::default();
+            needed.for_each(Planes::shrink);
+            give_back();
         }
     }
 
     fn bytes(&self) -> usize {
         (self.pyramid.samples() + self.space.room()) * size_of::<T>()
+    }
+}
+
+/// Hands freed memory back to the system. The GNU allocator keeps blocks of up to 32 MiB for later, among them most of ours, while results are too large to fit in.
+fn give_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: takes no pointer, and may be called at any time from any thread.
+    unsafe {
+        libc::malloc_trim(0);
     }
 }
 

@@ -50,8 +50,8 @@ impl CoarseToFine {
             let last = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
             let plan = Plan { simd, effort, range, last };
             let changes = frames.len() == 3 && !self.options.central;
-            let estimate = estimate(&plan, changes, &mut workspace);
-            workspace.trim();
+            let mut estimate = estimate(&plan, changes, &mut workspace);
+            workspace.trim(estimate.planes_mut());
             output::fill(&estimate, &workspace.space, frames, common, field);
             estimate.keep(&mut workspace);
             self.memory.give(workspace);
@@ -97,6 +97,12 @@ pub(super) struct Estimate<T> {
 }
 
 impl<T: SimdReal> Estimate<T> {
+    /// All its planes.
+    fn planes_mut(&mut self) -> impl Iterator<Item = &mut Planes<T>> {
+        let evidence = self.evidence.iter_mut().chain(&mut self.change).flat_map(Evidence::planes_mut);
+        evidence.chain([&mut self.motion, &mut self.data])
+    }
+
     /// Gives its memory back.
     fn keep(self, workspace: &mut Workspace<T>) {
         let evidence = self.evidence.into_iter().chain(self.change).flat_map(Evidence::into_planes);

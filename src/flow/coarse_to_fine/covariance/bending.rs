@@ -1,7 +1,8 @@
 //! What smoothing takes away from bent flow.
 //!
 //! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
-//! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance.
+//! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance; a share of that
+//! of the slopes goes any way.
 //!
 //! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so
 //! the motion loses `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
@@ -20,6 +21,8 @@ const SIGMA: f64 = 6.0;
 const WIDER: f64 = 1.25;
 /// The narrowest window that has one of its own, px.
 const NARROWEST: f64 = 3.5;
+/// Share of the slopes' squared errors that goes any way, not that of what is lost: turbulence without divergence bends without it, yet its estimate diverges.
+const ANY_WAY: f64 = 0.2;
 /// Places that one thread smooths at a time.
 const PIECE: usize = 1024;
 /// Planes of the motion.
@@ -42,16 +45,24 @@ pub(super) fn bending<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>, s
     let mut products = vec![[0.0; ENTRIES]; size.0 * size.1];
     for (losses, shares) in [(lost(motion, size), shares.fixed), (lost_to_windows(motion, evidence), shares.chosen)] {
         for (out, loss) in products.iter_mut().zip(losses) {
-            let scaled: Loss = std::array::from_fn(|k| loss[k] * shares[usize::from(k >= 2)]);
-            for i in 0..MOTION {
-                for j in i..MOTION {
-                    out[upper(i, j)] += scaled[i] * scaled[j];
-                }
-            }
+            add_loss(out, &loss, shares);
         }
     }
     soften(&mut products, size);
     products
+}
+
+/// Adds the errors that go with a loss.
+fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
+    let energy = shares[1].powi(2) * loss[2..].iter().map(|slope| slope * slope).sum::<f64>();
+    let kept = [1.0, (1.0 - ANY_WAY).sqrt()];
+    let scaled: Loss = std::array::from_fn(|k| loss[k] * shares[usize::from(k >= 2)] * kept[usize::from(k >= 2)]);
+    for i in 0..MOTION {
+        for j in i..MOTION {
+            out[upper(i, j)] += scaled[i] * scaled[j];
+        }
+    }
+    (2..MOTION).for_each(|k| out[upper(k, k)] += ANY_WAY * energy / 4.0);
 }
 
 /// The motion at a place.

@@ -38,7 +38,7 @@ const AMPLITUDE: f64 = 0.06;
 /// White noise in the difference of two frames over that in half the difference of the outer ones of three.
 const AHEAD_ENERGY: f64 = 4.0;
 /// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: what the next frame alone has beside what all three have.
-const CHANGE: f64 = 0.75;
+const CHANGE: f64 = 0.55;
 /// Share of the acceleration, px/frame^2, that a triple takes for motion.
 const ACCELERATION: f64 = 0.015;
 

@@ -26,6 +26,11 @@ impl<T: SimdReal> Evidence<T> {
         Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
     }
 
+    /// What the memory is.
+    pub fn planes_mut(&mut self) -> [&mut Planes<T>; 2] {
+        [&mut self.means, &mut self.choice]
+    }
+
     /// The memory.
     pub fn into_planes(self) -> [Planes<T>; 2] {
         [self.means, self.choice]
