@@ -1,6 +1,6 @@
 //! The gradient equation in the windows around all pixels, summed: M. Chiba and S. Ozawa, equations (5) to (8).
 
-use super::kernels::{DerivativeKernels, REACH, SIDE};
+use super::kernels::{DerivativeKernels, REACH};
 use super::local_flow::LocalFlowOptions;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
@@ -110,6 +110,8 @@ impl Build<'_> {
     }
 
     /// Derivatives along x and y of the mean of both frames, and by time of their smoothed difference; row-major, nothing along the border.
+    ///
+    /// The masks are even or odd along each axis: rows and columns as far above as below are added or subtracted first, which leaves a fourth of the products.
     #[inline(always)]
     fn derivatives<V: Lanes<Scalar = f64>>(&self) -> [Vec<f64>; 3] {
         let (width, height) = self.first.size();
@@ -117,17 +119,28 @@ impl Build<'_> {
         let frames = self.first.data().iter().zip(self.warped.data());
         let (mean, difference): (Vec<f64>, Vec<f64>) = frames.map(|(a, b)| (0.5 * (a + b), b - a)).unzip();
         let mut out = std::array::from_fn(|_| vec![0.0; width * height]);
+        let mut folded: [Folded; REACH + 1] = std::array::from_fn(|_| Folded::new(width));
         for y in REACH..height - REACH {
+            for (k, folded) in folded.iter_mut().enumerate() {
+                let (above, below) = ((y - k) * width..(y - k + 1) * width, (y + k) * width..(y + k + 1) * width);
+                folded.fill::<V>(
+                    k,
+                    [&mean[above.clone()], &mean[below.clone()]],
+                    [&difference[above], &difference[below]],
+                );
+            }
             for x in starts::<V>(REACH..width - REACH) {
-                let corner = (y - REACH) * width + x - REACH;
                 let (mut dx, mut dy, mut dt) = (V::zero(), V::zero(), V::zero());
-                for j in 0..SIDE {
-                    for i in 0..SIDE {
-                        let at = corner + j * width + i;
-                        let (value, change) = (V::load(&mean[at..]), V::load(&difference[at..]));
-                        dx = value.mul_add(V::splat(x_mask[j][i]), dx);
-                        dy = value.mul_add(V::splat(y_mask[j][i]), dy);
-                        dt = change.mul_add(V::splat(mask[j][i]), dt);
+                for (k, Folded { sum, rise, change }) in folded.iter().enumerate() {
+                    let (mask, x_mask, y_mask) = (&mask[REACH + k], &x_mask[REACH + k], &y_mask[REACH + k]);
+                    dy = V::load(&rise[x..]).mul_add(V::splat(y_mask[REACH]), dy);
+                    dt = V::load(&change[x..]).mul_add(V::splat(mask[REACH]), dt);
+                    for i in 1..=REACH {
+                        let around = |line: &[f64]| (V::load(&line[x - i..]), V::load(&line[x + i..]));
+                        let ((left, right), (a, b), (c, d)) = (around(sum), around(rise), around(change));
+                        dx = (right - left).mul_add(V::splat(x_mask[REACH + i]), dx);
+                        dy = (a + b).mul_add(V::splat(y_mask[REACH + i]), dy);
+                        dt = (c + d).mul_add(V::splat(mask[REACH + i]), dt);
                     }
                 }
                 for (value, plane) in [dx, dy, dt].into_iter().zip(&mut out) {
@@ -136,6 +149,35 @@ impl Build<'_> {
             }
         }
         out
+    }
+}
+
+/// Two rows, so far above and below a third one, as one.
+struct Folded {
+    /// Their sum in the mean of the frames.
+    sum: Vec<f64>,
+    /// The lower one less the upper one there.
+    rise: Vec<f64>,
+    /// Their sum in the difference of the frames.
+    change: Vec<f64>,
+}
+
+impl Folded {
+    fn new(width: usize) -> Self {
+        let [sum, rise, change] = std::array::from_fn(|_| vec![0.0; width]);
+        Self { sum, rise, change }
+    }
+
+    /// Of the rows `k` above and below; for 0 both are the same one, which counts once.
+    #[inline(always)]
+    fn fill<V: Lanes<Scalar = f64>>(&mut self, k: usize, mean: [&[f64]; 2], difference: [&[f64]; 2]) {
+        let share = V::splat(if k == 0 { 0.5 } else { 1.0 });
+        for x in starts::<V>(0..self.sum.len()) {
+            let [above, below] = [V::load(&mean[0][x..]), V::load(&mean[1][x..])];
+            ((above + below) * share).store(&mut self.sum[x..]);
+            (below - above).store(&mut self.rise[x..]);
+            ((V::load(&difference[0][x..]) + V::load(&difference[1][x..])) * share).store(&mut self.change[x..]);
+        }
     }
 }
 
@@ -150,6 +192,7 @@ fn starts<V: Lanes>(range: Range<usize>) -> impl Iterator<Item = usize> {
 mod tests {
     use super::*;
     use crate::math::random::CounterRng;
+    use crate::track::gradient::kernels::SIDE;
     use crate::track::gradient::kernels::derivative_kernels;
 
     /// Straight from the definition.

@@ -3,6 +3,7 @@
 //! M. Chiba and S. Ozawa, section on the tracking algorithm, equations (11) to (26), with the repairs that it needs: a gate for weak gradients, two starts of the flow, steering by position, a
 //! gate for innovations, and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
+use super::detect::detect_moving_target;
 use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::local_flow::{LocalFlow, LocalFlowOptions, MAD, MeanFlow, median};
 use super::options::{Control, GradientOptions, Mode};
@@ -17,6 +18,10 @@ const FEWEST: usize = 12;
 const GATE: f64 = 16.0;
 /// Refusals in a row after which a measurement is taken all the same.
 const REFUSALS: usize = 3;
+/// Variance of the position and velocity of what is too fast for local flow, px^2: whole pixels, an outline of changed ones.
+const FAST: f64 = 1.0;
+/// Its sides differ from the target's by less than this factor.
+const ALIKE: f64 = 1.6;
 /// Frames without motion after which the target counts as lost.
 const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
@@ -121,7 +126,8 @@ impl LocalLoop {
 
     /// The next frame; `None`: it cannot be used.
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
-        let found = frame.map(|frame| self.measure(frame));
+        let second = frame.map(|frame| self.cut(frame));
+        let found = second.as_ref().map(|second| self.measure(second));
         let was_lost = self.missed >= LOST_AFTER;
         self.filter.predict();
         let (mut innovation, mut measured) = (f64::NAN, false);
@@ -129,10 +135,13 @@ impl LocalLoop {
             Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
                 let place = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
                 let [r_pos, r_vel] = self.rules.variances;
-                let z =
+                let mut z =
                     Measurement { position: Some((place, [r_pos; 2])), velocity: Some((mean.velocity, [r_vel; 2])) };
                 innovation = self.filter.innovation(&z);
-                if !self.rules.careful || innovation < GATE || self.refused >= REFUSALS {
+                let fast = second.as_ref().filter(|_| self.rules.careful && innovation >= GATE);
+                let fast = fast.and_then(|second| self.too_fast(second));
+                z = fast.unwrap_or(z);
+                if !self.rules.careful || innovation < GATE || fast.is_some() || self.refused >= REFUSALS {
                     self.filter.update(&z);
                     (self.refused, measured) = (0, true);
                 } else {
@@ -155,12 +164,27 @@ impl LocalLoop {
         self.tell(state, found, (innovation, measured, was_lost));
     }
 
-    /// What moves in the window between the last frame and this one.
-    fn measure(&self, frame: &Frame<f64>) -> MeanFlow {
-        let (first, second) = (&self.before, self.cut(frame));
+    /// A target that moves farther from what is expected than local flow reaches, seen in the `second` window.
+    fn too_fast(&self, second: &Frame<f64>) -> Option<Measurement> {
+        let (corner, expected, speed) = (self.corner(), self.filter.position(), self.filter.speed());
+        let near = [0, 1].map(|k| expected[k] - corner[k]);
+        let found = detect_moving_target(&self.before, second, Some(near))?;
+        let unlike = (0..2).any(|k| (found.displacement[k] - speed[k]).abs() > self.rules.flow.step_max);
+        let alike = |found: f64, known: f64| (found / known).max(known / found) < ALIKE;
+        let same = alike(found.bounds.width, self.size[0]) && alike(found.bounds.height, self.size[1]);
+        let centre = found.bounds.centre();
+        (unlike && same).then(|| Measurement {
+            position: Some(([0, 1].map(|k| centre[k] + corner[k]), [FAST; 2])),
+            velocity: Some((found.displacement, [FAST; 2])),
+        })
+    }
+
+    /// What moves in the window between the last frame and the `second`, which is that of this one.
+    fn measure(&self, second: &Frame<f64>) -> MeanFlow {
+        let first = &self.before;
         let velocity = self.filter.speed();
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
-        let mut flow = self.rules.flow.flow_from(first, &second, starts);
+        let mut flow = self.rules.flow.flow_from(first, second, starts);
         self.keep_window(&mut flow);
         let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
         let mut mean = flow.mean(eps);

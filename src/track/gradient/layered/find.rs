@@ -9,6 +9,8 @@ use crate::types::Frame;
 
 /// Deviations of the increment from the prediction: of the position, px, and of size and angle.
 const PRIOR: [f64; 2] = [3.0, 0.02];
+/// That of size and angle where a look-alike touches, whose pull may go a long way with the target.
+const STIFF: f64 = 0.005;
 /// Levels of a frame like the one before, and of one after an interruption; px.
 const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Least visibility of a target that is seen well.
@@ -29,6 +31,8 @@ const LEAK: f64 = 0.06;
 const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said then.
 pub(super) const TOUCHED: &str = "something like the target touches it";
+/// What is said where it did a moment ago, and its pull may still be felt.
+const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
 /// What is said of a target that was looked for.
 pub(super) const SEARCHED: &str = "found by looking all around";
 /// Growth from one frame to the next that a look-alike makes.
@@ -86,8 +90,9 @@ impl Layered {
         if (doubted || interrupted) && self.age >= YOUNG {
             best = self.covered(frame, plain, levels).or(best);
         }
-        if best.is_some_and(|found| !found.occluded && self.is_touched(&found)) {
-            best = self.touched(frame, levels).or(best);
+        let touched = best.filter(|found| !found.occluded).and_then(|found| self.is_touched(&found));
+        if let Some(reason) = touched {
+            best = self.touched(frame, levels, reason).or(best);
         }
         if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
             best = self.searched(frame).or(best);
@@ -108,18 +113,21 @@ impl Layered {
         taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
     }
 
-    /// Whether something that looks like the target touches it: much of it beside the target, on one side. While that is so, or was a moment ago, what pulls the target out of its way or makes it grow
-    /// is the look-alike too.
-    fn is_touched(&self, found: &Finding) -> bool {
+    /// Whether something that looks like the target touches it: much of it beside the target, on one side. A moment after that was so, what pulls the target out of its way or makes it grow
+    /// is still the look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would differ the more the longer it lasts.
+    fn is_touched(&self, found: &Finding) -> Option<&'static str> {
+        if found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1 {
+            return Some(TOUCHED);
+        }
         let grown = (found.aligned.pose.scale() / self.pose.scale() - 1.0).abs() > GROWN;
-        found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1 || self.wary > 0 && (found.nis > SURE || grown)
+        (self.wary > 0 && (found.nis > SURE || grown)).then_some(TOUCHED_BEFORE)
     }
 
     /// Something that looks like the target touches it.
-    fn touched(&self, frame: &Frame<f64>, levels: &[f64]) -> Option<Finding> {
-        let how = (Freedom::Translation, Silence::Lookalike, [self.spread(), PRIOR[1]], levels);
+    fn touched(&self, frame: &Frame<f64>, levels: &[f64], reason: &'static str) -> Option<Finding> {
+        let how = (self.freedom, Silence::Lookalike, [self.spread(), STIFF], levels);
         let found = self.try_at(frame, &self.expected(false), how)?;
-        Some(Finding { occluded: true, reason: TOUCHED, ..found })
+        Some(Finding { occluded: true, reason, ..found })
     }
 
     /// All around, in whole pixels, and then as usual.
