@@ -16,6 +16,7 @@ import numpy as np
 
 import tracking_flow
 import tracking_hard_scenes as hard_scenes
+import tracking_large
 import tracking_scenes as scenes
 from trackers import Tracker, everyone, ours
 from tracking_scores import NEAR, Truth, scores
@@ -23,7 +24,7 @@ from tracking_scenes import Scene
 
 Row = dict[str, object]
 Figures = dict[str, float]
-NAMES = ("parts", "published", "hard", "others win", "simulations", "sequences", "recordings")
+NAMES = ("parts", "published", "hard", "others win", "simulations", "sequences", "large", "recordings")
 HARD_TITLE = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 BARS = {"success": ">= 1", "centre_error": "<= 0.10 (S3 0.20)", "displacement_error": "<= 0.08", "scale_error": "<= 0.06", "angle_error": "<= 5"}
 """Asked of `layered` on the published scenes."""
@@ -44,6 +45,7 @@ def sections(quick: bool, data: Path | None, trackers: list[Tracker] | None = No
         "others win": ("Tracking, scenes in which others win", lambda: comparison(hard_scenes.others_win(), with_affine(chosen))),
         "simulations": ("Tracking, Simulations 1 to 3", lambda: comparison(list(scenes.simulations()), chosen, MEAN_ASKED["simulations"])),
         "sequences": ("Tracking, 96 sequences of Simulations 1 to 3", lambda: [] if quick else summary(list(scenes.sequences()), own)),
+        "large": ("Tracking, a large target", lambda: large(chosen)),
         "recordings": ("Tracking, recordings", lambda: [] if data is None else recordings(data, chosen)),
     }
     made = {title: make() for name, (title, make) in makers.items() if name in names}
@@ -108,6 +110,16 @@ def summary(tested: list[Scene], trackers: list[Tracker]) -> list[Row]:
             end = np.linalg.norm(track.centres[-1] - truth.centres[-1])
             found[tracker.name].append({**scores(track, truth), "followed": float(end <= NEAR)})
     return [{"tracker": name, "scenes": len(tested), **_means(each)} for name, each in found.items()]
+
+
+def large(trackers: list[Tracker]) -> list[Row]:
+    """One row for each scene and tracker: CPU time of a frame, and how well it was followed. KCF is the bar for our time with a camera that stands still."""
+    kept = ("milliseconds", "success", "centre_error")
+    rows: list[Row] = []
+    for scene in tracking_large.large():
+        for name, figures in run(scene, trackers).items():
+            rows.append({"scene": scene.name, "tracker": name, **{column: figures[column] for column in kept}})
+    return rows
 
 
 def _means(figures: list[Figures]) -> Row:

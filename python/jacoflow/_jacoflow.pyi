@@ -877,7 +877,7 @@ class _GradientTracker:
         bbox: list[float] | None,
         center: list[float] | None,
         method: str,
-        fov: int,
+        fov: int | None,
         control: str,
         model: str,
         camera: str,

@@ -127,7 +127,7 @@ class GradientTracker:
         "layered" (default): target and background as layers, one gradient step over the whole target from the filter's prediction. "local": the paper's loop (local flow in a window, its mean over what moves,
         a Gauss-Markov filter) with the repairs that it needs. "paper": its text to the letter, which loses targets on all but flat backgrounds.
     fov : int, px
-        Side of the window that is looked at ("local", "paper"), made odd; default 51.
+        Side of the window that is looked at ("local", "paper"), made odd; default 51, or 1.6 times the longer side of the box where that is more.
     control : "integer" or "subpixel"
         Whether that window moves in whole pixels (default) or not.
     model : "similarity" or "affine"
@@ -156,7 +156,7 @@ class GradientTracker:
         *,
         center: ArrayLike | None = None,
         method: str = "layered",
-        fov: int = 51,
+        fov: int | None = None,
         control: str = "integer",
         model: str = "similarity",
         camera: str = "auto",
@@ -167,7 +167,7 @@ class GradientTracker:
         box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
         if isinstance(eps, str) and eps != "auto":
             raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
-        if operator.index(fov) < 0:
+        if fov is not None and operator.index(fov) < 0:
             raise ValueError(f"fov: expected at least 15 px, got {fov}")
         slowest = None if eps == "auto" else float(eps)
         self._tracker = _GradientTracker(_frame(frame), box, point, method, fov, control, model, camera, order, window, slowest)

@@ -12,7 +12,7 @@ use crate::pipeline::{
     Begun, Overlays, TableTarget, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary,
     check_target, is_folder,
 };
-use crate::track::gradient::{GradientOptions, Mode, Start};
+use crate::track::gradient::{GradientOptions, Start};
 use crate::track::{GradientTracker, Tracker};
 use crate::types::{Frame, TrackStatus};
 use clap::Args;
@@ -81,7 +81,7 @@ impl TrackCommand {
         let details = self.details(&opened);
         let begin = |frame: &Frame<f64>| {
             let trackers = trackers(frame, &self.targets.starts(), &options)?;
-            Ok(Begun { trackers, sinks: self.sinks(&wanted, &options)? })
+            Ok(Begun { trackers, sinks: self.sinks(&wanted)? })
         };
         let failure = {
             let bar = Bar::new(watch, "track", self.tell.quiet);
@@ -91,13 +91,13 @@ impl TrackCommand {
     }
 
     /// Begins what is written; folders are made.
-    fn sinks(&self, wanted: &[Wanted], options: &GradientOptions) -> Result<Vec<Box<dyn TrackSink>>> {
+    fn sinks(&self, wanted: &[Wanted]) -> Result<Vec<Box<dyn TrackSink>>> {
         if let Some(folder) = self.output.as_deref().filter(|path| *path != Path::new("-") && is_folder(path)) {
             std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
         }
         let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
         if let Some(folder) = &self.overlay {
-            sinks.push(Box::new(Overlays::create(folder, self.drawing(options))?));
+            sinks.push(Box::new(Overlays::create(folder, self.drawing())?));
         }
         for (target, format) in wanted {
             sinks.push(Box::new(TrackRows::create(target, *format)?));
@@ -164,13 +164,9 @@ impl TrackCommand {
         Ok(vec![(TableTarget::File(path.to_path_buf()), by_name)])
     }
 
-    /// How targets are drawn: with the window where the tracker looks through one.
-    fn drawing(&self, options: &GradientOptions) -> TrackOverlay {
-        TrackOverlay {
-            window: (options.mode != Mode::Layered).then_some(options.fov as f64),
-            enlargement: self.enlarge,
-            ..TrackOverlay::default()
-        }
+    /// How targets are drawn.
+    fn drawing(&self) -> TrackOverlay {
+        TrackOverlay { enlargement: self.enlarge, ..TrackOverlay::default() }
     }
 
     fn details(&self, opened: &Opened) -> Value {

@@ -173,6 +173,7 @@ mod tests {
             innovation: 0.3,
             gain: 0.4,
             line_of_sight: [0.5, 0.6],
+            fov: f64::NAN,
             flow_count: 77,
             covariance: [axis(100.0), axis(200.0)],
         }

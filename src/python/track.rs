@@ -37,7 +37,7 @@ impl PyGradientTracker {
         bbox: Option<[f64; 4]>,
         center: Option<[f64; 2]>,
         method: &str,
-        fov: usize,
+        fov: Option<usize>,
         control: &str,
         model: &str,
         camera: &str,

@@ -37,7 +37,7 @@ pub struct TrackerArguments {
     /// gradient: which system follows the target
     #[arg(long, value_enum, value_name = "NAME", default_value = "layered")]
     pub mode: ModeWord,
-    /// Side of the window that is looked at, px (local, paper), made odd [default: 51]
+    /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,
     /// How the window follows the target (local)
@@ -123,7 +123,7 @@ impl TrackerArguments {
                 ModeWord::Local => Mode::Local,
                 ModeWord::Paper => Mode::Paper,
             },
-            fov: self.fov.unwrap_or(defaults.fov),
+            fov: self.fov,
             control: match self.control {
                 ControlWord::Integer => Control::Integer,
                 ControlWord::Subpixel => Control::Subpixel,

@@ -35,8 +35,6 @@ pub fn status_colour(status: TrackStatus) -> Rgb {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackOverlay {
-    /// Side of the window about the line of sight, px; default `None`: not drawn, for trackers that have none.
-    pub window: Option<f64>,
     /// By how much the picture is larger than the frame ([`Picture::enlarged`]); default 1.
     pub enlargement: usize,
     /// Width of the strokes, px of the picture; default 1.3.
@@ -45,7 +43,7 @@ pub struct TrackOverlay {
 
 impl Default for TrackOverlay {
     fn default() -> Self {
-        Self { window: None, enlargement: 1, thickness: 1.3 }
+        Self { enlargement: 1, thickness: 1.3 }
     }
 }
 
@@ -61,7 +59,7 @@ impl TrackOverlay {
         for pair in path.windows(2) {
             self.stroke(picture, pair[0].0, pair[1].0, status_colour(pair[1].1));
         }
-        self.draw_window(picture, state.line_of_sight);
+        self.draw_window(picture, state);
         let corners = box_corners(state);
         self.polygon(picture, &corners, colour);
         self.polygon(picture, &ellipse(state), colour);
@@ -96,9 +94,12 @@ impl TrackOverlay {
         draw_stroke(picture, (x, y - CROSS), (x, y + CROSS), self.thickness, colour);
     }
 
-    /// The window of side `window` about the line of sight, dashed.
-    fn draw_window(&self, picture: &mut Picture, [x, y]: [f64; 2]) {
-        let Some(half) = self.window.map(|side| side / 2.0).filter(|half| *half < LONGEST) else { return };
+    /// The window about the line of sight, dashed.
+    fn draw_window(&self, picture: &mut Picture, state: &TrackState) {
+        let ([x, y], half) = (state.line_of_sight, state.fov / 2.0);
+        if half.is_nan() || half >= LONGEST {
+            return;
+        }
         let corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]];
         for (k, from) in corners.iter().enumerate() {
             self.dashed(picture, *from, corners[(k + 1) % 4]);
@@ -189,9 +190,9 @@ mod tests {
 
     #[test]
     fn path_window_and_status_have_their_colours() {
-        let lost = TrackState { status: TrackStatus::Lost, ..state() };
+        let lost = TrackState { status: TrackStatus::Lost, fov: 30.0, ..state() };
         let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Coasting)];
-        let overlay = TrackOverlay { window: Some(30.0), ..TrackOverlay::default() };
+        let overlay = TrackOverlay::default();
         let picture = drawn(overlay, &lost, &path);
         assert_eq!(picture.pixel(10, 40), status_colour(TrackStatus::Coasting));
         assert_eq!(picture.pixel(30, 15), status_colour(TrackStatus::Lost));
@@ -214,9 +215,9 @@ mod tests {
         let mut unknown = state();
         unknown.bounds.x = f64::NAN;
         unknown.position = [f64::NAN; 2];
-        unknown.line_of_sight = [f64::NAN; 2];
+        (unknown.line_of_sight, unknown.fov) = ([f64::NAN; 2], 51.0);
         unknown.covariance[0][0][0] = f64::NAN;
-        let overlay = TrackOverlay { window: Some(51.0), ..TrackOverlay::default() };
+        let overlay = TrackOverlay::default();
         assert_eq!(drawn(overlay, &unknown, &[]), Picture::filled(64, 48, GREY));
         unknown = state();
         unknown.covariance[1][0][0] = f64::INFINITY;

@@ -4,12 +4,17 @@
 //! gate for innovations, and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
 use super::detect::detect_moving_target;
-use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
-use super::local_flow::{LocalFlow, LocalFlowOptions, MAD, MeanFlow, median};
-use super::options::{Control, GradientOptions, Mode};
+use super::gauss_markov::{GaussMarkovFilter, Measurement};
+use super::local_flow::{LocalFlow, MAD, MeanFlow, median};
+use super::options::{Control, GradientOptions};
+use super::rules::Rules;
 use crate::image::Interpolation;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
+/// Side of the window of small targets, px.
+const FOV: usize = 51;
+/// Side of the window over that of a large target.
+const ROOM: f64 = 1.6;
 /// Pixels around the window that masks need.
 const MARGIN: usize = 6;
 /// Fewest moving pixels that a target is.
@@ -26,60 +31,6 @@ const ALIKE: f64 = 1.6;
 const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
 const LEAST_EPS: f64 = 0.3;
-
-/// What is done, in all that the modes differ by.
-#[derive(Debug, Clone)]
-pub(super) struct Rules {
-    flow: LocalFlowOptions,
-    dynamics: Dynamics,
-    velocity: Velocity,
-    /// Variances of the measured position and velocity, px^2.
-    variances: [f64; 2],
-    /// How much of the mean flow the centroid is moved by.
-    brought: f64,
-    /// The window follows the filter's position, and not its velocity.
-    by_position: bool,
-    /// Pixels may start at rest.
-    rest: bool,
-    /// Measurements are gated, and targets may stop.
-    careful: bool,
-}
-
-impl Rules {
-    /// Those of a mode.
-    pub fn of(options: &GradientOptions) -> Self {
-        let mut rules = if options.mode == Mode::Paper { Self::paper() } else { Self::repaired() };
-        rules.flow.window = options.window.unwrap_or(rules.flow.window);
-        rules.flow.order = options.order.unwrap_or(rules.flow.order);
-        rules
-    }
-
-    fn repaired() -> Self {
-        Self {
-            flow: LocalFlowOptions::default(),
-            dynamics: Dynamics::default(),
-            velocity: Velocity::Mean,
-            variances: [1.0, 0.25],
-            brought: 1.0,
-            by_position: true,
-            rest: true,
-            careful: true,
-        }
-    }
-
-    fn paper() -> Self {
-        Self {
-            flow: LocalFlowOptions { window: 5, order: 2, min_sigma: 0.0, ..LocalFlowOptions::default() },
-            dynamics: Dynamics { q: 0.25, ..Dynamics::default() },
-            velocity: Velocity::AsPrinted,
-            variances: [4.0, 0.25],
-            brought: 0.5,
-            by_position: false,
-            rest: false,
-            careful: false,
-        }
-    }
-}
 
 /// One target in the loop.
 #[derive(Debug)]
@@ -103,8 +54,7 @@ impl LocalLoop {
         let rules = Rules::of(options);
         let centre = bounds.centre();
         let mut this = Self {
-            // Beyond the frame there is nothing, and a window has a middle.
-            fov: options.fov.min(2 * frame.width().max(frame.height())) | 1,
+            fov: window(options.fov, bounds, frame.size()),
             control: options.control,
             eps: options.eps,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
@@ -117,6 +67,11 @@ impl LocalLoop {
         };
         this.before = this.cut(frame);
         this
+    }
+
+    /// Side of the window, px.
+    pub fn fov(&self) -> f64 {
+        self.fov as f64
     }
 
     /// Covariance of the filter along x and y.
@@ -288,9 +243,15 @@ impl LocalLoop {
         state.rotation_observable = false;
         state.visibility = f64::from(u8::from(measured));
         state.innovation = innovation;
-        state.line_of_sight = self.line_of_sight();
+        (state.line_of_sight, state.fov) = (self.line_of_sight(), self.fov());
         state.flow_count = count;
     }
+}
+
+/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a window has a middle.
+fn window(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
+    let needed = (ROOM * bounds.width.max(bounds.height)) as usize;
+    wanted.unwrap_or(needed.max(FOV)).min(2 * width.max(height)) | 1
 }
 
 /// A square of the frame from a corner on; NaN outside.

@@ -14,6 +14,7 @@ mod local;
 mod local_flow;
 mod options;
 mod refine;
+mod rules;
 
 pub use detect::{MovingTarget, detect_moving_target};
 pub use gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
@@ -62,7 +63,8 @@ impl Engine {
             Self::Local(engine) => engine.covariance(),
             Self::Layered(engine) => engine.covariance(),
         };
-        TrackState { covariance, ..TrackState::at(bounds.centre(), bounds) }
+        let fov = if let Self::Local(engine) = self { engine.fov() } else { f64::NAN };
+        TrackState { covariance, fov, ..TrackState::at(bounds.centre(), bounds) }
     }
 }
 

@@ -76,8 +76,8 @@ pub enum Start {
 pub struct GradientOptions {
     /// Which system.
     pub mode: Mode,
-    /// Side of the window that is looked at, px (`local`, `paper`), made odd; default 51.
-    pub fov: usize,
+    /// Side of the window that is looked at, px (`local`, `paper`), made odd; `None` (default): 51, or 1.6 times the longer side of the target's box where that is more.
+    pub fov: Option<usize>,
     /// How that window moves; default whole pixels.
     pub control: Control,
     /// Side of the windows of local flow, px: 3, 5 or 7; default 7 (`paper` 5).
@@ -96,7 +96,7 @@ impl Default for GradientOptions {
     fn default() -> Self {
         Self {
             mode: Mode::default(),
-            fov: 51,
+            fov: None,
             control: Control::default(),
             window: None,
             order: None,
@@ -113,8 +113,8 @@ impl GradientOptions {
     /// # Errors
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
-        if self.fov < 15 {
-            return Err(Error::argument("fov", "at least 15 px", self.fov));
+        if let Some(fov) = self.fov.filter(|fov| *fov < 15) {
+            return Err(Error::argument("fov", "at least 15 px", fov));
         }
         if let Some(window) = self.window.filter(|w| ![3, 5, 7].contains(w)) {
             return Err(Error::argument("window", "3, 5 or 7 px", window));

@@ -37,6 +37,8 @@ const WARY: usize = 8;
 const TOLD: f64 = 0.88;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
+/// Deviation of the middle of the learnt support from that of the target, px: it stays from frame to frame, and no filter takes it away.
+const OUTLINE: f64 = 0.07;
 /// Rate of the filtered change of size and angle.
 const RATE: f64 = 0.3;
 /// The same of the mean visibility.
@@ -121,9 +123,12 @@ impl Layered {
         }
     }
 
-    /// Covariance of the filter along x and y.
+    /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
     pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
-        self.filter.covariance()
+        self.filter.covariance().map(|mut axis| {
+            axis[0][0] += OUTLINE * OUTLINE;
+            axis
+        })
     }
 
     /// The next frame; `None`: it cannot be used.

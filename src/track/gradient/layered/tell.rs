@@ -74,7 +74,7 @@ impl Layered {
         state.position = self.filter.position();
         state.line_of_sight = state.position;
         state.acceleration = self.filter.acceleration();
-        state.covariance = self.filter.covariance();
+        state.covariance = self.covariance();
         state.bounds = self.bounds(&self.pose);
     }
 }
