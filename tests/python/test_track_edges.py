@@ -55,6 +55,36 @@ def test_windows_larger_than_the_frame_are_clipped(method):
     assert np.linalg.norm(found.position[-1] - (14 + 11, 20)) <= 3.0
 
 
+def test_the_window_is_as_large_as_the_target_needs():
+    """A window of 51 px on an even target of 80 px would see no edge of it."""
+    frames = np.random.default_rng(2).normal(90, 2, (25, 220, 260)).astype(np.uint8)
+    for t in range(25):
+        frames[t, 60:140, 40 + 2 * t : 120 + 2 * t] += 80
+    box = (39.5, 59.5, 80, 80)
+    found = track.track(frames, box, method="local")
+    assert np.linalg.norm(found.position[-1] - (79.5 + 48, 99.5)) <= 3.0 and np.all(found.status[5:] == "tracking")
+    small = track.track(frames, box, method="local", fov=51)
+    assert np.linalg.norm(small.position[-1] - (79.5 + 48, 99.5)) > 3.0
+
+
+def test_local_follows_what_is_too_fast_for_one_gradient_step():
+    scene = next(scene for scene in tracking_hard_scenes.hard() if scene.name == "9 px/frame")
+    found = follow(scene, method="local")
+    assert success(scene, found) >= 0.9
+    assert np.linalg.norm(found.position - scene.centres, axis=1)[5:].max() <= 6.0
+
+
+def test_stated_deviations_hold_the_centre():
+    """Within two stated deviations in 95 % of frames would be right for independent errors; those of the learnt outline stay from frame to frame."""
+    held = []
+    for scene in SIMULATION.values():
+        found = follow(scene)
+        deviations = np.sqrt(found.covariance[:, :, 0, 0])
+        held.append((np.abs(found.position - scene.centres) < 2 * deviations)[1:].mean())
+        assert deviations[5:].max() <= 0.5, scene.name
+    assert np.mean(held) >= 0.85 and np.median(held) >= 0.9
+
+
 def test_a_target_that_stops_is_held_by_the_rule_for_it():
     scene = HARD["stops at 20 for good"]
     still = follow(scene, method="local")

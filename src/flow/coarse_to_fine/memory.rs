@@ -57,13 +57,21 @@ pub(super) struct Workspace<T> {
 }
 
 impl<T: SimdReal> Workspace<T> {
-    /// Lets go of all memory but what is `needed`, where there is much: the motion is found, and results need memory of their own.
-    pub fn trim<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
-        if self.bytes() > LIMIT {
-            *self = Self::default();
-            needed.for_each(Planes::shrink);
-            give_back();
-        }
+    /// Whether there is so much memory that results should not need theirs besides.
+    pub fn is_large(&self) -> bool {
+        self.bytes() > LIMIT
+    }
+
+    /// Lets go of what is free.
+    pub fn clear(&self) {
+        lock(&self.space.free).clear();
+    }
+
+    /// Gives all but what is `needed` back to the system. That takes time, since the next estimate has to ask for it again.
+    pub fn give_back<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
+        *self = Self::default();
+        needed.for_each(Planes::shrink);
+        give_back();
     }
 
     fn bytes(&self) -> usize {

@@ -24,9 +24,28 @@ use rayon::prelude::*;
 /// Pixels between sites.
 const STEP: f64 = 2.0;
 
-/// Writes the estimate at the field's sites. A pair's motion is carried from midway to the first frame.
+/// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
+fn rows() -> f64 {
+    1.0 + 2.0 * DataOptions::default().gradient.powi(2)
+}
+
+/// The covariance of the estimate, wherever it may be asked for.
+pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], common: &Common) -> Spread<T> {
+    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
+    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
+    let left = halved_noise().powi(estimate.level as i32);
+    let energy_of = |variance: f64| share * rows() * left * variance * estimate.range.gain.powi(2);
+    let noise = match common.noise {
+        Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
+        // Rounding is the least noise that whole numbers can have.
+        None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
+    };
+    covariance(estimate, noise, frames.len() == 2)
+}
+
+/// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to the first frame.
 pub(super) fn fill<T: SimdReal>(
-    estimate: &Estimate<T>,
+    (estimate, covariance): (&Estimate<T>, Option<Spread<T>>),
     space: &Space<T>,
     frames: &[&Frame<T>],
     common: &Common,
@@ -36,27 +55,17 @@ pub(super) fn fill<T: SimdReal>(
     let moved = (frames.len() == 2).then(|| at_first_frame(simd, space, &estimate.motion));
     let found = moved.as_ref().unwrap_or(&estimate.motion);
     let full = at_full_resolution(simd, space, (estimate.level, found), frames[0].size());
-    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
-    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
-    let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
-    let left = halved_noise().powi(estimate.level as i32);
-    let energy_of = |variance: f64| share * rows * left * variance * estimate.range.gain.powi(2);
-    let noise = || match common.noise {
-        Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
-        // Rounding is the least noise that whole numbers can have.
-        None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
-    };
     let writer = Writer {
         simd,
         pitch: 2 << estimate.level,
         data: &estimate.data,
-        per_row: 1.0 / (rows.sqrt() * estimate.range.gain),
+        per_row: 1.0 / (rows().sqrt() * estimate.range.gain),
         motion: full.as_ref().unwrap_or(found),
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
         consistency: Consistency::of(estimate),
-        covariance: field.covariance.is_some().then(|| covariance(estimate, noise(), frames.len() == 2)),
+        covariance,
         evidence: estimate.evidence.as_ref(),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);

@@ -1,6 +1,7 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
 use super::change::add_change;
+use super::covariance::Spread;
 use super::descend::{Found, Plan};
 use super::grid::Planes;
 use super::levels::Compared;
@@ -51,12 +52,37 @@ impl CoarseToFine {
             let plan = Plan { simd, effort, range, last };
             let changes = frames.len() == 3 && !self.options.central;
             let mut estimate = estimate(&plan, changes, &mut workspace);
-            workspace.trim(estimate.planes_mut());
-            output::fill(&estimate, &workspace.space, frames, common, field);
-            estimate.keep(&mut workspace);
+            let spread = spread(&mut estimate, &mut workspace, (frames, common), field);
+            output::fill((&estimate, spread), &workspace.space, frames, common, field);
+            estimate.keep(&workspace);
             self.memory.give(workspace);
         });
     }
+}
+
+/// The covariance, if it is wanted. It takes so many planes that of large frames whatever else there is goes back to the system, before and after.
+fn spread<T: SimdReal>(
+    estimate: &mut Estimate<T>,
+    workspace: &mut Workspace<T>,
+    (frames, common): (&[&Frame<T>], &Common),
+    field: &FlowField<T>,
+) -> Option<Spread<T>> {
+    let is_large = workspace.is_large();
+    if field.covariance.is_none() {
+        if is_large {
+            workspace.clear();
+        }
+        return None;
+    }
+    if is_large {
+        workspace.give_back(estimate.planes_mut());
+    }
+    let spread = output::spread(estimate, frames, common);
+    if is_large && field.window.is_none() {
+        estimate.forget_evidence(workspace);
+        workspace.give_back(estimate.planes_mut());
+    }
+    Some(spread)
 }
 
 /// From the filled pyramid to the motion; `changes`: of three frames, to the next and not the mean of both steps.
@@ -103,9 +129,15 @@ impl<T: SimdReal> Estimate<T> {
         evidence.chain([&mut self.motion, &mut self.data])
     }
 
+    /// Gives back what only covariance and diagnostics rest on.
+    fn forget_evidence(&mut self, workspace: &Workspace<T>) {
+        let evidence = self.evidence.take().into_iter().chain(self.change.take());
+        evidence.flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
+    }
+
     /// Gives its memory back.
-    fn keep(self, workspace: &mut Workspace<T>) {
-        let evidence = self.evidence.into_iter().chain(self.change).flat_map(Evidence::into_planes);
-        evidence.chain([self.motion, self.data]).for_each(|planes| workspace.space.keep(planes));
+    fn keep(mut self, workspace: &Workspace<T>) {
+        self.forget_evidence(workspace);
+        [self.motion, self.data].into_iter().for_each(|planes| workspace.space.keep(planes));
     }
 }

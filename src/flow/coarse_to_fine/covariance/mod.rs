@@ -28,7 +28,7 @@ pub(super) use spread::Spread;
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
 const FLOW_NOISE: f64 = 1.15;
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.46;
+const SLOPE_NOISE: f64 = 0.44;
 /// Errors over what bent motion loses, in the flow and in the slopes.
 const BENDING: bending::Shares = bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] };
 /// Share of the corrected peak locking that is left.
