@@ -138,6 +138,8 @@ impl<T: SimdReal> Estimate<T> {
     /// Gives its memory back.
     fn keep(mut self, workspace: &Workspace<T>) {
         self.forget_evidence(workspace);
-        [self.motion, self.data].into_iter().for_each(|planes| workspace.space.keep(planes));
+        for planes in [self.motion, self.data] {
+            workspace.space.keep(planes);
+        }
     }
 }
