@@ -45,8 +45,8 @@ pub struct TrackCommand {
     /// Formats: csv (everything), mot (boxes) [default: by the file's name, else csv]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     pub format: Vec<String>,
-    /// Draw the targets over every frame, as track_000000.png, ... in this folder
-    #[arg(long, value_name = "FOLDER", help_heading = "Output")]
+    /// Draw the targets over every frame: a folder for track_000000.png, ..., or a film by the name *.y4m
+    #[arg(long, value_name = "FOLDER|FILM", help_heading = "Output")]
     pub overlay: Option<PathBuf>,
     /// Enlarge the drawn pictures N times, for small targets
     #[arg(long, value_name = "N", default_value = "1", requires = "overlay", help_heading = "Output", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=16))]
@@ -60,6 +60,9 @@ pub struct TrackCommand {
     #[command(flatten)]
     pub tell: TellArguments,
 }
+
+/// Frames per second of a film where the input does not tell.
+const FILM_RATE: f64 = 25.0;
 
 /// A text that is to be written.
 type Wanted = (TableTarget, TrackFormat);
@@ -79,9 +82,10 @@ impl TrackCommand {
             .with_threads(threads)
             .with_numbering(opened.numbering);
         let details = self.details(&opened);
+        let rate = opened.numbering.rate;
         let begin = |frame: &Frame<f64>| {
             let trackers = trackers(frame, &self.targets.starts(), &options)?;
-            Ok(Begun { trackers, sinks: self.sinks(&wanted)? })
+            Ok(Begun { trackers, sinks: self.sinks(&wanted, rate)? })
         };
         let failure = {
             let bar = Bar::new(watch, "track", self.tell.quiet);
@@ -91,13 +95,13 @@ impl TrackCommand {
     }
 
     /// Begins what is written; folders are made.
-    fn sinks(&self, wanted: &[Wanted]) -> Result<Vec<Box<dyn TrackSink>>> {
+    fn sinks(&self, wanted: &[Wanted], rate: Option<f64>) -> Result<Vec<Box<dyn TrackSink>>> {
         if let Some(folder) = self.output.as_deref().filter(|path| *path != Path::new("-") && is_folder(path)) {
             std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
         }
         let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
-        if let Some(folder) = &self.overlay {
-            sinks.push(Box::new(Overlays::create(folder, self.drawing())?));
+        if let Some(path) = &self.overlay {
+            sinks.push(Box::new(Overlays::create(path, self.drawing(), rate.unwrap_or(FILM_RATE))?));
         }
         for (target, format) in wanted {
             sinks.push(Box::new(TrackRows::create(target, *format)?));

@@ -6,6 +6,7 @@
 mod decode;
 mod field_format;
 mod field_npz;
+mod film;
 mod flo;
 mod flow_image;
 mod jpeg;
@@ -26,6 +27,7 @@ pub mod write;
 pub use decode::read_image;
 pub use field_format::FieldFormat;
 pub use field_npz::{StoredField, read_npz, read_npz_from, write_npz, write_npz_to};
+pub use film::FilmWriter;
 pub use flo::{read_flo, write_flo};
 pub use flow_image::FlowImage;
 pub use kitti::{read_kitti, write_kitti};

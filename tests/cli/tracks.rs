@@ -136,6 +136,13 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     let again = place.line(&format!("track s.y4m {BOX} --overlay local"));
     assert!(again.code == 2 && again.err.contains("overlay") && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("track s.y4m {BOX} --overlay local --force"));
+    // A film instead: as many frames, read back as luma; it is not replaced unasked.
+    let film = format!("track s.y4m {BOX} --overlay film.y4m --enlarge 2");
+    place.good(&film);
+    let again = place.line(&film);
+    assert!(again.code == 2 && again.err.contains("overlay"), "{}", again.err);
+    place.good(&format!("{film} --force"));
+    assert!(std::fs::read(place.path("film.y4m")).unwrap().starts_with(b"YUV4MPEG2 W"));
 }
 
 #[test]

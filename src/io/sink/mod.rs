@@ -7,6 +7,7 @@ mod y4m;
 pub use npy::NpySink;
 pub use png::PngSink;
 pub use y4m::Y4mSink;
+pub(super) use y4m::ratio;
 
 use crate::error::{Error, Result};
 use crate::types::AnyFrame;

@@ -85,7 +85,7 @@ impl Y4mSink {
 }
 
 /// A frame rate as a ratio: whole, of the family 1000 n / 1001 (29.97, 23.976, ...), or to a millionth.
-fn ratio(rate: f64) -> (u64, u64) {
+pub(in crate::io) fn ratio(rate: f64) -> (u64, u64) {
     if rate.fract() == 0.0 {
         return (rate as u64, 1);
     }

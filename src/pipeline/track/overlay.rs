@@ -1,9 +1,9 @@
-//! Tracks over the frames, as pictures.
+//! Tracks over the frames, as pictures or a film.
 
+use super::album::Album;
 use super::{TrackSink, TrackStep};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::picture::{GreyRange, PathPoint, TrackOverlay};
-use crate::io::{NumberedFiles, write_picture};
 use crate::pipeline::sink::Ending;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -12,51 +12,33 @@ use std::path::{Path, PathBuf};
 pub const PATH_LENGTH: usize = 1000;
 
 /// First word of the files' names.
-const STEM: &str = "track";
+pub(super) const STEM: &str = "track";
 
-/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole.
+/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one film.
 #[derive(Debug)]
 pub struct Overlays {
-    files: NumberedFiles,
+    album: Album,
     overlay: TrackOverlay,
     range: Option<GreyRange>,
     paths: Vec<VecDeque<PathPoint>>,
-    written: usize,
-    latest: Option<PathBuf>,
 }
 
 impl Overlays {
-    /// Pictures in `folder`, which is made when it does not exist.
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
-    /// As [`NumberedFiles::create`].
-    pub fn create(folder: impl AsRef<Path>, overlay: TrackOverlay) -> Result<Self> {
-        let files = NumberedFiles::create(folder, STEM, "png")?;
-        Ok(Self { files, overlay, range: None, paths: Vec::new(), written: 0, latest: None })
+    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
+    pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
+        let album = Album::create(path.as_ref(), frame_rate)?;
+        Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film that exists. Nothing is made.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `overlay`.
-    pub fn check(folder: &Path) -> Result<()> {
-        if folder.exists() && !folder.is_dir() {
-            return Err(Error::argument("overlay", "a folder", folder.display()));
-        }
-        let entries = folder.read_dir().into_iter().flatten().flatten();
-        let ours = |path: &PathBuf| {
-            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            let number = stem.strip_prefix(STEM).and_then(|rest| rest.strip_prefix('_'));
-            path.extension().is_some_and(|e| e == "png")
-                && number.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
-        };
-        match entries.map(|entry| entry.path()).find(ours) {
-            Some(path) => {
-                let wanted = "a place without earlier results (--force replaces them)";
-                Err(Error::argument("overlay", wanted, path.display()))
-            }
-            None => Ok(()),
-        }
+    /// [`Error::Argument`](crate::Error::Argument) named `overlay`.
+    pub fn check(path: &Path) -> Result<()> {
+        Album::check(path)
     }
 
     /// Remembers where the targets are.
@@ -82,19 +64,15 @@ impl TrackSink for Overlays {
         for (index, (state, path)) in step.states.iter().zip(&mut self.paths).enumerate() {
             self.overlay.draw(&mut picture, index + 1, state, path.make_contiguous());
         }
-        let file = self.files.path(step.frame_index);
-        write_picture(&file, &picture)?;
-        self.written += 1;
-        self.latest = Some(file);
-        Ok(())
+        self.album.add(step.frame_index, &picture)
     }
 
-    fn finish(&mut self, _ending: Ending) -> Result<()> {
-        Ok(())
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        self.album.finish(ending)
     }
 
     fn files(&self) -> (usize, Option<PathBuf>) {
-        (self.written, self.latest.clone())
+        self.album.files()
     }
 }
 
@@ -106,7 +84,7 @@ mod tests {
     #[test]
     fn a_path_stays_bounded_and_earlier_pictures_are_not_mixed() {
         let folder = tempfile::tempdir().unwrap();
-        let mut overlays = Overlays::create(folder.path(), TrackOverlay::default()).unwrap();
+        let mut overlays = Overlays::create(folder.path(), TrackOverlay::default(), 25.0).unwrap();
         let frame = AnyFrame::U8(Frame::filled(16, 16, 0));
         let states = [TrackState::at([6.0, 8.0], TargetBox::about([6.0, 8.0], 5.0, 3.0))];
         for index in 0..PATH_LENGTH + 5 {

@@ -57,7 +57,7 @@ fn names(folder: &Path) -> Vec<String> {
 /// Every kind of sink in a folder.
 fn into(folder: &Path) -> Vec<Box<dyn TrackSink>> {
     let mut sinks: Vec<Box<dyn TrackSink>> =
-        vec![Box::new(Overlays::create(folder.join("o"), TrackOverlay::default()).unwrap())];
+        vec![Box::new(Overlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap())];
     for format in TrackFormat::ALL {
         let target = TableTarget::File(folder.join(format!("t.{}", format.extension())));
         sinks.push(Box::new(TrackRows::create(&target, format).unwrap()));

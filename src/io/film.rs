@@ -1,0 +1,113 @@
+//! Pictures as a film: colour YUV4MPEG2, which players and encoders read.
+
+use super::sink::ratio;
+use super::write::AtomicFile;
+use crate::error::{Error, Result};
+use crate::image::picture::Picture;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes pictures of one size as `C444`, full range, by the matrix of ITU-R BT.601 as JPEG has it.
+#[derive(Debug)]
+pub struct FilmWriter {
+    file: AtomicFile,
+    path: PathBuf,
+    rate: (u64, u64),
+    size: Option<(usize, usize)>,
+}
+
+impl FilmWriter {
+    /// Begins a file, which appears under its name when it is finished. `frame_rate`: frames per second.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::create`]; [`Error::Argument`] named `frame_rate` unless that is positive.
+    pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
+        if !(frame_rate > 0.0 && frame_rate.is_finite()) {
+            return Err(Error::argument("frame_rate", "a positive number of frames per second", frame_rate));
+        }
+        let path = path.as_ref();
+        Ok(Self { file: AtomicFile::create(path)?, path: path.to_path_buf(), rate: ratio(frame_rate), size: None })
+    }
+
+    /// Adds a picture.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `picture` for another size than the first one's; [`Error::Io`] with the path.
+    pub fn write(&mut self, picture: &Picture) -> Result<()> {
+        let size @ (width, height) = (picture.width(), picture.height());
+        let ((a, b), is_first) = (self.rate, self.size.is_none());
+        let wanted = *self.size.get_or_insert(size);
+        if size != wanted {
+            let expected = format!("{} x {} px, as the first", wanted.0, wanted.1);
+            return Err(Error::argument("picture", expected, format!("{width} x {height} px")));
+        }
+        let mut bytes = Vec::with_capacity(3 * width * height + 128);
+        if is_first {
+            let header = format!("YUV4MPEG2 W{width} H{height} F{a}:{b} Ip A1:1 C444 XCOLORRANGE=FULL\n");
+            bytes.extend_from_slice(header.as_bytes());
+        }
+        bytes.extend_from_slice(b"FRAME\n");
+        for plane in 0..3 {
+            bytes.extend(picture.data().chunks_exact(3).map(|rgb| sample(rgb, plane)));
+        }
+        self.file.write_all(&bytes).map_err(|e| Error::io(&self.path, e))
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::commit`].
+    pub fn finish(self) -> Result<()> {
+        self.file.commit()
+    }
+
+    /// As [`FilmWriter::finish`], under another name in the same folder.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::commit`].
+    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+        self.file.commit_as(path)
+    }
+}
+
+/// Luma (0) or one of the differences of colour (1: blue, 2: red) of red, green and blue.
+fn sample(rgb: &[u8], plane: usize) -> u8 {
+    const MATRIX: [[f64; 3]; 3] = [[0.299, 0.587, 0.114], [-0.168_736, -0.331_264, 0.5], [0.5, -0.418_688, -0.081_312]];
+    let sum: f64 = MATRIX[plane].iter().zip(rgb).map(|(weight, value)| weight * f64::from(*value)).sum();
+    (sum + if plane == 0 { 0.0 } else { 128.0 }).round().clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::{OpenOptions, open};
+
+    #[test]
+    fn colours_are_those_of_jfif() {
+        let planes = |rgb: [u8; 3]| [0, 1, 2].map(|plane| sample(&rgb, plane));
+        assert_eq!(planes([0, 0, 0]), [0, 128, 128]);
+        assert_eq!(planes([255, 255, 255]), [255, 128, 128]);
+        assert_eq!(planes([255, 0, 0]), [76, 85, 255]);
+        assert_eq!(planes([0, 0, 255]), [29, 255, 107]);
+    }
+
+    #[test]
+    fn a_film_is_read_back_and_has_one_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.y4m");
+        let mut film = FilmWriter::create(&path, 29.97).unwrap();
+        let picture = |level: u8| Picture::filled(6, 4, [level; 3]);
+        film.write(&picture(10)).unwrap();
+        film.write(&picture(200)).unwrap();
+        assert!(film.write(&Picture::filled(4, 6, [0; 3])).unwrap_err().to_string().starts_with("picture"));
+        assert!(!path.exists());
+        film.finish().unwrap();
+        let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+        let mut levels = Vec::new();
+        while let Some(frame) = source.next_frame().unwrap() {
+            levels.push(frame.to_real::<f64>().get(5, 3));
+        }
+        assert_eq!(levels, [10.0, 200.0]);
+        assert!(FilmWriter::create(folder.path().join("b.y4m"), 0.0).is_err());
+    }
+}
