@@ -26,6 +26,8 @@ const REACH: isize = 10;
 const ALIKE: (f64, f64) = (1.05, 1.4);
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
+/// Pixels of an object that judge a displacement, about: of larger ones every second along both axes, every third ...
+const VOTES: f64 = 4096.0;
 /// Smallest side of what is found, px.
 const LEAST_SIDE: f64 = 3.0;
 
@@ -155,7 +157,8 @@ fn displacement(
     let cost = |dx: isize, dy: isize| {
         let TargetBox { x, y, width, height } = bounds(object, [dx, dy]);
         let inside = |from: f64, length: f64| (from + 0.5) as isize..(from + length + 0.5) as isize;
-        let pixels = inside(y, height).flat_map(|j| inside(x, width).map(move |i| (i, j)));
+        let step = ((width * height / VOTES).sqrt().ceil() as usize).max(1);
+        let pixels = inside(y, height).step_by(step).flat_map(|j| inside(x, width).step_by(step).map(move |i| (i, j)));
         let off = pixels.map(|(i, j)| match (read(second, i, j), read(between, i - dx, j - dy)) {
             (Some(now), Some([low, high])) => (low - now).max(now - high).clamp(0.0, CAP),
             _ => CAP,
