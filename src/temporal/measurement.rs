@@ -61,7 +61,8 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
         let inverse = if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN };
         for (b, pixels) in self.pixels.chunks_exact(BLOCK).enumerate() {
             let measured = &mut self.measured[b * MEASURED * BLOCK..(b + 1) * MEASURED * BLOCK];
-            let neighbours = pixels[BLOCK - 1] == pixels[0] + BLOCK - 1;
+            // The last block of a narrow frame repeats its last pixel: both ends alone would not tell.
+            let neighbours = pixels.windows(2).all(|pair| pair[1] == pair[0] + 1);
             for at in (0..BLOCK).step_by(V::LANES) {
                 let pixels = &pixels[at..at + V::LANES];
                 // Derivatives do not see a constant: differences from one sample keep every digit of theirs.

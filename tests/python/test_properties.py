@@ -1,7 +1,7 @@
 """Properties that hold for any picture: gain, symmetry, shapes."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -111,6 +111,7 @@ def test_any_size_and_any_noise_give_arrays_of_the_right_shape(height, width, co
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(3, 16), st.integers(3, 16), st.sampled_from(["augmented", "non_augmented", "fast", "extended"]), seeds)
+@example(8, 3, "augmented", 0)
 def test_the_filter_survives_any_noise(height, width, form, seed):
     frames = (np.random.default_rng(seed).random((4, height, width)) * 255).astype(np.uint8)
     flow_filter = jacoflow.FlowFilter(form=form)
