@@ -112,7 +112,7 @@ impl Build<'_> {
 
     /// Derivatives along x and y of the mean of both frames, and by time of their smoothed difference; row-major, nothing along the border.
     ///
-    /// The masks are even or odd along each axis: rows and columns as far above as below are added or subtracted first, which leaves a fourth of the products.
+    /// The masks are even or odd along each axis: rows and columns as far above as below are added or subtracted first, which leaves a third of the products.
     #[inline(always)]
     fn derivatives<V: Lanes<Scalar = f32>>(&self) -> [Vec<f32>; 3] {
         let (width, height) = self.first.size();
