@@ -136,7 +136,7 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     let again = place.line(&format!("track s.y4m {BOX} --overlay local"));
     assert!(again.code == 2 && again.err.contains("overlay") && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("track s.y4m {BOX} --overlay local --force"));
-    // A film instead: as many frames, read back as luma; it is not replaced unasked.
+    // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
     let film = format!("track s.y4m {BOX} --overlay film.y4m --enlarge 2");
     place.good(&film);
     let again = place.line(&film);
