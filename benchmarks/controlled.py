@@ -173,20 +173,36 @@ def row(case: Case, rival: dict[str, object], contestant: Contestant) -> Row:
     }
 
 
+def summary(name: str, method: str, rows: list[Row], combine: Callable[[str, Array], float]) -> Row:
+    """A row of the ratios of `rows`, each combined by `combine(name of the ratio, its values)`; those that no row has are left out."""
+    ratios = {ratio: np.array([each[ratio] for each in rows if each[ratio] != ""], float) for ratio in RATIOS}
+    return {"wavelength": name, "method": method, **{ratio: combine(ratio, values) for ratio, values in ratios.items() if values.size}}
+
+
+def worst(ratio: str, values: Array) -> float:
+    """Gains are bad when small, the ratio to the bound when large."""
+    return float(values.max() if ratio == "jacobian_over_bound" else values.min())
+
+
+def geometric_mean(_: str, values: Array) -> float:
+    """The mean of ratios."""
+    return float(np.exp(np.log(values).mean()))
+
+
 def table(cases: list[Case], contestants: list[Contestant]) -> list[Row]:
-    """One row for each contestant and case, then the worst and the geometric mean of its ratios."""
+    """One row for each contestant and case, then the worst and the geometric mean of its ratios; the mean over the noisy scenes apart, as the bound of the others is
+    nothing but the rounding to grey levels."""
     if rivals.cv2 is None:
         return []
     peers = [farneback(case) for case in cases]
     rows: list[Row] = []
     for contestant in contestants:
         own = [row(case, peer, contestant) for case, peer in zip(cases, peers, strict=True)]
-        ratios = {name: np.array([each[name] for each in own if each[name] != ""], float) for name in RATIOS}
-        # Gains are bad when small, the ratio to the bound when large.
-        worst = {name: float(all_.max() if name == "jacobian_over_bound" else all_.min()) for name, all_ in ratios.items() if all_.size}
-        means = {name: float(np.exp(np.log(all_).mean())) for name, all_ in ratios.items() if all_.size}
         rows += own
-        rows += [{"wavelength": "worst", "method": contestant.name, **worst}, {"wavelength": "geometric mean", "method": contestant.name, **means}]
+        rows += [summary("worst", contestant.name, own, worst), summary("geometric mean", contestant.name, own, geometric_mean)]
+        noisy = [each for case, each in zip(cases, own, strict=True) if case.noise > 0]
+        if 0 < len(noisy) < len(own):
+            rows.append(summary("geometric mean, with noise", contestant.name, noisy, geometric_mean))
     return rows
 
 

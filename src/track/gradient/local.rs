@@ -27,6 +27,16 @@ const REFUSALS: usize = 3;
 const FAST: f64 = 1.0;
 /// Its sides differ from the target's by less than this factor.
 const ALIKE: f64 = 1.6;
+/// How fast the usual count of moving pixels follows a larger one, and a smaller one: parts are hidden more often than they grow.
+const USUAL: [f64; 2] = [0.1, 0.03];
+/// Share of the usual count from which on all of the target is seen: counts scatter.
+const WHOLE: f64 = 0.85;
+/// Deviation of the mean flow of what is left over the target's speed, where nearly all is hidden: the edge that hides it stands still.
+const SLIP: f64 = 2.0;
+/// Least speed for that, px/frame.
+const LEAST_SPEED: f64 = 1.0;
+/// Share of the usual count below which what is left of a target is about to be hidden, and not to stop.
+const HIDDEN: f64 = 0.6;
 /// Frames without motion after which the target counts as lost.
 const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
@@ -45,6 +55,10 @@ pub(super) struct LocalLoop {
     sight: [f64; 2],
     /// What the window showed in the frame before.
     before: Frame<f64>,
+    /// How many pixels of the target move where none is hidden; 0: not known yet.
+    usual: f64,
+    /// Share of these that moved in the last frame in which any did.
+    seen: f64,
     refused: usize,
     missed: usize,
 }
@@ -61,6 +75,8 @@ impl LocalLoop {
             size: [bounds.width, bounds.height],
             sight: centre,
             before: Frame::default(),
+            usual: 0.0,
+            seen: 1.0,
             refused: 0,
             missed: 0,
             rules,
@@ -90,8 +106,12 @@ impl LocalLoop {
             Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
                 let place = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
                 let [r_pos, r_vel] = self.rules.variances;
-                let mut z =
-                    Measurement { position: Some((place, [r_pos; 2])), velocity: Some((mean.velocity, [r_vel; 2])) };
+                let missing = if self.rules.careful { 1.0 - self.share(mean.count) } else { 0.0 };
+                let [lean, slip] = self.hidden(missing);
+                let mut z = Measurement {
+                    position: Some((place, lean.map(|lean| r_pos + lean * lean))),
+                    velocity: Some((mean.velocity, slip.map(|slip| r_vel + slip * slip))),
+                };
                 innovation = self.filter.innovation(&z);
                 let fast = second.as_ref().filter(|_| self.rules.careful && innovation >= GATE);
                 let fast = fast.and_then(|second| self.too_fast(second));
@@ -99,12 +119,14 @@ impl LocalLoop {
                 if !self.rules.careful || innovation < GATE || fast.is_some() || self.refused >= REFUSALS {
                     self.filter.update(&z);
                     (self.refused, measured) = (0, true);
+                    self.count(mean.count);
                 } else {
                     self.refused += 1;
                 }
             }
+            Some(_) if self.rules.careful && self.seen < HIDDEN => {}
             Some(_) if self.rules.careful => {
-                // Nothing moves: the target has stopped, or is hidden.
+                // Nothing moves though all of it did: the target has stopped.
                 self.refused = 0;
                 self.filter
                     .update(&Measurement { position: None, velocity: Some(([0.0; 2], [self.rules.variances[1]; 2])) });
@@ -117,6 +139,27 @@ impl LocalLoop {
             self.before = self.cut(frame);
         }
         self.tell(state, found, (innovation, measured, was_lost));
+    }
+
+    /// Deviations of the middle of what moves from the target's, px, and of its mean flow from the target's, px/frame, along x and y, where a share of it is `missing`:
+    /// outlines are what moves, so that a side that is hidden takes its quarter of them from far out.
+    fn hidden(&self, missing: f64) -> [[f64; 2]; 2] {
+        let speed = self.filter.speed();
+        let slip = speed.map(|speed| SLIP * missing * speed.abs().max(LEAST_SPEED));
+        [self.size.map(|length| missing * length), slip]
+    }
+
+    /// Share of the target that moves, by the usual count.
+    fn share(&self, count: usize) -> f64 {
+        if self.usual > 0.0 { (count as f64 / (WHOLE * self.usual)).min(1.0) } else { 1.0 }
+    }
+
+    /// Remembers how many pixels of the target moved.
+    fn count(&mut self, count: usize) {
+        self.seen = self.share(count);
+        let count_now = count as f64;
+        let gain = if self.usual == 0.0 { 1.0 } else { USUAL[usize::from(count_now < self.usual)] };
+        self.usual += gain * (count_now - self.usual);
     }
 
     /// A target that moves farther from what is expected than local flow reaches, seen in the `second` window.
