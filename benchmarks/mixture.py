@@ -38,11 +38,12 @@ class FromResponsibilities(BayesianGaussianMixture):  # type: ignore[misc]
 
 
 def case(components: int, count: int, dimensions: int) -> tuple[Array, Array]:
-    """Points (N, D) about as many centres as there are components, and responsibilities (N, K)."""
+    """Points (N, D) about as many centres as there are components, and responsibilities (N, K) that know half of the truth: from random ones rounding decides between optima."""
     rng = np.random.default_rng(0)
     centres = rng.normal(0, 10, (components, dimensions))
-    points = centres[rng.integers(components, size=count)] + rng.normal(0, 2, (count, dimensions))
-    return points, rng.dirichlet(np.ones(components), count)
+    labels = rng.integers(components, size=count)
+    points = centres[labels] + rng.normal(0, 2, (count, dimensions))
+    return points, 0.5 * np.eye(components)[labels] + 0.5 * rng.dirichlet(np.ones(components), count)
 
 
 def ours(points: Array, shares: Array, rounds: int, threads: int) -> VariationalGaussianMixture:
@@ -55,7 +56,7 @@ def theirs(points: Array, shares: Array, rounds: int) -> FromResponsibilities:
     """The same fit of scikit-learn's, whose first round is its initialisation."""
     d = points.shape[1]
     mixture = FromResponsibilities(
-        shares.shape[1], weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3,
+        n_components=shares.shape[1], weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3,
         mean_prior=points.mean(0), degrees_of_freedom_prior=d + 9.1, covariance_prior=0.1 * np.eye(d), reg_covar=0, max_iter=rounds - 1, tol=0,
     )  # fmt: skip
     mixture.resp = shares

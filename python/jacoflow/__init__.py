@@ -10,7 +10,10 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 (1, 64, 96)
 """
 
-from . import filters, io, mixture, plot, scenes, track, video
+from importlib import import_module as _import_module
+from typing import Any as _Any
+
+from . import filters, io, plot, scenes, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -59,3 +62,10 @@ __all__ = [
     "track",
     "video",
 ]
+
+
+def __getattr__(name: str) -> _Any:
+    """`jacoflow.mixture`, imported when it is first asked for: it looks for scikit-learn, whose import takes longer than ours."""
+    if name == "mixture":
+        return _import_module("jacoflow.mixture")
+    raise AttributeError(f"module 'jacoflow' has no attribute {name!r}")

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,37 @@ __all__ = ["VariationalGaussianMixture"]
 Array = NDArray[np.float64]
 
 
-class VariationalGaussianMixture:
+class _Parameters:
+    """What scikit-learn's `BaseEstimator` does for parameters, where that is not installed."""
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The parameters by name, as they were given (their units); `deep` makes no difference."""
+        return {name: getattr(self, name) for name in _names(type(self))}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Sets parameters by name (in their units); ValueError for a name that there is none of."""
+        for name, value in parameters.items():
+            if name not in _names(type(self)):
+                raise ValueError(f"Invalid parameter {name!r} for estimator {self}. Valid parameters are: {_names(type(self))!r}.")
+            setattr(self, name, value)
+        return self
+
+    def __repr__(self) -> str:
+        defaults = {name: parameter.default for name, parameter in inspect.signature(type(self)).parameters.items()}
+        changed = [f"{name}={value!r}" for name, value in self.get_params().items() if repr(value) != repr(defaults[name])]
+        return f"{type(self).__name__}({', '.join(changed)})"
+
+
+if TYPE_CHECKING:
+    _Base = _Parameters
+else:
+    try:
+        from sklearn.base import BaseEstimator as _Base
+    except ImportError:
+        _Base = _Parameters
+
+
+class VariationalGaussianMixture(_Base):
     """A mixture of Gaussians in D dimensions, fitted to weighted points by variational Bayes.
 
     Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern Recognition and
@@ -200,34 +230,13 @@ class VariationalGaussianMixture:
         """Mean of `score_samples` over points (N, D) with weights (N,)."""
         return float(np.average(self.score_samples(X), weights=_weights(sample_weight)))
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The parameters by name, as they were given (their units); `deep` makes no difference."""
-        return {name: getattr(self, name) for name in self._names()}
-
-    def set_params(self, **parameters: Any) -> VariationalGaussianMixture:
-        """Sets parameters by name (in their units); ValueError for a name that there is none of."""
-        for name, value in parameters.items():
-            if name not in self._names():
-                raise ValueError(f"Invalid parameter {name!r} for estimator {self}. Valid parameters are: {self._names()!r}.")
-            setattr(self, name, value)
-        return self
-
-    def __repr__(self) -> str:
-        defaults = {name: parameter.default for name, parameter in inspect.signature(type(self).__init__).parameters.items()}
-        changed = [f"{name}={value!r}" for name, value in self.get_params().items() if value is not defaults[name] and repr(value) != repr(defaults[name])]
-        return f"{type(self).__name__}({', '.join(changed)})"
-
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "_state")
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import InputTags, Tags, TargetTags
-
-        return Tags(estimator_type="density_estimator", target_tags=TargetTags(required=False), input_tags=InputTags())
-
-    @classmethod
-    def _names(cls) -> list[str]:
-        return sorted(name for name in inspect.signature(cls.__init__).parameters if name != "self")
+        tags = super().__sklearn_tags__()  # type: ignore[misc]
+        tags.estimator_type = "density_estimator"
+        return tags
 
     def _parameters(self) -> dict[str, Any]:
         """What the compiled module takes."""
@@ -243,6 +252,7 @@ class VariationalGaussianMixture:
 
     def _points(self, X: ArrayLike, *, fitting: bool) -> Array:
         """Points as the compiled module takes them; of the dimension that was fitted unless they are to be `fitting`."""
+        self._remember_names(X, fitting)
         points = _reals("X", X)
         if points.ndim != 2:
             raise ValueError(f"X: expected 2D array (N, D), got {points.ndim}D array instead. Reshape your data either using X.reshape(-1, 1) or X.reshape(1, -1).")
@@ -255,6 +265,13 @@ class VariationalGaussianMixture:
         if not fitting and points.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {points.shape[1]} features, but {type(self).__name__} is expecting {self.n_features_in_} features as input")
         return points
+
+    def _remember_names(self, X: ArrayLike, fitting: bool) -> None:
+        """Names of the columns of a data frame, `feature_names_in_` (D,), which later ones must have as well: scikit-learn's own rules, where that is installed."""
+        if _Base is not _Parameters:
+            from sklearn.utils import validation
+
+            validation._check_feature_names(self, X, reset=fitting)
 
     def _continues(self, points: Array) -> bool:
         """Whether a fit may begin with the components of the last one."""
@@ -280,6 +297,11 @@ class VariationalGaussianMixture:
         self.n_features_in_ = self.means_.shape[1]
         self.mean_prior_, self.covariance_prior_ = state["prior_mean"], state["prior_scale_inverse"]
         self.degrees_of_freedom_prior_ = state["prior_degrees_of_freedom"]
+
+
+def _names(kind: type) -> list[str]:
+    """Names of the parameters."""
+    return sorted(inspect.signature(kind).parameters)
 
 
 def _reals(name: str, values: ArrayLike) -> Array:

@@ -67,7 +67,7 @@ impl Points<'_> {
         }
         let total: f64 = weights.iter().sum();
         if total <= 0.0 || !total.is_finite() {
-            return wrong("weights with a finite sum above 0", format!("weights with the sum {total}"));
+            return wrong("weights that are not all zero, with a finite sum", format!("weights with the sum {total}"));
         }
         Ok(())
     }
@@ -90,7 +90,7 @@ impl Points<'_> {
 /// Points about a centre, coordinate by coordinate, filled up to whole blocks with points of no weight.
 #[derive(Debug)]
 pub(super) struct Planes {
-    pub count: usize,
+    /// N, filled up to whole blocks.
     pub padded: usize,
     pub dimensions: usize,
     /// What was taken off the coordinates.
@@ -117,7 +117,7 @@ impl Planes {
             }
         }
         let total = weights.iter().sum();
-        Self { count, padded, dimensions, centre, values, weights, total }
+        Self { padded, dimensions, centre, values, weights, total }
     }
 
     /// One coordinate of all points.

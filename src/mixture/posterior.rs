@@ -1,7 +1,7 @@
 //! What is believed of the components after the M step, and what densities that means.
 
 use super::moments::{Moments, keep_rows};
-use super::points::{BAND, Planes, Points};
+use super::points::{BAND, Points};
 use super::prior::Prior;
 use crate::error::{Error, Result};
 use crate::math::dense;
@@ -239,13 +239,6 @@ impl Densities {
         }
         shares.iter_mut().for_each(|share| *share /= sum);
         most + sum.ln()
-    }
-
-    /// Coordinates of a point of planes.
-    pub fn point(planes: &Planes, n: usize, into: &mut [f64]) {
-        for (d, x) in into.iter_mut().enumerate() {
-            *x = planes.plane(d)[n];
-        }
     }
 }
 

@@ -1,6 +1,8 @@
 """Weighted variational mixtures: agreement with scikit-learn on repeated points, conventions, edge cases."""
 
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -12,12 +14,13 @@ from sklearn.utils.estimator_checks import check_estimator
 from jacoflow.mixture import VariationalGaussianMixture
 
 
-def clusters(count, dimensions, seed=0):
-    """Points (N, D) about four centres, whole weights (N,), responsibilities (N, 6)."""
+def clusters(count, dimensions, seed=0, apart=6.0):
+    """Points (N, D) about four centres `apart`, whole weights (N,), responsibilities (N, 6)."""
     rng = np.random.default_rng(seed)
-    centres = rng.normal(0, 6, (4, dimensions))
-    x = centres[rng.integers(4, size=count)] + rng.normal(0, 1, (count, dimensions))
-    return x, rng.integers(0, 5, count), rng.dirichlet(np.ones(6), count)
+    centres, labels = rng.normal(0, apart, (4, dimensions)), rng.integers(4, size=count)
+    x = centres[labels] + rng.normal(0, 1, (count, dimensions))
+    # From wholly random responsibilities rounding decides between optima.
+    return x, rng.integers(0, 5, count), 0.5 * np.eye(6)[labels] + 0.5 * rng.dirichlet(np.ones(6), count)
 
 
 def full_bound(reference, d, total):
@@ -43,7 +46,7 @@ def test_agrees_with_scikit_learn_on_repeated_points(d, rounds):
     repeated = np.repeat(x, f, axis=0)
     mean = np.average(x, axis=0, weights=f)
     reference = FromResponsibilities(
-        6, weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3, mean_prior=mean,
+        n_components=6, weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3, mean_prior=mean,
         degrees_of_freedom_prior=d + 9.1, covariance_prior=0.1 * np.eye(d), reg_covar=0, max_iter=rounds - 1, tol=0,
     )  # fmt: skip
     reference.resp = np.repeat(resp, f, axis=0)
@@ -106,7 +109,7 @@ def test_warm_start_goes_on():
 
 
 def test_batches_and_a_single_fit():
-    x, f, _ = clusters(3000, 3)
+    x, f, _ = clusters(3000, 3, apart=20.0)
     parameters = {"mean_prior": np.average(x, axis=0, weights=f), "covariance_prior": 0.1, "random_state": 0, "tol": 1e-8, "max_iter": 300}
     whole = VariationalGaussianMixture(4, **parameters).fit(x, sample_weight=f)
     first = VariationalGaussianMixture(4, **parameters).partial_fit(x, sample_weight=f)
@@ -202,4 +205,24 @@ def test_scikit_learns_conventions():
     mixture = VariationalGaussianMixture(3, tol=1e-3, random_state=1)
     assert clone(mixture).get_params() == mixture.get_params()
     assert repr(mixture) == "VariationalGaussianMixture(n_components=3, random_state=1, tol=0.001)"
-    check_estimator(mixture)
+    check_estimator(mixture, on_skip=None)
+
+
+def test_works_without_scikit_learn():
+    program = """if True:
+        import sys
+        sys.modules["sklearn"] = None
+        import jacoflow
+        mixture = jacoflow.mixture.VariationalGaussianMixture(3, random_state=1)
+        assert repr(mixture) == "VariationalGaussianMixture(n_components=3, random_state=1)", repr(mixture)
+        assert mixture.set_params(tol=None).get_params()["tol"] is None
+        for wrong in (lambda: mixture.set_params(magic=1), lambda: mixture.predict([[0.0]])):
+            try:
+                wrong()
+            except (ValueError, AttributeError) as error:
+                assert "magic" in str(error) or "not fitted" in str(error), error
+            else:
+                raise AssertionError
+        assert mixture.fit_predict([[0.0], [0.1], [9.0]]).shape == (3,)
+    """
+    subprocess.run([sys.executable, "-c", program], check=True)
