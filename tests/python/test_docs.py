@@ -34,7 +34,8 @@ def public():
             if inspect.isclass(thing) and thing.__module__.startswith("jacoflow") and not issubclass(thing, Exception):
                 for member, value in vars(thing).items():
                     described = inspect.isroutine(value) or inspect.isdatadescriptor(value) or isinstance(value, property)
-                    if not member.startswith("_") and described:
+                    borrowed = type(value).__module__.startswith("sklearn")
+                    if not member.startswith("_") and described and not borrowed:
                         yield f"{module_name}.{name}.{member}", getattr(thing, member)
 
 
