@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture")
 
 
 def main() -> None:
@@ -84,6 +84,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import tracking
 
         return tracking.sections(quick, data)
+    if name == "mixture":
+        import mixture
+
+        return {"Weighted mixtures, a round": mixture.table(rounds)}
     if data is None:
         return {}
     import accuracy
@@ -103,7 +107,7 @@ def describe_machine(simd: str) -> dict[str, str]:
     import jacoflow
 
     machine["jacoflow"] = jacoflow.__version__
-    for package in ("numpy", "opencv-contrib-python-headless", "filterpy"):
+    for package in ("numpy", "opencv-contrib-python-headless", "filterpy", "scikit-learn"):
         try:
             machine[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

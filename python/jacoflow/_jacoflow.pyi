@@ -50,6 +50,9 @@ __all__ = [
     "_detect_moving_target",
     "_local_flow",
     "_mean_flow",
+    "_mixture_densities",
+    "_mixture_fit",
+    "_mixture_partial_fit",
     "_observability",
     "Scene",
     "Sensor",
@@ -910,6 +913,19 @@ def _mean_flow(flow: NDArray[np.float64], accepted: NDArray[np.bool_], eps: floa
 def _detect_moving_target(
     first: NDArray[Any], second: NDArray[Any], center: list[float] | None
 ) -> tuple[list[float], list[float]] | None: ...
+def _mixture_fit(
+    points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    parameters: dict[str, Any],
+    responsibilities: NDArray[np.float64] | None,
+    start: dict[str, Any] | None,
+) -> dict[str, Any]: ...
+def _mixture_partial_fit(
+    points: NDArray[np.float64], weights: NDArray[np.float64] | None, parameters: dict[str, Any], earlier: dict[str, Any] | None, forgetting: float
+) -> dict[str, Any]: ...
+def _mixture_densities(
+    points: NDArray[np.float64], components: dict[str, Any], threads: int | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

@@ -1,8 +1,8 @@
 //! The linear filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", 1960).
 
-use super::dense::multiply;
 use super::state::{GaussianState, check_matrix, check_measurement, expect, shared};
 use crate::error::Result;
+use crate::math::dense::multiply;
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 

@@ -36,7 +36,6 @@
 //! # }
 //! ```
 
-mod dense;
 mod extended;
 mod kalman;
 mod sigma_points;

@@ -103,7 +103,7 @@ impl SigmaPoints {
         super::state::check_mean(x)?;
         self.check(n)?;
         let mut l = vec![0.0; n * n];
-        if !super::dense::cholesky(p, n, &mut l) {
+        if !crate::math::dense::cholesky(p, n, &mut l) {
             return Err(Error::Numerical("P is not positive definite".into()));
         }
         let mut out = vec![0.0; Self::count(n) * n];

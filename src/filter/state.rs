@@ -1,9 +1,9 @@
 //! What every filter here holds: a batch of Gaussians, the noise, and the last update's by-products.
 
-use super::dense::{
+use crate::error::{Error, Result};
+use crate::math::dense::{
     cholesky, covariance_fault, factor, forward, mend, multiply, multiply_transposed, solve, symmetrise,
 };
-use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// A batch of `B` independent Gaussian states with `n` dimensions, measured by `m` numbers each. Row-major arrays.

@@ -5,6 +5,7 @@
 
 use super::*;
 use crate::error::{Error, Result};
+use crate::math::dense;
 use crate::math::random::CounterRng;
 
 mod soundness;

@@ -1,9 +1,9 @@
 //! The unscented filter (S. Julier, J. Uhlmann, "Unscented filtering and nonlinear estimation", 2004).
 
-use super::dense::{cholesky, solve, symmetrise};
 use super::sigma_points::SigmaPoints;
 use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::{Error, Result};
+use crate::math::dense::{cholesky, solve, symmetrise};
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 

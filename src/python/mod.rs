@@ -14,6 +14,7 @@ mod gauss_markov;
 mod image;
 mod io;
 mod keywords;
+mod mixture;
 mod observability;
 mod options;
 mod progress;
@@ -50,6 +51,8 @@ mod _jacoflow {
     use super::io::{
         FrameReader, open_frames, read_float_map, read_flow, read_one_image, write_float_map, write_flow, write_frames,
     };
+    #[pymodule_export]
+    use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
     use super::observability::{classify, observability};
     #[pymodule_export]

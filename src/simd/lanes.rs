@@ -39,6 +39,8 @@ pub(crate) trait Lanes:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The greatest whole number not above the value.
     fn floor(self) -> Self;
+    /// 2 to the power of the value, a whole number that is an exponent of normal numbers: -126 to 127 in single, -1022 to 1023 in double precision.
+    fn power_of_two(self) -> Self;
     /// Sums four rows of four neighbours down their columns, a patch of its own for every lane `l`:
     /// `result[k][l] = sum_j weights[j][l] plane[(row[l] + j) stride + column[l] + k]`, `j, k = 0..4`.
     ///
@@ -66,7 +68,7 @@ pub(crate) trait SimdReal: Real + Lanes<Scalar = Self> {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ty, $avx2:ident, $avx512:ident) => {
+    ($t:ty, $bits:ty, $bias:literal, $mantissa:literal, $avx2:ident, $avx512:ident) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -117,6 +119,10 @@ macro_rules! scalar_lanes {
                 <$t>::floor(self)
             }
             #[inline(always)]
+            fn power_of_two(self) -> $t {
+                <$t>::from_bits(((self as i32 + $bias) as $bits) << $mantissa)
+            }
+            #[inline(always)]
             fn sum_patches(plane: &[$t], stride: usize, column: $t, row: $t, weights: [$t; 4]) -> [$t; 4] {
                 let patch = &plane[row as usize * stride + column as usize..][..3 * stride + 4];
                 std::array::from_fn(|k| {
@@ -140,5 +146,5 @@ macro_rules! scalar_lanes {
     };
 }
 
-scalar_lanes!(f32, F32x8, F32x16);
-scalar_lanes!(f64, F64x4, F64x8);
+scalar_lanes!(f32, u32, 127, 23, F32x8, F32x16);
+scalar_lanes!(f64, u64, 1023, 52, F64x4, F64x8);

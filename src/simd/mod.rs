@@ -7,11 +7,13 @@
 //! Closures do not inherit target features, so a kernel is a struct with its arguments as fields and
 //! `#[inline(always)]` on `run` and on everything hot that it calls.
 
+mod exponential;
 mod lanes;
 mod precision;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub(crate) use exponential::exp;
 pub(crate) use lanes::{Lanes, SimdReal};
 pub(crate) use precision::{same, same_mut};
 

@@ -12,6 +12,10 @@ use super::lanes::Lanes;
 use core::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// A whole number added to these stands, with the exponent's bias, in the lowest bits of the sum: `2^23 + 127`, `2^52 + 1023`.
+const BIASED_F32: f32 = 8_388_735.0;
+const BIASED_F64: f64 = 4_503_599_627_371_519.0;
+
 /// Round towards minus infinity, without a flag for inexact results.
 const FLOOR: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
 
@@ -21,7 +25,7 @@ macro_rules! lanes {
         $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident, $div:ident,
         $fmadd:ident, $fnmadd:ident, $sqrt:ident, $min:ident, $max:ident,
         |$la:ident, $lb:ident| $lt:expr, |$sm:ident, $sy:ident, $sn:ident| $select:expr,
-        |$fa:ident| $floor:expr, $patches:path
+        |$fa:ident| $floor:expr, |$pa:ident| $power:expr, $patches:path
     ) => {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($vector);
@@ -131,6 +135,12 @@ macro_rules! lanes {
                 Self(unsafe { $floor })
             }
             #[inline(always)]
+            fn power_of_two(self) -> Self {
+                let $pa = self.0;
+                // SAFETY: see the module's note.
+                Self(unsafe { $power })
+            }
+            #[inline(always)]
             fn sum_patches(plane: &[$scalar], stride: usize, column: Self, row: Self, weights: [Self; 4]) -> [Self; 4] {
                 // SAFETY: see the module's note.
                 unsafe { $patches(plane, stride, column.0, row.0, weights.map(|w| w.0)) }.map(Self)
@@ -160,6 +170,7 @@ lanes!(
     |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm256_blendv_ps(n, y, m),
     |a| _mm256_floor_ps(a),
+    |a| _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(_mm256_add_ps(a, _mm256_set1_ps(BIASED_F32))))),
     patches::f32x8
 );
 lanes!(
@@ -183,6 +194,7 @@ lanes!(
     |a, b| _mm256_cmp_pd::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm256_blendv_pd(n, y, m),
     |a| _mm256_floor_pd(a),
+    |a| _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(_mm256_add_pd(a, _mm256_set1_pd(BIASED_F64))))),
     patches::f64x4
 );
 lanes!(
@@ -206,6 +218,7 @@ lanes!(
     |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm512_mask_blend_ps(m, n, y),
     |a| _mm512_roundscale_ps::<FLOOR>(a),
+    |a| _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(_mm512_add_ps(a, _mm512_set1_ps(BIASED_F32))))),
     patches::f32x16
 );
 lanes!(
@@ -229,5 +242,6 @@ lanes!(
     |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm512_mask_blend_pd(m, n, y),
     |a| _mm512_roundscale_pd::<FLOOR>(a),
+    |a| _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(_mm512_add_pd(a, _mm512_set1_pd(BIASED_F64))))),
     patches::f64x8
 );

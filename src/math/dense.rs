@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// `out = a b` with `a` of `rows x inner` and `b` of `inner x columns`.
-pub(super) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+pub(crate) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
     let columns = b.len() / inner;
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         out.fill(0.0);
@@ -16,7 +16,7 @@ pub(super) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
 }
 
 /// `out = a b^T` with `a` of `rows x inner` and `b` of `columns x inner`.
-pub(super) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+pub(crate) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
     let columns = b.len() / inner;
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         for (out, b) in out.iter_mut().zip(b.chunks_exact(inner)) {
@@ -26,7 +26,7 @@ pub(super) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut 
 }
 
 /// Replaces a square matrix by its symmetric part.
-pub(super) fn symmetrise(a: &mut [f64], n: usize) {
+pub(crate) fn symmetrise(a: &mut [f64], n: usize) {
     for i in 0..n {
         for j in 0..i {
             let mean = 0.5 * (a[i * n + j] + a[j * n + i]);
@@ -37,7 +37,7 @@ pub(super) fn symmetrise(a: &mut [f64], n: usize) {
 }
 
 /// The lower Cholesky factor of `a` (only its lower triangle is read); false where a pivot is not positive.
-pub(super) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
+pub(crate) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
     l.fill(0.0);
     for j in 0..n {
         let row: f64 = l[j * n..j * n + j].iter().map(|v| v * v).sum();
@@ -57,7 +57,7 @@ pub(super) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
 
 /// The Cholesky factor of `a`, which is first mended if it must be: symmetrised, and its eigenvalues lifted to 1e-12 of the largest.
 /// Returns whether it was mended; `None` when it cannot be (NaN, infinity, no positive eigenvalue).
-pub(super) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
+pub(crate) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
     if cholesky(a, n, l) {
         return Some(false);
     }
@@ -87,7 +87,7 @@ pub(super) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
 const ROUNDING: f64 = 1e-9;
 
 /// What is wrong with a covariance, in words: entries that are not finite, no symmetry, or an eigenvalue below zero by more than rounding. `None`: nothing.
-pub(super) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
+pub(crate) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
     if let Some(value) = a.iter().find(|v| !v.is_finite()) {
         return Some(format!("one with the entry {value}"));
     }
@@ -105,7 +105,7 @@ pub(super) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
 }
 
 /// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended; `None`: nothing can be done.
-pub(super) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
+pub(crate) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
     if a.iter().any(|v| !v.is_finite()) {
         return None;
     }
@@ -131,7 +131,7 @@ fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
 }
 
 /// Solves `l l^T x = b` in place.
-pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
+pub(crate) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     forward(l, n, b);
     for i in (0..n).rev() {
         let dot: f64 = (i + 1..n).map(|k| l[k * n + i] * b[k]).sum();
@@ -140,7 +140,7 @@ pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
 }
 
 /// Solves `l x = b` in place.
-pub(super) fn forward(l: &[f64], n: usize, b: &mut [f64]) {
+pub(crate) fn forward(l: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
         let dot: f64 = (0..i).map(|k| l[i * n + k] * b[k]).sum();
         b[i] = (b[i] - dot) / l[i * n + i];

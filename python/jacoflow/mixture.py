@@ -1,0 +1,329 @@
+"""Mixtures of Gaussians by variational Bayes, for points with weights.
+
+scikit-learn's conventions, without needing scikit-learn: `fit`, `predict`, `sample_weight`, `random_state`, fitted attributes with a trailing underscore.
+Arrays are (N, D) of real numbers in any unit; everything is computed in double precision.
+
+>>> import numpy as np
+>>> from jacoflow.mixture import VariationalGaussianMixture
+>>> rng = np.random.default_rng(0)
+>>> x = np.concatenate([rng.normal(0, 1, (200, 2)), rng.normal(8, 1, (100, 2))])
+>>> mixture = VariationalGaussianMixture(6, random_state=0).fit(x, sample_weight=np.full(300, 2.0))
+>>> np.sort(mixture.weights_)[-2:].round(2).tolist()
+[0.33, 0.66]
+"""
+
+from __future__ import annotations
+
+import inspect
+import numbers
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._jacoflow import _mixture_densities, _mixture_fit, _mixture_partial_fit
+
+__all__ = ["VariationalGaussianMixture"]
+
+Array = NDArray[np.float64]
+
+
+class VariationalGaussianMixture:
+    """A mixture of Gaussians in D dimensions, fitted to weighted points by variational Bayes.
+
+    Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern Recognition and
+    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, whatever the number of threads and the
+    order of the points.
+
+    Parameters
+    ----------
+    n_components : int
+        K, the most components there may be (no unit).
+    weight_concentration_prior : float
+        `alpha0` of the Dirichlet prior, above 0, no unit.
+    mean_precision_prior : float
+        `beta0`, precision of the means over that of the points, above 0, no unit.
+    mean_prior : array (D,), units of X
+        `m0`; default: the weighted mean.
+    degrees_of_freedom_prior : float
+        `nu0` of the Wishart prior, above D - 1; default D + 9.1.
+    covariance_prior : array (D, D) or float, units of X squared
+        `W0^-1`, or its diagonal; default: the weighted covariance.
+    max_iter : int
+        Most rounds, each an M step and an E step.
+    tol : float or None
+        Rounds end when the lower bound grows by less than this times the sum of the weights; None: exactly `max_iter` rounds.
+    n_init : int
+        Fits from different seeds, of which the one with the greatest lower bound is kept.
+    init : "kmeans++" or "random"
+        First responsibilities: clusters of weighted k-means, or random numbers.
+    prune_weight : float
+        Components with less weight of points than this are left out while fitting; 0: none.
+    warm_start : bool
+        Whether `fit` begins with the components of the last fit.
+    random_state : int, numpy.random.RandomState, numpy.random.Generator or None
+        Seed; None: numpy's global one.
+    threads : int or None
+        Number of threads; default: the environment variable JACOFLOW_THREADS, or every processor.
+
+    Attributes
+    ----------
+    weights_ : array (K,)
+        Expected proportions, `alpha / sum(alpha)`.
+    means_ : array (K, D), units of X
+        `m_k`.
+    covariances_, precisions_ : array (K, D, D)
+        `W_k^-1 / nu_k` and its inverse.
+    weight_concentration_, mean_precision_, degrees_of_freedom_ : array (K,)
+        `alpha_k`, `beta_k`, `nu_k`.
+    lower_bound_ : float, lower_bounds_ : array (n_iter_,)
+        The lower bound of the evidence after the last and after each M step, natural logarithm.
+    n_iter_ : int, converged_ : bool
+        Rounds, and whether `tol` ended them.
+    n_features_in_ : int
+        D.
+    mean_prior_, covariance_prior_, degrees_of_freedom_prior_
+        The prior that was used: (D,), (D, D), float.
+
+    Raises
+    ------
+    ValueError
+        For parameters out of range, points that are not finite, weights that are negative, not finite or all zero; each message names the argument.
+    """
+
+    weights_: Array
+    means_: Array
+    covariances_: Array
+    precisions_: Array
+    weight_concentration_: Array
+    mean_precision_: Array
+    degrees_of_freedom_: Array
+    lower_bounds_: Array
+    lower_bound_: float
+    n_iter_: int
+    converged_: bool
+    n_features_in_: int
+    mean_prior_: Array
+    covariance_prior_: Array
+    degrees_of_freedom_prior_: float
+
+    def __init__(
+        self,
+        n_components: int = 12,
+        *,
+        weight_concentration_prior: float = 0.1,
+        mean_precision_prior: float = 1e-3,
+        mean_prior: ArrayLike | None = None,
+        degrees_of_freedom_prior: float | None = None,
+        covariance_prior: ArrayLike | None = None,
+        max_iter: int = 100,
+        tol: float | None = 1e-4,
+        n_init: int = 1,
+        init: str = "kmeans++",
+        prune_weight: float = 0.0,
+        warm_start: bool = False,
+        random_state: Any = None,
+        threads: int | None = None,
+    ) -> None:
+        self.n_components = n_components
+        self.weight_concentration_prior = weight_concentration_prior
+        self.mean_precision_prior = mean_precision_prior
+        self.mean_prior = mean_prior
+        self.degrees_of_freedom_prior = degrees_of_freedom_prior
+        self.covariance_prior = covariance_prior
+        self.max_iter = max_iter
+        self.tol = tol
+        self.n_init = n_init
+        self.init = init
+        self.prune_weight = prune_weight
+        self.warm_start = warm_start
+        self.random_state = random_state
+        self.threads = threads
+
+    def fit(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None, resp: ArrayLike | None = None) -> VariationalGaussianMixture:
+        """Fits the mixture to points.
+
+        Parameters
+        ----------
+        X : array (N, D)
+            Points.
+        y : ignored
+            Only there for pipelines (no unit).
+        sample_weight : array (N,)
+            Evidence of each point, not negative; default 1.
+        resp : array (N, n_components)
+            First responsibilities, rows that sum to 1, in place of `init`.
+        """
+        points, weights = self._points(X, fitting=True), _weights(sample_weight)
+        start = self._state if self.warm_start and self._continues(points) else None
+        self._take(_mixture_fit(points, weights, self._parameters(), None if resp is None else _reals("resp", resp), start))
+        return self
+
+    def partial_fit(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None, forgetting: float = 1.0) -> VariationalGaussianMixture:
+        """Adds a batch of points to the mixture; the first batch is a fit.
+
+        Responsibilities of earlier points stay as they were; of them only weights, means and scatters of the components are kept, times `forgetting`. Rounds maximise the lower bound of earlier and new points together.
+
+        Parameters
+        ----------
+        X : array (N, D)
+            Points of the batch.
+        y : ignored
+            Only there for pipelines (no unit).
+        sample_weight : array (N,)
+            Evidence of each point, not negative; default 1.
+        forgetting : float in (0, 1], no unit
+            What earlier points weigh after this batch over what they weighed before.
+        """
+        first = not hasattr(self, "_state")
+        points, weights = self._points(X, fitting=first), _weights(sample_weight)
+        self._take(_mixture_partial_fit(points, weights, self._parameters(), None if first else self._state, forgetting))
+        return self
+
+    def fit_predict(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> NDArray[np.int64]:
+        """Fits the mixture to points (N, D) and returns the component of each, (N,)."""
+        return self.fit(X, y, sample_weight).predict(X)
+
+    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
+        """The component that each point (N, D) belongs to, (N,): the one with the greatest responsibility."""
+        return np.argmax(self.predict_proba(X), axis=1)
+
+    def predict_proba(self, X: ArrayLike) -> Array:
+        """Responsibilities (N, K) of the components for points (N, D), equation (13); rows sum to 1."""
+        return self._densities(X)[1]
+
+    def score_samples(self, X: ArrayLike) -> Array:
+        """Log density (N,) of points (N, D): `ln sum_k rho_nk` of equation (14), natural logarithm."""
+        return self._densities(X)[0]
+
+    def score(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> float:
+        """Mean of `score_samples` over points (N, D) with weights (N,)."""
+        return float(np.average(self.score_samples(X), weights=_weights(sample_weight)))
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The parameters by name, as they were given (their units); `deep` makes no difference."""
+        return {name: getattr(self, name) for name in self._names()}
+
+    def set_params(self, **parameters: Any) -> VariationalGaussianMixture:
+        """Sets parameters by name (in their units); ValueError for a name that there is none of."""
+        for name, value in parameters.items():
+            if name not in self._names():
+                raise ValueError(f"Invalid parameter {name!r} for estimator {self}. Valid parameters are: {self._names()!r}.")
+            setattr(self, name, value)
+        return self
+
+    def __repr__(self) -> str:
+        defaults = {name: parameter.default for name, parameter in inspect.signature(type(self).__init__).parameters.items()}
+        changed = [f"{name}={value!r}" for name, value in self.get_params().items() if value is not defaults[name] and repr(value) != repr(defaults[name])]
+        return f"{type(self).__name__}({', '.join(changed)})"
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "_state")
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import InputTags, Tags, TargetTags
+
+        return Tags(estimator_type="density_estimator", target_tags=TargetTags(required=False), input_tags=InputTags())
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return sorted(name for name in inspect.signature(cls.__init__).parameters if name != "self")
+
+    def _parameters(self) -> dict[str, Any]:
+        """What the compiled module takes."""
+        parameters = self.get_params()
+        for name in ("n_components", "max_iter", "n_init"):
+            _demand(name, parameters[name], numbers.Integral, "an integer")
+        for name in ("weight_concentration_prior", "mean_precision_prior", "prune_weight"):
+            _demand(name, parameters[name], numbers.Real, "a number")
+        for name in ("degrees_of_freedom_prior", "tol"):
+            if parameters[name] is not None:
+                _demand(name, parameters[name], numbers.Real, "a number or None")
+        return {**parameters, "seed": _seed(self.random_state)}
+
+    def _points(self, X: ArrayLike, *, fitting: bool) -> Array:
+        """Points as the compiled module takes them; of the dimension that was fitted unless they are to be `fitting`."""
+        points = _reals("X", X)
+        if points.ndim != 2:
+            raise ValueError(f"X: expected 2D array (N, D), got {points.ndim}D array instead. Reshape your data either using X.reshape(-1, 1) or X.reshape(1, -1).")
+        if points.shape[0] == 0:
+            raise ValueError(f"X: found array with 0 sample(s) (shape={points.shape}) while a minimum of 1 is required.")
+        if points.shape[1] == 0:
+            raise ValueError(f"X: found array with 0 feature(s) (shape={points.shape}) while a minimum of 1 is required.")
+        if not np.isfinite(points).all():
+            raise ValueError(f"X: expected finite numbers, got {'NaN' if np.isnan(points).any() else 'infinity'}.")
+        if not fitting and points.shape[1] != self.n_features_in_:
+            raise ValueError(f"X has {points.shape[1]} features, but {type(self).__name__} is expecting {self.n_features_in_} features as input")
+        return points
+
+    def _continues(self, points: Array) -> bool:
+        """Whether a fit may begin with the components of the last one."""
+        return hasattr(self, "_state") and self.n_features_in_ == points.shape[1] and len(self.weights_) <= self.n_components
+
+    def _densities(self, X: ArrayLike) -> tuple[Array, Array]:
+        if not hasattr(self, "_state"):
+            raise _not_fitted(type(self).__name__)
+        sums, shares = _mixture_densities(self._points(X, fitting=False), self._state, self.threads)
+        return sums, shares
+
+    def _take(self, state: dict[str, Any]) -> None:
+        """The attributes that a fit leaves."""
+        self._state = state
+        alpha, nu = state["weight_concentration"], state["degrees_of_freedom"]
+        self.weight_concentration_, self.degrees_of_freedom_ = alpha, nu
+        self.mean_precision_, self.means_ = state["mean_precision"], state["means"]
+        self.weights_ = alpha / alpha.sum()
+        self.covariances_ = state["scale_inverses"] / nu[:, None, None]
+        self.precisions_ = np.linalg.inv(self.covariances_)
+        self.lower_bounds_, self.lower_bound_ = state["lower_bounds"], float(state["lower_bounds"][-1])
+        self.n_iter_, self.converged_ = len(self.lower_bounds_), state["converged"]
+        self.n_features_in_ = self.means_.shape[1]
+        self.mean_prior_, self.covariance_prior_ = state["prior_mean"], state["prior_scale_inverse"]
+        self.degrees_of_freedom_prior_ = state["prior_degrees_of_freedom"]
+
+
+def _reals(name: str, values: ArrayLike) -> Array:
+    """An array of doubles; TypeError or ValueError naming the argument for what is none."""
+    if hasattr(values, "toarray") and not isinstance(values, np.ndarray):
+        raise TypeError(f"{name}: sparse data was passed, but dense data is required. Use '.toarray()' to convert to a dense numpy array.")
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise ValueError(f"{name}: Complex data not supported, got {array.dtype}.")
+    try:
+        return np.ascontiguousarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name}: expected real numbers, got {array.dtype}: {error}") from error
+
+
+def _weights(sample_weight: ArrayLike | None) -> Array | None:
+    return None if sample_weight is None else _reals("sample_weight", sample_weight)
+
+
+def _demand(name: str, value: object, kind: type, words: str) -> None:
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise TypeError(f"{name}: expected {words}, got {value!r}")
+
+
+def _seed(random_state: Any) -> int:
+    """A seed of 32 bits out of what scikit-learn's users give."""
+    if random_state is None:
+        return int(np.random.randint(2**31))
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**31))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**31))
+    _demand("random_state", random_state, numbers.Integral, "an integer, a numpy generator or None")
+    if not 0 <= random_state < 2**64:
+        raise ValueError(f"random_state: expected an integer from 0 to 2^64 - 1, got {random_state}")
+    return int(random_state)
+
+
+def _not_fitted(name: str) -> Exception:
+    """scikit-learn's error where that is installed, else one that is caught the same ways."""
+    message = f"This {name} instance is not fitted yet. Call 'fit' with appropriate arguments before using this estimator."
+    try:
+        from sklearn.exceptions import NotFittedError
+    except ImportError:
+        return AttributeError(message)
+    error: Exception = NotFittedError(message)
+    return error

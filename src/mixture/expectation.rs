@@ -1,0 +1,308 @@
+//! The E step (13) to (17) and the sums that the next M step needs (18) to (20), in one pass over the points.
+
+use super::moments::Moments;
+use super::points::{BAND, BLOCK, Planes};
+use super::posterior::Densities;
+use crate::simd::{Kernel, Lanes, Level, dispatch, exp};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Below this an exponential is zero; a product of it and zero is then zero, whatever the density.
+const LEAST: f64 = -1000.0;
+
+/// What the E step leaves: responsibilities only as their sums.
+#[derive(Debug)]
+pub(super) struct Expected {
+    /// (18) to (20).
+    pub moments: Moments,
+    /// `sum_n f_n sum_k r_nk ln r_nk`.
+    pub negentropy: f64,
+}
+
+/// Sums of one band about the components' means: of each component `N, sum d, lower triangle of sum d d^T`, `d = x - m_k`.
+#[derive(Debug)]
+struct Sums {
+    values: Vec<f64>,
+    negentropy: f64,
+}
+
+/// Responsibilities under `densities`, summed. Call it inside [`Threads::install`](crate::parallel::Threads::install).
+///
+/// Bands of fixed size are summed one after another: results do not depend on the number of threads.
+pub(super) fn expect(planes: &Planes, densities: &Densities) -> Expected {
+    let bands: Vec<Range<usize>> =
+        (0..planes.padded).step_by(BAND).map(|from| from..(from + BAND).min(planes.padded)).collect();
+    let sums: Vec<Sums> = bands.into_par_iter().map(|band| band_sums(planes, densities, band)).collect();
+    let mut sums = sums.into_iter();
+    let mut all = sums.next().expect("there is at least one point");
+    for band in sums {
+        all.values.iter_mut().zip(&band.values).for_each(|(sum, more)| *sum += more);
+        all.negentropy += band.negentropy;
+    }
+    Expected { moments: moments(&all.values, densities), negentropy: all.negentropy }
+}
+
+/// The sums of a band, by the kernel for its number of dimensions.
+fn band_sums(planes: &Planes, densities: &Densities, band: Range<usize>) -> Sums {
+    let level = Level::detect();
+    match planes.dimensions {
+        1 => dispatch(level, Band::<1> { planes, densities, band }),
+        2 => dispatch(level, Band::<2> { planes, densities, band }),
+        3 => dispatch(level, Band::<3> { planes, densities, band }),
+        4 => dispatch(level, Band::<4> { planes, densities, band }),
+        5 => dispatch(level, Band::<5> { planes, densities, band }),
+        6 => dispatch(level, Band::<6> { planes, densities, band }),
+        _ => plain_sums(planes, densities, band),
+    }
+}
+
+/// From sums about the components' old means to means and scatters about the new ones.
+fn moments(sums: &[f64], densities: &Densities) -> Moments {
+    let d = densities.dimensions;
+    let mut moments = Moments::none(densities.components(), d);
+    for (k, sums) in sums.chunks_exact(1 + d + densities.triangle()).enumerate() {
+        let count = sums[0];
+        moments.counts[k] = count;
+        if count <= 0.0 {
+            continue;
+        }
+        let (first, second) = sums[1..].split_at(d);
+        for i in 0..d {
+            moments.means[k * d + i] = densities.means[k * d + i] + first[i] / count;
+            for j in 0..=i {
+                let scatter = second[i * (i + 1) / 2 + j] - first[i] * (first[j] / count);
+                // A variance is not negative, whatever rounding says.
+                let scatter = if i == j { scatter.max(0.0) } else { scatter };
+                moments.scatters[(k * d + i) * d + j] = scatter;
+                moments.scatters[(k * d + j) * d + i] = scatter;
+            }
+        }
+    }
+    moments
+}
+
+/// The sums for any number of dimensions, point by point; the oracle of the kernel.
+fn plain_sums(planes: &Planes, densities: &Densities, band: Range<usize>) -> Sums {
+    let (d, components) = (planes.dimensions, densities.components());
+    let length = 1 + d + densities.triangle();
+    let mut sums = Sums { values: vec![0.0; components * length], negentropy: 0.0 };
+    let (mut x, mut shares) = (vec![0.0; d], vec![0.0; components]);
+    for n in band.start..band.end.min(planes.count) {
+        let weight = planes.weights[n];
+        Densities::point(planes, n, &mut x);
+        densities.share(&x, &mut shares);
+        for (k, (share, sums_k)) in shares.iter().zip(sums.values.chunks_exact_mut(length)).enumerate() {
+            if *share == 0.0 {
+                continue;
+            }
+            sums.negentropy += weight * share * share.ln();
+            let share = weight * share;
+            sums_k[0] += share;
+            let mut at = 1 + d;
+            for i in 0..d {
+                let off = share * (x[i] - densities.means[k * d + i]);
+                sums_k[1 + i] += off;
+                for j in 0..=i {
+                    sums_k[at] += off * (x[j] - densities.means[k * d + j]);
+                    at += 1;
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// The same in lanes.
+struct Band<'a, const D: usize> {
+    planes: &'a Planes,
+    densities: &'a Densities,
+    band: Range<usize>,
+}
+
+impl<const D: usize> Kernel<f64> for Band<'_, D> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> Sums {
+        let components = self.densities.components();
+        let length = 1 + D + self.densities.triangle();
+        let mut lanes = vec![0.0; components * length * V::LANES];
+        let mut logs = vec![0.0; components * BLOCK];
+        let mut negentropy = 0.0;
+        for from in self.band.step_by(BLOCK) {
+            let mut points = [[0.0; BLOCK]; D];
+            for d in 0..D {
+                points[d].copy_from_slice(&self.planes.plane(d)[from..from + BLOCK]);
+            }
+            let weights = &self.planes.weights[from..from + BLOCK];
+            let mut most = [f64::NEG_INFINITY; BLOCK];
+            for (k, logs) in logs.chunks_exact_mut(BLOCK).enumerate() {
+                log_densities::<V, D>(self.densities, k, &points, logs, &mut most);
+            }
+            let (mut total, mut entropy) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for logs in logs.chunks_exact_mut(BLOCK) {
+                exponentials::<V>(logs, &most, &mut total, &mut entropy);
+            }
+            let mut scale = [0.0; BLOCK];
+            for i in 0..BLOCK {
+                negentropy += weights[i] * (entropy[i] / total[i] - total[i].ln());
+                scale[i] = weights[i] / total[i];
+            }
+            for (k, (shares, lanes)) in
+                logs.chunks_exact(BLOCK).zip(lanes.chunks_exact_mut(length * V::LANES)).enumerate()
+            {
+                add::<V, D>(&self.densities.means[k * D..(k + 1) * D], &points, shares, &scale, lanes);
+            }
+        }
+        let values = lanes.chunks_exact(V::LANES).map(|lanes| lanes.iter().sum()).collect();
+        Sums { values, negentropy }
+    }
+}
+
+/// `ln rho` of a block's points under component k, and the greatest so far of each point.
+#[inline(always)]
+fn log_densities<V: Lanes<Scalar = f64>, const D: usize>(
+    densities: &Densities,
+    k: usize,
+    points: &[[f64; BLOCK]; D],
+    logs: &mut [f64],
+    most: &mut [f64; BLOCK],
+) {
+    let constant = V::splat(densities.constants[k]);
+    let mut mean = [V::zero(); D];
+    let mut rows = [[V::zero(); D]; D];
+    let triangle = &densities.whitening[k * D * (D + 1) / 2..(k + 1) * D * (D + 1) / 2];
+    for i in 0..D {
+        mean[i] = V::splat(densities.means[k * D + i]);
+        for j in 0..=i {
+            rows[i][j] = V::splat(triangle[i * (i + 1) / 2 + j]);
+        }
+    }
+    for at in (0..BLOCK).step_by(V::LANES) {
+        let mut off = [V::zero(); D];
+        let mut log = constant;
+        for i in 0..D {
+            off[i] = V::load(&points[i][at..]) - mean[i];
+            let mut z = off[0] * rows[i][0];
+            for j in 1..=i {
+                z = off[j].mul_add(rows[i][j], z);
+            }
+            log = z.neg_mul_add(z, log);
+        }
+        log.store(&mut logs[at..]);
+        log.max(V::load(&most[at..])).store(&mut most[at..]);
+    }
+}
+
+/// Turns `ln rho` into `rho` over the greatest one's; adds them to `total`, and times their logarithms to `entropy`.
+#[inline(always)]
+fn exponentials<V: Lanes<Scalar = f64>>(
+    logs: &mut [f64],
+    most: &[f64; BLOCK],
+    total: &mut [f64; BLOCK],
+    entropy: &mut [f64; BLOCK],
+) {
+    for at in (0..BLOCK).step_by(V::LANES) {
+        let log = (V::load(&logs[at..]) - V::load(&most[at..])).max(V::splat(LEAST));
+        let share = exp(log);
+        share.store(&mut logs[at..]);
+        (V::load(&total[at..]) + share).store(&mut total[at..]);
+        share.mul_add(log, V::load(&entropy[at..])).store(&mut entropy[at..]);
+    }
+}
+
+/// Adds a block to the lanes' sums of one component.
+#[inline(always)]
+fn add<V: Lanes<Scalar = f64>, const D: usize>(
+    mean: &[f64],
+    points: &[[f64; BLOCK]; D],
+    shares: &[f64],
+    scale: &[f64; BLOCK],
+    lanes: &mut [f64],
+) {
+    let mut centre = [V::zero(); D];
+    let mut count = V::load(lanes);
+    let mut first = [V::zero(); D];
+    let mut second = [[V::zero(); D]; D];
+    let mut slot = 1 + D;
+    for i in 0..D {
+        centre[i] = V::splat(mean[i]);
+        first[i] = V::load(&lanes[(1 + i) * V::LANES..]);
+        for j in 0..=i {
+            second[i][j] = V::load(&lanes[slot * V::LANES..]);
+            slot += 1;
+        }
+    }
+    for at in (0..BLOCK).step_by(V::LANES) {
+        let share = V::load(&shares[at..]) * V::load(&scale[at..]);
+        count = count + share;
+        let mut off = [V::zero(); D];
+        for i in 0..D {
+            off[i] = V::load(&points[i][at..]) - centre[i];
+            let weighted = share * off[i];
+            first[i] = first[i] + weighted;
+            for j in 0..=i {
+                second[i][j] = weighted.mul_add(off[j], second[i][j]);
+            }
+        }
+    }
+    count.store(lanes);
+    slot = 1 + D;
+    for i in 0..D {
+        first[i].store(&mut lanes[(1 + i) * V::LANES..]);
+        for j in 0..=i {
+            second[i][j].store(&mut lanes[slot * V::LANES..]);
+            slot += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::mixture::points::Points;
+    use crate::mixture::posterior::{Factors, Posterior};
+    use crate::mixture::prior::Prior;
+
+    /// Kernel and plain sums of the same made-up points and components.
+    fn both<const D: usize>() {
+        let (count, components) = (150, 4);
+        let rng = CounterRng::new(D as u64);
+        let values: Vec<f64> = (0..count * D).map(|i| 3.0 * rng.normal(i as u64)).collect();
+        let weights: Vec<f64> = (0..count).map(|i| f64::from(i as u32 % 4)).collect();
+        let points = Points { dimensions: D, values: &values, weights: Some(&weights) };
+        let planes = Planes::new(&points, points.mean());
+        let prior = Prior {
+            weight_concentration: 0.1,
+            mean_precision: 0.001,
+            mean: vec![0.0; D],
+            degrees_of_freedom: D as f64 + 1.0,
+            scale_inverse: (0..D * D).map(|at| if at % (D + 1) == 0 { 0.3 } else { 0.0 }).collect(),
+        };
+        let shares: Vec<f64> = (0..count * components).map(|i| rng.uniform(1000 + i as u64)).collect();
+        let shares: Vec<f64> =
+            shares.chunks(components).flat_map(|row| row.iter().map(|r| r / row.iter().sum::<f64>())).collect();
+        let posterior = Posterior::maximised(&prior, &Moments::of(&points, &planes.centre, &shares));
+        let densities = Densities::of(&posterior, &Factors::of(&posterior).unwrap());
+        let plain = plain_sums(&planes, &densities, 0..planes.padded);
+        let scale = plain.values.iter().fold(1.0f64, |m, v| m.max(v.abs()));
+        for level in Level::available() {
+            let got = dispatch(level, Band::<D> { planes: &planes, densities: &densities, band: 0..planes.padded });
+            assert!((got.negentropy - plain.negentropy).abs() < 1e-11 * plain.negentropy.abs().max(1.0), "{level:?}");
+            for (got, want) in got.values.iter().zip(&plain.values) {
+                assert!((got - want).abs() < 1e-12 * scale, "{level:?}, D = {D}: {got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_agree_with_the_plain_sums() {
+        both::<1>();
+        both::<2>();
+        both::<3>();
+        both::<4>();
+        both::<5>();
+        both::<6>();
+    }
+}

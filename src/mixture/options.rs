@@ -1,0 +1,100 @@
+//! What a fit may be asked for.
+
+use crate::error::{Error, Result};
+use crate::parallel::Threads;
+
+/// Where the inverse scale matrix of the Wishart prior, `W0^-1` (D, D), comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum CovariancePrior {
+    /// The weighted covariance of the points.
+    Data,
+    /// This number times the identity.
+    Isotropic(f64),
+    /// This matrix, row-major.
+    Full(Vec<f64>),
+}
+
+/// Where a fit without responsibilities begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Seeding {
+    /// Weighted k-means++ seeds and ten steps of Lloyd's algorithm.
+    #[default]
+    KMeans,
+    /// Random responsibilities.
+    Random,
+}
+
+/// Options of [`fit`](super::fit()); the defaults are those of the stereo paper's section on clustering, except where its prior would need a unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MixtureOptions {
+    /// Number of components K: 12.
+    pub components: usize,
+    /// `alpha0` of the Dirichlet prior: 0.1.
+    pub weight_concentration_prior: f64,
+    /// `beta0`, precision of the means over that of the points: 0.001.
+    pub mean_precision_prior: f64,
+    /// `m0` (D); none: the weighted mean of the points.
+    pub mean_prior: Option<Vec<f64>>,
+    /// `nu0` of the Wishart prior, above D - 1; none: D + 9.1.
+    pub degrees_of_freedom_prior: Option<f64>,
+    /// `W0^-1`: the weighted covariance of the points.
+    pub covariance_prior: CovariancePrior,
+    /// Most rounds of an M step and an E step: 100.
+    pub max_iter: usize,
+    /// Rounds end when the lower bound grows by less than this times the sum of the weights: 1e-4. None: always `max_iter` rounds.
+    pub tol: Option<f64>,
+    /// Fits from different seeds, of which that with the greatest lower bound is kept: 1.
+    pub n_init: usize,
+    /// How fits begin.
+    pub seeding: Seeding,
+    /// Components with less weight of points than this are left out: 0, none.
+    pub prune_weight: f64,
+    /// Seed of the random numbers: 0.
+    pub seed: u64,
+    /// Number of threads; results do not depend on it.
+    pub threads: Threads,
+}
+
+impl Default for MixtureOptions {
+    fn default() -> Self {
+        Self {
+            components: 12,
+            weight_concentration_prior: 0.1,
+            mean_precision_prior: 1e-3,
+            mean_prior: None,
+            degrees_of_freedom_prior: None,
+            covariance_prior: CovariancePrior::Data,
+            max_iter: 100,
+            tol: Some(1e-4),
+            n_init: 1,
+            seeding: Seeding::KMeans,
+            prune_weight: 0.0,
+            seed: 0,
+            threads: Threads::default(),
+        }
+    }
+}
+
+impl MixtureOptions {
+    /// # Errors
+    /// [`Error::Argument`] naming what cannot be used, whatever the points are.
+    pub(super) fn check(&self) -> Result<()> {
+        let positive = |name, value: f64| match value.is_finite() && value > 0.0 {
+            true => Ok(()),
+            false => Err(Error::argument(name, "a finite number above 0", value)),
+        };
+        for (name, count) in [("n_components", self.components), ("max_iter", self.max_iter), ("n_init", self.n_init)] {
+            if count == 0 {
+                return Err(Error::argument(name, "a positive integer", count));
+            }
+        }
+        positive("weight_concentration_prior", self.weight_concentration_prior)?;
+        positive("mean_precision_prior", self.mean_precision_prior)?;
+        for (name, value) in [("tol", self.tol.unwrap_or(0.0)), ("prune_weight", self.prune_weight)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(Error::argument(name, "a finite number, at least 0", value));
+            }
+        }
+        self.threads.check().map(|_| ())
+    }
+}

@@ -1,0 +1,265 @@
+//! What is believed of the components after the M step, and what densities that means.
+
+use super::moments::{Moments, keep_rows};
+use super::points::{BAND, Planes, Points};
+use super::prior::Prior;
+use crate::error::{Error, Result};
+use crate::math::dense;
+use crate::math::special::digamma;
+use rayon::prelude::*;
+use std::f64::consts::{LN_2, TAU};
+
+/// The posterior of every component: `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k ~ W(W_k, nu_k)` (24).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Posterior {
+    /// D.
+    pub dimensions: usize,
+    /// `alpha_k` (K), equation (23).
+    pub weight_concentration: Vec<f64>,
+    /// `beta_k` (K), equation (25).
+    pub mean_precision: Vec<f64>,
+    /// `nu_k` (K), equation (28).
+    pub degrees_of_freedom: Vec<f64>,
+    /// `m_k` (K, D), equation (26).
+    pub means: Vec<f64>,
+    /// `W_k^-1` (K, D, D), equation (27).
+    pub scale_inverses: Vec<f64>,
+}
+
+impl Posterior {
+    /// The M step, (23) to (28).
+    pub(super) fn maximised(prior: &Prior, moments: &Moments) -> Self {
+        let d = moments.dimensions;
+        let mut this = Self {
+            dimensions: d,
+            weight_concentration: moments.counts.iter().map(|n| prior.weight_concentration + n).collect(),
+            mean_precision: moments.counts.iter().map(|n| prior.mean_precision + n).collect(),
+            degrees_of_freedom: moments.counts.iter().map(|n| prior.degrees_of_freedom + n).collect(),
+            means: prior.mean.repeat(moments.components()),
+            scale_inverses: prior.scale_inverse.repeat(moments.components()),
+        };
+        for (k, count) in moments.counts.iter().copied().enumerate().filter(|(_, count)| *count > 0.0) {
+            let share = count / this.mean_precision[k];
+            let mean = &moments.means[k * d..(k + 1) * d];
+            let matrix = &mut this.scale_inverses[k * d * d..(k + 1) * d * d];
+            for i in 0..d {
+                let off = mean[i] - prior.mean[i];
+                this.means[k * d + i] = prior.mean[i] + share * off;
+                for j in 0..d {
+                    let spread = prior.mean_precision * share * off * (mean[j] - prior.mean[j]);
+                    matrix[i * d + j] += moments.scatters[k * d * d + i * d + j] + spread;
+                }
+            }
+        }
+        this
+    }
+
+    /// K.
+    pub fn components(&self) -> usize {
+        self.weight_concentration.len()
+    }
+
+    /// Only the components for which `keep` holds.
+    pub(super) fn retain(&mut self, keep: &[bool]) {
+        let d = self.dimensions;
+        let single = [&mut self.weight_concentration, &mut self.mean_precision, &mut self.degrees_of_freedom];
+        single.into_iter().for_each(|values| keep_rows(values, 1, keep));
+        keep_rows(&mut self.means, d, keep);
+        keep_rows(&mut self.scale_inverses, d * d, keep);
+    }
+
+    /// With `by` taken off (`sign` -1) or put on (1) the means.
+    pub(super) fn moved(mut self, by: &[f64], sign: f64) -> Self {
+        for mean in self.means.chunks_exact_mut(self.dimensions) {
+            mean.iter_mut().zip(by).for_each(|(m, c)| *m += sign * c);
+        }
+        self
+    }
+
+    /// Whether its parts fit together.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `start`.
+    pub(super) fn check(&self, dimensions: usize) -> Result<()> {
+        let k = self.components();
+        let lengths = [
+            self.mean_precision.len() == k,
+            self.degrees_of_freedom.len() == k,
+            self.dimensions == dimensions && self.means.len() == k * dimensions,
+            self.scale_inverses.len() == k * dimensions * dimensions,
+        ];
+        let numbers = [&self.weight_concentration, &self.mean_precision, &self.degrees_of_freedom];
+        let finite = self.means.iter().chain(&self.scale_inverses).all(|x| x.is_finite());
+        let sound = finite && numbers.into_iter().flatten().all(|x| x.is_finite() && *x > 0.0);
+        if k == 0 || lengths.contains(&false) || !sound {
+            let expected = format!("components with finite parameters in {dimensions} dimensions");
+            return Err(Error::argument(
+                "start",
+                expected,
+                format!("{k} components in {} dimensions", self.dimensions),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Share of each component in the points (13), (N, K), row-major. Every row sums to 1.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for points that are not finite or of another dimension, [`Error::Numerical`] for a matrix without a factor.
+    pub fn responsibilities(&self, points: &Points) -> Result<Vec<f64>> {
+        Ok(self.log_densities(points)?.1)
+    }
+
+    /// The component that each point belongs to: the one with the greatest share.
+    ///
+    /// # Errors
+    /// As [`Posterior::responsibilities`].
+    pub fn labels(&self, points: &Points) -> Result<Vec<u32>> {
+        let shares = self.responsibilities(points)?;
+        let largest = |row: &[f64]| (0..row.len()).fold(0, |best, k| if row[k] > row[best] { k } else { best });
+        Ok(shares.chunks_exact(self.components()).map(|row| largest(row) as u32).collect())
+    }
+
+    /// `ln sum_k rho_nk` of the points (N) by (14), and [`Posterior::responsibilities`].
+    ///
+    /// # Errors
+    /// As [`Posterior::responsibilities`].
+    pub fn log_densities(&self, points: &Points) -> Result<(Vec<f64>, Vec<f64>)> {
+        points.check_values()?;
+        self.check(points.dimensions)?;
+        let densities = Densities::of(self, &Factors::of(self)?);
+        let components = self.components();
+        let mut shares = vec![0.0; points.count() * components];
+        let mut sums = vec![0.0; points.count()];
+        let bands = shares.par_chunks_mut(BAND * components).zip(sums.par_chunks_mut(BAND)).enumerate();
+        bands.for_each(|(band, (shares, sums))| {
+            for (n, (row, sum)) in shares.chunks_exact_mut(components).zip(sums).enumerate() {
+                *sum = densities.share(points.at(band * BAND + n), row);
+            }
+        });
+        Ok((sums, shares))
+    }
+}
+
+/// Lower Cholesky factors of the `W_k^-1`, and `ln |W_k^-1|`.
+#[derive(Debug)]
+pub(super) struct Factors {
+    pub lower: Vec<f64>,
+    pub log_determinants: Vec<f64>,
+}
+
+impl Factors {
+    /// # Errors
+    /// [`Error::Numerical`] for a matrix that cannot be mended.
+    pub fn of(posterior: &Posterior) -> Result<Self> {
+        let d = posterior.dimensions;
+        let mut lower = vec![0.0; posterior.scale_inverses.len()];
+        for (k, (matrix, l)) in
+            posterior.scale_inverses.chunks_exact(d * d).zip(lower.chunks_exact_mut(d * d)).enumerate()
+        {
+            if !dense::cholesky(matrix, d, l) && dense::factor(&mut matrix.to_vec(), d, l).is_none() {
+                return Err(Error::Numerical(format!("the covariance of component {k} is not positive definite")));
+            }
+        }
+        let log_determinants =
+            lower.chunks_exact(d * d).map(|l| 2.0 * (0..d).map(|i| l[i * (d + 1)].ln()).sum::<f64>()).collect();
+        Ok(Self { lower, log_determinants })
+    }
+}
+
+/// `ln rho_nk = constant_k - |A_k (x_n - m_k)|^2` (14) with `A_k^T A_k = nu_k W_k / 2`, lower triangular.
+#[derive(Debug)]
+pub(super) struct Densities {
+    pub dimensions: usize,
+    /// (K).
+    pub constants: Vec<f64>,
+    /// (K, D).
+    pub means: Vec<f64>,
+    /// Rows of the lower triangles, one after another: (K, D (D + 1) / 2).
+    pub whitening: Vec<f64>,
+}
+
+impl Densities {
+    /// Those of a posterior, (15) to (17).
+    pub fn of(posterior: &Posterior, factors: &Factors) -> Self {
+        let d = posterior.dimensions;
+        let total = digamma(posterior.weight_concentration.iter().sum());
+        let mut whitening = Vec::with_capacity(posterior.components() * d * (d + 1) / 2);
+        let mut constants = Vec::with_capacity(posterior.components());
+        for k in 0..posterior.components() {
+            let nu = posterior.degrees_of_freedom[k];
+            let log_pi = digamma(posterior.weight_concentration[k]) - total;
+            let gammas: f64 = (0..d).map(|i| digamma((nu - i as f64) / 2.0)).sum();
+            let log_precision = gammas + d as f64 * LN_2 - factors.log_determinants[k];
+            let spread = d as f64 / posterior.mean_precision[k];
+            constants.push(log_pi + 0.5 * (log_precision - d as f64 * TAU.ln() - spread));
+            let inverse = inverse_of_lower(&factors.lower[k * d * d..(k + 1) * d * d], d);
+            let scale = (0.5 * nu).sqrt();
+            for i in 0..d {
+                whitening.extend(inverse[i * d..=i * d + i].iter().map(|value| scale * value));
+            }
+        }
+        Self { dimensions: d, constants, means: posterior.means.clone(), whitening }
+    }
+
+    /// K.
+    pub fn components(&self) -> usize {
+        self.constants.len()
+    }
+
+    /// Values of a lower triangle.
+    pub fn triangle(&self) -> usize {
+        self.dimensions * (self.dimensions + 1) / 2
+    }
+
+    /// `ln rho` of one point under one component.
+    fn log_density(&self, k: usize, x: &[f64]) -> f64 {
+        let mean = &self.means[k * self.dimensions..];
+        let mut rows = &self.whitening[k * self.triangle()..];
+        let mut square = 0.0;
+        for i in 0..self.dimensions {
+            let (row, rest) = rows.split_at(i + 1);
+            let z: f64 = row.iter().zip(x.iter().zip(mean)).map(|(a, (x, m))| a * (x - m)).sum();
+            square += z * z;
+            rows = rest;
+        }
+        self.constants[k] - square
+    }
+
+    /// Shares of the components in one point (K); returns `ln sum_k rho_k`.
+    pub fn share(&self, x: &[f64], shares: &mut [f64]) -> f64 {
+        for (k, share) in shares.iter_mut().enumerate() {
+            *share = self.log_density(k, x);
+        }
+        let most = shares.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut sum = 0.0;
+        for share in shares.iter_mut() {
+            *share = (*share - most).exp();
+            sum += *share;
+        }
+        shares.iter_mut().for_each(|share| *share /= sum);
+        most + sum.ln()
+    }
+
+    /// Coordinates of a point of planes.
+    pub fn point(planes: &Planes, n: usize, into: &mut [f64]) {
+        for (d, x) in into.iter_mut().enumerate() {
+            *x = planes.plane(d)[n];
+        }
+    }
+}
+
+/// `l^-1` of a lower triangular matrix, row-major.
+fn inverse_of_lower(l: &[f64], d: usize) -> Vec<f64> {
+    let mut inverse = vec![0.0; d * d];
+    let mut column = vec![0.0; d];
+    for j in 0..d {
+        column.fill(0.0);
+        column[j] = 1.0;
+        dense::forward(l, d, &mut column);
+        for i in 0..d {
+            inverse[i * d + j] = column[i];
+        }
+    }
+    inverse
+}

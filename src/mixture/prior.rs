@@ -1,0 +1,122 @@
+//! What is believed before any point is seen.
+
+use super::options::{CovariancePrior, MixtureOptions};
+use super::points::Points;
+use crate::error::{Error, Result};
+use crate::math::dense;
+
+/// Added to the default of the degrees of freedom, over D.
+const FREEDOM: f64 = 9.1;
+/// Pivots of a data covariance below this share of its mean diagonal are none: points in a plane.
+const FLAT: f64 = 1e-10;
+/// What the diagonal of such a covariance is raised by, relative to its mean, or absolutely where there is no spread at all.
+const RAISED: f64 = 1e-6;
+
+/// The prior: `pi ~ Dir(alpha0)` (8), `mu_k ~ N(m0, (beta0 Lambda_k)^-1)`, `Lambda_k ~ W(W0, nu0)` (9).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// `alpha0`.
+    pub weight_concentration: f64,
+    /// `beta0`.
+    pub mean_precision: f64,
+    /// `m0` (D).
+    pub mean: Vec<f64>,
+    /// `nu0`.
+    pub degrees_of_freedom: f64,
+    /// `W0^-1` (D, D), row-major.
+    pub scale_inverse: Vec<f64>,
+}
+
+impl Prior {
+    /// What the options say, and where they leave it open, what the points do.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming a prior of the wrong size or without a density.
+    pub fn resolve(options: &MixtureOptions, points: &Points) -> Result<Self> {
+        let dimensions = points.dimensions;
+        let this = Self {
+            weight_concentration: options.weight_concentration_prior,
+            mean_precision: options.mean_precision_prior,
+            mean: options.mean_prior.clone().unwrap_or_else(|| points.mean()),
+            degrees_of_freedom: options.degrees_of_freedom_prior.unwrap_or(dimensions as f64 + FREEDOM),
+            scale_inverse: match &options.covariance_prior {
+                CovariancePrior::Data => data_covariance(points),
+                CovariancePrior::Isotropic(variance) => scaled_identity(dimensions, *variance),
+                CovariancePrior::Full(matrix) => matrix.clone(),
+            },
+        };
+        this.check(dimensions)?;
+        Ok(this)
+    }
+
+    /// # Errors
+    /// As [`Prior::resolve`].
+    fn check(&self, dimensions: usize) -> Result<()> {
+        if self.mean.len() != dimensions || self.mean.iter().any(|m| !m.is_finite()) {
+            let got = format!("{:?}", self.mean);
+            return Err(Error::argument("mean_prior", format!("{dimensions} finite numbers"), got));
+        }
+        let least = dimensions as f64 - 1.0;
+        if !(self.degrees_of_freedom.is_finite() && self.degrees_of_freedom > least) {
+            let expected = format!("a finite number above {least}");
+            return Err(Error::argument("degrees_of_freedom_prior", expected, self.degrees_of_freedom));
+        }
+        let expected = format!("a symmetric positive definite matrix ({dimensions}, {dimensions})");
+        if self.scale_inverse.len() != dimensions * dimensions {
+            let got = format!("{} numbers", self.scale_inverse.len());
+            return Err(Error::argument("covariance_prior", expected, got));
+        }
+        if let Some(fault) = dense::covariance_fault(&self.scale_inverse, dimensions) {
+            return Err(Error::argument("covariance_prior", expected, fault));
+        }
+        let mut factor = vec![0.0; dimensions * dimensions];
+        if !dense::cholesky(&self.scale_inverse, dimensions, &mut factor) {
+            return Err(Error::argument("covariance_prior", expected, "one that is singular"));
+        }
+        Ok(())
+    }
+}
+
+fn scaled_identity(n: usize, value: f64) -> Vec<f64> {
+    (0..n * n).map(|at| if at % (n + 1) == 0 { value } else { 0.0 }).collect()
+}
+
+/// Weighted covariance of the points, over the sum of the weights less one where that is at least one (so that weights are repetitions); raised where the points
+/// lie in a plane.
+fn data_covariance(points: &Points) -> Vec<f64> {
+    let d = points.dimensions;
+    let mean = points.mean();
+    let mut sums = vec![0.0; d * d];
+    let mut total = 0.0;
+    for n in 0..points.count() {
+        let (x, weight) = (points.at(n), points.weight(n));
+        total += weight;
+        for i in 0..d {
+            for j in 0..=i {
+                sums[i * d + j] += weight * (x[i] - mean[i]) * (x[j] - mean[j]);
+            }
+        }
+    }
+    let over = if total >= 2.0 { total - 1.0 } else { total };
+    for i in 0..d {
+        for j in 0..=i {
+            sums[i * d + j] /= over;
+            sums[j * d + i] = sums[i * d + j];
+        }
+    }
+    raise_if_flat(&mut sums, d);
+    sums
+}
+
+/// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction.
+fn raise_if_flat(matrix: &mut [f64], d: usize) {
+    let typical = (0..d).map(|i| matrix[i * (d + 1)]).sum::<f64>() / d as f64;
+    let mut factor = vec![0.0; d * d];
+    let exists = dense::cholesky(matrix, d, &mut factor);
+    let pivots = (0..d).map(|i| factor[i * (d + 1)].powi(2));
+    if exists && pivots.fold(f64::INFINITY, f64::min) > FLAT * typical {
+        return;
+    }
+    let raised = if typical > 0.0 { RAISED * typical } else { RAISED };
+    (0..d).for_each(|i| matrix[i * (d + 1)] += raised);
+}

@@ -1,0 +1,217 @@
+//! Weighted mixtures for Python; the class that a user meets is `jacoflow.mixture.VariationalGaussianMixture`.
+
+use super::arrays;
+use crate::error::Error;
+use crate::mixture::{
+    CovariancePrior, Fit, MixtureOptions, Moments, Points, Posterior, Prior, Retained, Seeding, Start, fit, partial_fit,
+};
+use crate::parallel::Threads;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyDictMethods};
+
+/// An array of doubles with its shape.
+type Array = (Vec<usize>, Vec<f64>);
+
+/// An entry of a dictionary that the Python class made.
+fn entry<'py, T: for<'a> FromPyObject<'a, 'py, Error = PyErr>>(from: &Bound<'py, PyDict>, name: &str) -> PyResult<T> {
+    from.as_any().get_item(name)?.extract()
+}
+
+/// An array of a dictionary.
+fn numbers(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<Vec<f64>> {
+    Ok(arrays::doubles(name, &from.as_any().get_item(name)?)?.1)
+}
+
+/// An option that is an array or absent.
+fn optional(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<Option<Array>> {
+    let value = from.as_any().get_item(name)?;
+    if value.is_none() { Ok(None) } else { arrays::doubles(name, &value).map(Some) }
+}
+
+/// A count: an integer, positive; which ones are too small the core says.
+fn count(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<usize> {
+    let value: super::options::Integer = entry(from, name)?;
+    usize::try_from(value.0).map_err(|_| Error::argument(name, "a positive integer", value.0).into())
+}
+
+/// The core's options from the parameters of the Python class.
+fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptions> {
+    let covariance_prior = match optional(from, "covariance_prior")? {
+        None => CovariancePrior::Data,
+        Some((shape, values)) if shape.is_empty() => CovariancePrior::Isotropic(values[0]),
+        Some((shape, values)) if shape == [dimensions, dimensions] => CovariancePrior::Full(values),
+        Some((shape, _)) => {
+            let expected = format!("a number or a matrix ({dimensions}, {dimensions})");
+            return Err(Error::argument("covariance_prior", expected, format!("shape {shape:?}")).into());
+        }
+    };
+    let seeding = match entry::<String>(from, "init")?.as_str() {
+        "kmeans++" => Seeding::KMeans,
+        "random" => Seeding::Random,
+        other => return Err(Error::argument("init", "\"kmeans++\" or \"random\"", format!("{other:?}")).into()),
+    };
+    Ok(MixtureOptions {
+        components: count(from, "n_components")?,
+        weight_concentration_prior: entry(from, "weight_concentration_prior")?,
+        mean_precision_prior: entry(from, "mean_precision_prior")?,
+        mean_prior: optional(from, "mean_prior")?.map(|(_, values)| values),
+        degrees_of_freedom_prior: entry(from, "degrees_of_freedom_prior")?,
+        covariance_prior,
+        max_iter: count(from, "max_iter")?,
+        tol: entry(from, "tol")?,
+        n_init: count(from, "n_init")?,
+        seeding,
+        prune_weight: entry(from, "prune_weight")?,
+        seed: entry(from, "seed")?,
+        threads: Threads::new(entry(from, "threads")?)?,
+    })
+}
+
+/// Points (N, D) and their weights (N) as they came.
+struct Sample {
+    dimensions: usize,
+    values: Vec<f64>,
+    weights: Option<Vec<f64>>,
+}
+
+impl Sample {
+    fn new(x: &Bound<'_, PyAny>, weights: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let (shape, values) = arrays::doubles("X", x)?;
+        let [_, dimensions] = shape[..] else {
+            return Err(Error::argument("X", "points (N, D)", format!("shape {shape:?}")).into());
+        };
+        let weights = weights.map(|weights| arrays::doubles("sample_weight", weights)).transpose()?;
+        if let Some((shape, _)) = weights.as_ref().filter(|(shape, _)| shape.len() != 1) {
+            return Err(Error::argument("sample_weight", "weights (N)", format!("shape {shape:?}")).into());
+        }
+        Ok(Self { dimensions, values, weights: weights.map(|(_, values)| values) })
+    }
+
+    fn points(&self) -> Points<'_> {
+        Points { dimensions: self.dimensions, values: &self.values, weights: self.weights.as_deref() }
+    }
+}
+
+/// Components from the arrays that [`told`] made.
+fn posterior(from: &Bound<'_, PyDict>) -> PyResult<Posterior> {
+    let means = arrays::doubles("means", &from.as_any().get_item("means")?)?;
+    Ok(Posterior {
+        dimensions: means.0.last().copied().unwrap_or(0),
+        weight_concentration: numbers(from, "weight_concentration")?,
+        mean_precision: numbers(from, "mean_precision")?,
+        degrees_of_freedom: numbers(from, "degrees_of_freedom")?,
+        means: means.1,
+        scale_inverses: numbers(from, "scale_inverses")?,
+    })
+}
+
+/// What earlier batches left, from the arrays that [`told`] made.
+fn retained(from: &Bound<'_, PyDict>) -> PyResult<Retained> {
+    let posterior = posterior(from)?;
+    let prior = Prior {
+        weight_concentration: entry(from, "prior_weight_concentration")?,
+        mean_precision: entry(from, "prior_mean_precision")?,
+        mean: numbers(from, "prior_mean")?,
+        degrees_of_freedom: entry(from, "prior_degrees_of_freedom")?,
+        scale_inverse: numbers(from, "prior_scale_inverse")?,
+    };
+    let moments = Moments {
+        dimensions: posterior.dimensions,
+        counts: numbers(from, "counts")?,
+        means: numbers(from, "centroids")?,
+        scatters: numbers(from, "scatters")?,
+    };
+    Ok(Retained { prior, posterior, moments, negentropy: entry(from, "negentropy")? })
+}
+
+/// A fit as a dictionary of arrays.
+fn told<'py>(py: Python<'py>, fit: Fit) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let (k, d) = (fit.posterior.components(), fit.posterior.dimensions);
+    let rounds = fit.lower_bounds.len();
+    let arrays: [(&str, &[usize], Vec<f64>); 11] = [
+        ("weight_concentration", &[k], fit.posterior.weight_concentration),
+        ("mean_precision", &[k], fit.posterior.mean_precision),
+        ("degrees_of_freedom", &[k], fit.posterior.degrees_of_freedom),
+        ("means", &[k, d], fit.posterior.means),
+        ("scale_inverses", &[k, d, d], fit.posterior.scale_inverses),
+        ("counts", &[k], fit.moments.counts),
+        ("centroids", &[k, d], fit.moments.means),
+        ("scatters", &[k, d, d], fit.moments.scatters),
+        ("lower_bounds", &[rounds], fit.lower_bounds),
+        ("prior_mean", &[d], fit.prior.mean),
+        ("prior_scale_inverse", &[d, d], fit.prior.scale_inverse),
+    ];
+    for (name, shape, values) in arrays {
+        out.set_item(name, arrays::owned(py, shape, values)?)?;
+    }
+    out.set_item("prior_weight_concentration", fit.prior.weight_concentration)?;
+    out.set_item("prior_mean_precision", fit.prior.mean_precision)?;
+    out.set_item("prior_degrees_of_freedom", fit.prior.degrees_of_freedom)?;
+    out.set_item("negentropy", fit.negentropy)?;
+    out.set_item("converged", fit.converged)?;
+    Ok(out)
+}
+
+#[pyfunction]
+#[pyo3(name = "_mixture_fit")]
+pub fn mixture_fit<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    weights: Option<&Bound<'py, PyAny>>,
+    parameters: &Bound<'py, PyDict>,
+    responsibilities: Option<&Bound<'py, PyAny>>,
+    start: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let sample = Sample::new(points, weights)?;
+    let options = options(parameters, sample.dimensions)?;
+    let shares = responsibilities.map(|shares| arrays::doubles("resp", shares)).transpose()?;
+    if let Some((shape, _)) = shares.as_ref().filter(|(shape, _)| shape.len() != 2 || shape[1] != options.components) {
+        let expected = format!("responsibilities (N, {})", options.components);
+        return Err(Error::argument("resp", expected, format!("shape {shape:?}")).into());
+    }
+    let components = start.map(posterior).transpose()?;
+    let result = py.detach(|| {
+        let start = match (&shares, &components) {
+            (Some((_, shares)), _) => Start::Responsibilities(shares),
+            (None, Some(components)) => Start::Components(components),
+            (None, None) => Start::Seeds,
+        };
+        fit(&sample.points(), &options, start)
+    })?;
+    told(py, result)
+}
+
+#[pyfunction]
+#[pyo3(name = "_mixture_partial_fit")]
+pub fn mixture_partial_fit<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    weights: Option<&Bound<'py, PyAny>>,
+    parameters: &Bound<'py, PyDict>,
+    earlier: Option<&Bound<'py, PyDict>>,
+    forgetting: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let sample = Sample::new(points, weights)?;
+    let options = options(parameters, sample.dimensions)?;
+    let earlier = earlier.map(retained).transpose()?;
+    let result = py.detach(|| partial_fit(&sample.points(), &options, earlier.as_ref(), forgetting))?;
+    told(py, result)
+}
+
+#[pyfunction]
+#[pyo3(name = "_mixture_densities")]
+pub fn mixture_densities<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    components: &Bound<'py, PyDict>,
+    threads: Option<usize>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let sample = Sample::new(points, None)?;
+    let components = posterior(components)?;
+    let threads = Threads::new(threads)?;
+    let (sums, shares) = py.detach(|| threads.install(|| components.log_densities(&sample.points())))?;
+    let n = sums.len();
+    let shares = arrays::owned(py, &[n, components.components()], shares)?;
+    Ok((arrays::owned(py, &[n], sums)?.into_any(), shares.into_any()))
+}

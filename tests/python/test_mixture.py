@@ -1,0 +1,205 @@
+"""Weighted variational mixtures: agreement with scikit-learn on repeated points, conventions, edge cases."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.special import gammaln
+from sklearn.base import clone
+from sklearn.mixture import BayesianGaussianMixture
+from sklearn.utils.estimator_checks import check_estimator
+
+from jacoflow.mixture import VariationalGaussianMixture
+
+
+def clusters(count, dimensions, seed=0):
+    """Points (N, D) about four centres, whole weights (N,), responsibilities (N, 6)."""
+    rng = np.random.default_rng(seed)
+    centres = rng.normal(0, 6, (4, dimensions))
+    x = centres[rng.integers(4, size=count)] + rng.normal(0, 1, (count, dimensions))
+    return x, rng.integers(0, 5, count), rng.dirichlet(np.ones(6), count)
+
+
+def full_bound(reference, d, total):
+    """scikit-learn's lower bound with the constants that it drops."""
+    alpha0, nu0, k = reference.weight_concentration_prior_, reference.degrees_of_freedom_prior_, reference.n_components
+    halves = gammaln((nu0 + 1 - np.arange(1, d + 1)) / 2).sum()
+    wishart = 0.5 * nu0 * np.linalg.slogdet(reference.covariance_prior_)[1] - 0.5 * nu0 * d * np.log(2) - halves
+    constants = gammaln(k * alpha0) - k * gammaln(alpha0) + k * wishart + k * d / 2 * np.log(reference.mean_precision_prior_)
+    return reference.lower_bound_ + constants - d * total / 2 * np.log(2 * np.pi)
+
+
+class FromResponsibilities(BayesianGaussianMixture):
+    """scikit-learn's mixture, begun with given responsibilities."""
+
+    def _initialize_parameters(self, X, random_state, xp=None):
+        self._initialize(X, self.resp)
+
+
+@pytest.mark.parametrize("d", [2, 3, 5])
+@pytest.mark.parametrize("rounds", [2, 10, 100])
+def test_agrees_with_scikit_learn_on_repeated_points(d, rounds):
+    x, f, resp = clusters(900, d)
+    repeated = np.repeat(x, f, axis=0)
+    mean = np.average(x, axis=0, weights=f)
+    reference = FromResponsibilities(
+        6, weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3, mean_prior=mean,
+        degrees_of_freedom_prior=d + 9.1, covariance_prior=0.1 * np.eye(d), reg_covar=0, max_iter=rounds - 1, tol=0,
+    )  # fmt: skip
+    reference.resp = np.repeat(resp, f, axis=0)
+    with pytest.warns(Warning):
+        reference.fit(repeated)
+    ours = VariationalGaussianMixture(6, covariance_prior=0.1, tol=None, max_iter=rounds).fit(x, sample_weight=f, resp=resp)
+    assert ours.n_iter_ == rounds
+    for name in ("weight_concentration_", "mean_precision_", "degrees_of_freedom_", "weights_", "covariances_"):
+        np.testing.assert_allclose(getattr(ours, name), getattr(reference, name), rtol=1e-11, atol=1e-13, err_msg=name)
+    np.testing.assert_allclose(ours.means_, reference.means_, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(ours.predict_proba(x), reference.predict_proba(x), atol=1e-10)
+    np.testing.assert_allclose(ours.score_samples(x), reference.score_samples(x), rtol=1e-9)
+    np.testing.assert_allclose(ours.lower_bound_, full_bound(reference, d, f.sum()), rtol=1e-13)
+
+
+@pytest.mark.parametrize("d", [1, 2, 7, 12])
+def test_weights_are_repetitions_and_seeds_do_not_know_the_order(d):
+    x, f, _ = clusters(400, d)
+    order = np.random.default_rng(1).permutation(f.sum())
+    ours = VariationalGaussianMixture(5, random_state=3).fit(x, sample_weight=f)
+    repeated = VariationalGaussianMixture(5, random_state=3).fit(np.repeat(x, f, axis=0)[order])
+    np.testing.assert_allclose(repeated.means_, ours.means_, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(repeated.lower_bound_, ours.lower_bound_, rtol=1e-11)
+
+
+def test_bound_rises_and_ends_by_tolerance():
+    x, f, _ = clusters(2000, 3)
+    mixture = VariationalGaussianMixture(8, random_state=0, tol=1e-4).fit(x, sample_weight=f)
+    steps = np.diff(mixture.lower_bounds_)
+    assert mixture.converged_ and mixture.n_iter_ == len(steps) + 1
+    assert (steps > -1e-9 * abs(mixture.lower_bound_)).all()
+    assert steps[-1] < 1e-4 * f.sum() <= steps[:-1].min()
+    assert not VariationalGaussianMixture(8, random_state=0, tol=None, max_iter=5).fit(x).converged_
+
+
+def test_several_starts_keep_the_best():
+    x, f, _ = clusters(500, 2, seed=4)
+    once = [VariationalGaussianMixture(4, random_state=0, n_init=n, init="random").fit(x, sample_weight=f).lower_bound_ for n in (1, 8)]
+    assert once[1] >= once[0]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_deterministic_and_pickled(threads):
+    x, f, _ = clusters(5000, 3)
+    usual = VariationalGaussianMixture(6, random_state=5).fit(x, sample_weight=f)
+    ours = VariationalGaussianMixture(6, random_state=5, threads=threads).fit(x, sample_weight=f)
+    again = pickle.loads(pickle.dumps(ours))
+    for name in ("means_", "covariances_", "lower_bounds_"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(usual, name))
+        np.testing.assert_array_equal(getattr(again, name), getattr(usual, name))
+    np.testing.assert_array_equal(again.predict(x), usual.fit_predict(x, sample_weight=f))
+
+
+def test_warm_start_goes_on():
+    x, _, _ = clusters(800, 2)
+    all_at_once = VariationalGaussianMixture(4, random_state=0, tol=None, max_iter=30).fit(x)
+    steps = VariationalGaussianMixture(4, random_state=0, tol=None, max_iter=15, warm_start=True)
+    steps.fit(x).fit(x)
+    np.testing.assert_allclose(steps.means_, all_at_once.means_, rtol=1e-9)
+
+
+def test_batches_and_a_single_fit():
+    x, f, _ = clusters(3000, 3)
+    parameters = {"mean_prior": np.average(x, axis=0, weights=f), "covariance_prior": 0.1, "random_state": 0, "tol": 1e-8, "max_iter": 300}
+    whole = VariationalGaussianMixture(4, **parameters).fit(x, sample_weight=f)
+    first = VariationalGaussianMixture(4, **parameters).partial_fit(x, sample_weight=f)
+    np.testing.assert_array_equal(first.means_, whole.means_)
+    batches = VariationalGaussianMixture(4, **parameters)
+    for batch in range(10):
+        batches.partial_fit(x[batch::10], sample_weight=f[batch::10])
+    order, other = (np.argsort(mixture.means_[:, 0]) for mixture in (whole, batches))
+    np.testing.assert_allclose(batches.weight_concentration_[other], whole.weight_concentration_[order], rtol=1e-3)
+    np.testing.assert_allclose(batches.means_[other], whole.means_[order], rtol=1e-3, atol=1e-3)
+    with pytest.raises(ValueError, match="forgetting"):
+        batches.partial_fit(x, forgetting=0.0)
+    with pytest.raises(ValueError, match="expecting 3 features"):
+        batches.partial_fit(x[:, :2])
+
+
+def test_forgetting_follows_what_moves():
+    rng = np.random.default_rng(0)
+    mixture = VariationalGaussianMixture(2, random_state=0)
+    for step in range(30):
+        mixture.partial_fit(rng.normal([[0.3 * step], [20.0]], 0.1, (2, 200)).reshape(-1, 1), forgetting=0.3)
+    assert abs(mixture.means_.min() - (8.7 - 0.3 * 0.3 / 0.7)) < 0.02
+    assert mixture.weight_concentration_.sum() == pytest.approx(400 / 0.7 + 0.2, rel=1e-6)
+
+
+def test_pruned_components_are_gone():
+    x, _, _ = clusters(500, 2)
+    mixture = VariationalGaussianMixture(20, covariance_prior=0.1, prune_weight=5, random_state=0).fit(x)
+    assert 4 <= len(mixture.weights_) < 20 and mixture.predict_proba(x).shape == (500, len(mixture.weights_))
+
+
+@pytest.mark.parametrize(
+    "x",
+    [np.zeros((1, 3)), np.full((50, 2), 4.0), np.arange(40.0).reshape(-1, 2), np.c_[np.arange(9.0), np.zeros(9)], [[0.0], [1e6], [-1e6], [1.0]]],
+    ids=["one point", "all equal", "a line", "a plane", "far outliers"],
+)
+@pytest.mark.parametrize("weight", [1e-8, 1.0, 1e8])
+def test_degenerate_points_stay_finite(x, weight):
+    mixture = VariationalGaussianMixture(12, random_state=0).fit(x, sample_weight=np.full(len(x), weight))
+    for name in ("weights_", "means_", "covariances_", "precisions_", "lower_bounds_"):
+        assert np.isfinite(getattr(mixture, name)).all(), name
+    np.testing.assert_allclose(mixture.predict_proba(x).sum(1), 1)
+    assert (np.linalg.eigvalsh(mixture.covariances_) > 0).all()
+
+
+def test_a_point_without_weight_is_predicted_and_not_fitted():
+    x, f, _ = clusters(300, 2)
+    weights = f.astype(float)
+    weights[0] = 0
+    far = x.copy()
+    far[0] = 1e3
+    ours, without = (VariationalGaussianMixture(4, random_state=0).fit(points, sample_weight=weights) for points in (far, x))
+    np.testing.assert_allclose(ours.means_, without.means_, rtol=1e-9)
+    assert ours.predict(far).shape == (300,)
+
+
+def test_twice_the_weights_is_another_fit():
+    x, _, _ = clusters(60, 2)
+    once, twice = (VariationalGaussianMixture(3, random_state=0, covariance_prior=1.0).fit(x, sample_weight=np.full(60, w)) for w in (1, 2))
+    assert twice.weight_concentration_.sum() == pytest.approx(2 * 60 + 0.3)
+    assert not np.allclose(once.covariances_, twice.covariances_, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("n_components", 0), ("weight_concentration_prior", 0.0), ("mean_precision_prior", -1.0), ("mean_prior", [0.0]), ("degrees_of_freedom_prior", 1.0),
+        ("covariance_prior", [[1.0, 2.0], [2.0, 1.0]]), ("covariance_prior", [[1.0, 0.5], [0.0, 1.0]]), ("covariance_prior", np.eye(3)), ("covariance_prior", -1.0),
+        ("max_iter", 0), ("tol", -1.0), ("n_init", -2), ("init", "magic"), ("prune_weight", np.nan), ("threads", 0), ("random_state", -1),
+    ],
+)  # fmt: skip
+def test_parameters_out_of_range_are_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        VariationalGaussianMixture(**{"n_components": 2, name: value}).fit(np.arange(20.0).reshape(-1, 2))
+
+
+@pytest.mark.parametrize(
+    ("weights", "x"),
+    [([1.0, -1.0], None), ([0.0, 0.0], None), ([np.nan, 1.0], None), ([1.0], None), (np.ones((2, 1)), None), (None, [[np.inf, 0.0], [0, 0]]), (None, np.zeros((0, 2)))],
+)
+def test_points_and_weights_that_cannot_be_used_are_named(weights, x):
+    with pytest.raises(ValueError, match="X" if weights is None else "sample_weight"):
+        VariationalGaussianMixture(2).fit(np.eye(2) if x is None else x, sample_weight=weights)
+
+
+@pytest.mark.parametrize("resp", [np.full((2, 3), 1 / 3), np.full((2, 2), 0.4), [[2.0, -1.0], [0.5, 0.5]], np.full(2, 0.5)])
+def test_responsibilities_that_cannot_be_used_are_named(resp):
+    with pytest.raises(ValueError, match="resp"):
+        VariationalGaussianMixture(2).fit(np.eye(2), resp=resp)
+
+
+def test_scikit_learns_conventions():
+    mixture = VariationalGaussianMixture(3, tol=1e-3, random_state=1)
+    assert clone(mixture).get_params() == mixture.get_params()
+    assert repr(mixture) == "VariationalGaussianMixture(n_components=3, random_state=1, tol=0.001)"
+    check_estimator(mixture)
