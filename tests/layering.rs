@@ -18,6 +18,7 @@ const LEVELS: &[(&str, u8)] = &[
     ("synth", 2),
     ("flow", 3),
     ("filter", 3),
+    ("stereo", 3),
     ("temporal", 4),
     ("track", 4),
     ("pipeline", 5),
