@@ -10,7 +10,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 (1, 64, 96)
 """
 
-from . import filters, io, mixture, plot, scenes, track, video
+from . import filters, io, mixture, plot, scenes, stereo, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -56,6 +56,7 @@ __all__ = [
     "quantities",
     "scenes",
     "smooth",
+    "stereo",
     "track",
     "video",
 ]

@@ -54,6 +54,8 @@ __all__ = [
     "_mixture_fit",
     "_mixture_partial_fit",
     "_observability",
+    "_edge_disparity",
+    "_estimate_row_offset",
     "Scene",
     "Sensor",
     "_scene_carriers",
@@ -938,6 +940,36 @@ def _observability(
     colour: _Colour | None = None,
     threads: int | None = None,
 ) -> dict[str, NDArray[Any]]: ...
+def _edge_disparity(
+    left: ArrayLike,
+    right: ArrayLike,
+    method: str,
+    disparity_range: tuple[int, int],
+    row_range: tuple[int, int],
+    row_offset: float | None,
+    subpixel: bool,
+    check: bool,
+    prior: ArrayLike | None,
+    prior_radius: int,
+    sigma: float,
+    threshold: float,
+    classes: int,
+    window: int,
+    min_support: float,
+    threads: int | None,
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], float]: ...
+def _estimate_row_offset(
+    left: ArrayLike,
+    right: ArrayLike,
+    disparity_range: tuple[int, int],
+    row_range: tuple[int, int],
+    sigma: float,
+    threshold: float,
+    classes: int,
+    window: int,
+    min_support: float,
+    threads: int | None,
+) -> float: ...
 def _open_frames(spec: _Path, colour: _Colour | None, first: int, limit: int | None, step: int) -> FrameReader: ...
 def _read_flow(path: _Path, format: Literal["flo", "kitti"]) -> NDArray[np.float32]: ...
 def _read_image(path: _Path, colour: _Colour | None) -> NDArray[Any]: ...

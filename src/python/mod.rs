@@ -20,6 +20,7 @@ mod options;
 mod progress;
 mod scenes;
 mod spare;
+mod stereo;
 mod track;
 
 use pyo3::prelude::*;
@@ -57,6 +58,8 @@ mod _jacoflow {
     use super::observability::{classify, observability};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
+    #[pymodule_export]
+    use super::stereo::{edge_disparity, estimate_row_offset};
     #[pymodule_export]
     use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
 
