@@ -55,6 +55,7 @@ __all__ = [
     "_mixture_partial_fit",
     "_observability",
     "_edge_disparity",
+    "_edge_pixels",
     "_estimate_row_offset",
     "Scene",
     "Sensor",
@@ -958,6 +959,9 @@ def _edge_disparity(
     min_support: float,
     threads: int | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], float]: ...
+def _edge_pixels(
+    view: ArrayLike, sigma: float, threshold: float, threads: int | None
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def _estimate_row_offset(
     left: ArrayLike,
     right: ArrayLike,

@@ -18,9 +18,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _edge_disparity, _estimate_row_offset
+from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
 
-__all__ = ["EdgeDisparity", "edge_disparity", "estimate_row_offset"]
+__all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,3 +126,11 @@ def estimate_row_offset(
     and units are those of `edge_disparity`. 0.0 where nothing can be matched; ValueError as there.
     """
     return _estimate_row_offset(left, right, disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)
+
+
+def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Rows and columns, (N,) each, px, of the edge pixels of a view (H, W) or (H, W, 3): where `edge_disparity` looks for a match.
+
+    They have a gradient (Gaussian of `sigma` px) of at least `threshold` grey levels/px and are the steepest along its direction.
+    """
+    return _edge_pixels(view, sigma, threshold, threads)

@@ -2,17 +2,19 @@
 
 use super::arrays::{self, ColourRule};
 use crate::parallel::Threads;
-use crate::stereo::{self, EdgeDisparityOptions, Method};
+use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method};
 use crate::track::GreyLevels;
 use crate::types::{AnyFrame, Frame};
 use pyo3::prelude::*;
 
-/// Both views in 8-bit grey levels; the left one decides what the white of floats is.
-fn views(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>) -> PyResult<[Frame<f32>; 2]> {
-    let left = arrays::frame("left", left, ColourRule::Luminance)?;
-    let right = arrays::frame("right", right, ColourRule::Luminance)?;
-    let levels = GreyLevels::decide(&left);
-    Ok([&left, &right].map(|view| in_levels(view, levels.gain(view))))
+/// Views in 8-bit grey levels; the first decides what the white of floats is.
+fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[Frame<f32>; N]> {
+    let mut frames = Vec::with_capacity(N);
+    for (name, view) in views {
+        frames.push(arrays::frame(name, view, ColourRule::Luminance)?);
+    }
+    let levels = frames.first().map(GreyLevels::decide);
+    Ok(std::array::from_fn(|i| in_levels(&frames[i], levels.map_or(1.0, |levels| levels.gain(&frames[i])))))
 }
 
 /// Samples times a gain, in single precision.
@@ -71,7 +73,7 @@ pub fn edge_disparity<'py>(
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, f64)> {
     let py = left.py();
     let common = options(method, disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
-    let [left, right] = views(left, right)?;
+    let [left, right] = grey_levels([("left", left), ("right", right)])?;
     let prior = prior.map(|prior| arrays::frame("prior", prior, ColourRule::Refuse)).transpose()?;
     let prior = prior.map(|prior| prior.to_real::<f32>());
     let options = EdgeDisparityOptions { row_offset, subpixel, check, prior, prior_radius, ..common };
@@ -104,6 +106,25 @@ pub fn estimate_row_offset(
     let options =
         options("sgm", disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
     let py = left.py();
-    let [left, right] = views(left, right)?;
+    let [left, right] = grey_levels([("left", left), ("right", right)])?;
     Ok(py.detach(|| stereo::estimate_row_offset(&left, &right, &options))?)
+}
+
+/// The compiled part of `jacoflow.stereo.edge_pixels`: rows and columns (N,).
+#[pyfunction(name = "_edge_pixels")]
+pub fn edge_pixels<'py>(
+    view: &Bound<'py, PyAny>,
+    sigma: f64,
+    threshold: f64,
+    threads: Option<usize>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let py = view.py();
+    let threads = Threads::new(threads)?;
+    let options = EdgeDisparityOptions { sigma, threshold, ..EdgeDisparityOptions::default() };
+    options.check()?;
+    let [view] = grey_levels([("view", view)])?;
+    let settings = EdgeSettings { sigma, threshold, classes: options.classes };
+    let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
+    let count = [map.len()];
+    Ok((arrays::owned(py, &count, map.rows)?.into_any(), arrays::owned(py, &count, map.columns)?.into_any()))
 }

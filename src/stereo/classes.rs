@@ -70,6 +70,16 @@ pub(super) fn match_classes(
     matches
 }
 
+/// The row offset that most matches have; among equals the one nearest 0; 0 without matches.
+pub(super) fn most_frequent_row(matches: &[Option<ClassMatch>], (least, greatest): (i32, i32)) -> i32 {
+    let mut counts = vec![0usize; (greatest - least + 1) as usize];
+    for found in matches.iter().flatten() {
+        counts[(found.row_offset - least) as usize] += 1;
+    }
+    let most = (least..=greatest).max_by_key(|e| (counts[(e - least) as usize], -e.abs()));
+    most.filter(|e| counts[(e - least) as usize] > 0).unwrap_or(0)
+}
+
 /// Some of the edge pixels.
 struct Task<'a> {
     edges: &'a EdgeMap,

@@ -1,8 +1,12 @@
 //! The one door: two views in, the disparity of the left edge pixels out.
 
-use super::classes::{ClassMatch, match_classes};
+use super::align::rows_moved;
+use super::classes::{match_classes, most_frequent_row};
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::{EdgeDisparityOptions, Method};
+use super::row_offset::row_offset_of;
+use super::semi_global::{Match, View, match_views};
+use super::subpixel::refine;
 use crate::error::Result;
 use crate::types::Frame;
 
@@ -23,30 +27,23 @@ pub struct EdgeDisparity {
     pub row_offset: f64,
 }
 
-/// One accepted edge pixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Accepted {
-    pub row: u32,
-    pub column: u32,
-    pub disparity: f32,
-    pub score: f32,
-}
-
 impl EdgeDisparity {
-    /// From accepted pixels in row-major order.
-    fn new((width, height): (usize, usize), accepted: &[Accepted], row_offset: f64) -> Self {
-        let mut disparity = Frame::filled(width, height, f32::NAN);
-        for each in accepted {
-            disparity.row_mut(each.row as usize)[each.column as usize] = each.disparity;
+    /// From the disparity and score of every edge pixel that has one.
+    fn new(edges: &EdgeMap, found: impl Iterator<Item = Option<(f32, f32)>>, row_offset: f64) -> Self {
+        let (width, height) = edges.class.size();
+        let disparity = Frame::filled(width, height, f32::NAN);
+        let (rows, columns, values, scores) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { disparity, rows, columns, values, scores, row_offset };
+        for ((&row, &column), found) in edges.rows.iter().zip(&edges.columns).zip(found) {
+            if let Some((disparity, score)) = found {
+                all.disparity.row_mut(row as usize)[column as usize] = disparity;
+                all.rows.push(row);
+                all.columns.push(column);
+                all.values.push(disparity);
+                all.scores.push(score);
+            }
         }
-        Self {
-            disparity,
-            rows: accepted.iter().map(|each| each.row).collect(),
-            columns: accepted.iter().map(|each| each.column).collect(),
-            values: accepted.iter().map(|each| each.disparity).collect(),
-            scores: accepted.iter().map(|each| each.score).collect(),
-            row_offset,
-        }
+        all
     }
 }
 
@@ -64,7 +61,8 @@ pub fn edge_disparity(
 ) -> Result<EdgeDisparity> {
     options.check_views(left, right)?;
     Ok(options.threads.install(|| match options.method {
-        Method::Classes | Method::SemiGlobal => by_classes(left, right, options),
+        Method::Classes => by_classes(left, right, options),
+        Method::SemiGlobal => by_semi_global(left, right, options),
     }))
 }
 
@@ -75,22 +73,39 @@ fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOpti
     let rows = options.row_offset.map_or(options.row_range, |e| (e.round() as i32, e.round() as i32));
     let matches = match_classes(&edges, &right, options, rows, 1);
     let row_offset = options.row_offset.unwrap_or_else(|| f64::from(most_frequent_row(&matches, rows)));
-    let accepted: Vec<_> = (edges.rows.iter().zip(&edges.columns).zip(&matches))
-        .filter_map(|((&row, &column), found)| {
-            found.map(|found| Accepted { row, column, disparity: found.disparity as f32, score: found.support })
-        })
-        .collect();
-    EdgeDisparity::new(left.size(), &accepted, row_offset)
+    EdgeDisparity::new(&edges, matches.iter().map(|m| m.map(|m| (m.disparity as f32, m.support))), row_offset)
 }
 
-/// The row offset that most matches have; among equals the one nearest 0; 0 without matches.
-pub(super) fn most_frequent_row(matches: &[Option<ClassMatch>], (least, greatest): (i32, i32)) -> i32 {
-    let mut counts = vec![0usize; (greatest - least + 1) as usize];
-    for found in matches.iter().flatten() {
-        counts[(found.row_offset - least) as usize] += 1;
+/// Semi-global matching after the rows are aligned.
+fn by_semi_global(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+    let settings = EdgeSettings::of(options);
+    let view = View::new(left, &settings);
+    let row_offset = options.row_offset.unwrap_or_else(|| row_offset_of(left, &view, right, options));
+    let matches = match_aligned(left, &view, right, row_offset, options);
+    EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), row_offset)
+}
+
+/// Matches of the left edge pixels with the right view moved up by `row_offset`.
+pub(super) fn match_aligned(
+    left: &Frame<f32>,
+    view: &View,
+    right: &Frame<f32>,
+    row_offset: f64,
+    options: &EdgeDisparityOptions,
+) -> Vec<Option<Match>> {
+    let aligned = rows_moved(right, row_offset);
+    let mut matches = match_views(view, &View::new(&aligned, &EdgeSettings::of(options)), options);
+    // A row that the right view does not have was replicated from its border.
+    let last = left.height() as f64 - 1.0;
+    for (found, &row) in matches.iter_mut().zip(&view.edges.rows) {
+        if !(0.0..=last).contains(&(f64::from(row) + row_offset)) {
+            *found = None;
+        }
     }
-    let most = (least..=greatest).max_by_key(|e| (counts[(e - least) as usize], -e.abs()));
-    most.filter(|e| counts[(e - least) as usize] > 0).unwrap_or(0)
+    if options.subpixel {
+        refine(left, view, &aligned, &mut matches);
+    }
+    matches
 }
 
 impl EdgeSettings {
@@ -98,9 +113,4 @@ impl EdgeSettings {
     pub(super) fn of(options: &EdgeDisparityOptions) -> Self {
         Self { sigma: options.sigma, threshold: options.threshold, classes: options.classes }
     }
-}
-
-/// Row offset of the right view.
-pub fn estimate_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<f64> {
-    edge_disparity(left, right, options).map(|found| found.row_offset)
 }

@@ -7,14 +7,18 @@
 //! H. Hirschmueller, "Stereo processing by semiglobal matching and mutual information", 2008, with edge pixels in place of a dense grid), which wants the rows of the cameras
 //! aligned: [`estimate_row_offset`].
 
+mod align;
 mod chains;
 mod classes;
 mod cost;
 mod disparity;
 mod edges;
 mod options;
+mod row_offset;
 mod semi_global;
+mod subpixel;
 
-pub use disparity::{EdgeDisparity, edge_disparity, estimate_row_offset};
+pub use disparity::{EdgeDisparity, edge_disparity};
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
+pub use row_offset::estimate_row_offset;
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
