@@ -27,7 +27,7 @@ pub struct Node {
     pub velocity: Option<[f64; 3]>,
     /// Motion `(u, v, w)` to the next step, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
-    /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the mean of the pixels.
+    /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle of the pixels (medians along x and y).
     pub affine: Option<[f64; 6]>,
     /// Truncated mean absolute difference of brightness that this motion leaves, grey levels.
     pub residual: Option<f64>,

@@ -43,7 +43,7 @@ impl SmoothedLevels {
 pub(super) struct PlaneMotion {
     /// Flow and derivatives at the centre.
     pub flow: AffineFlow<f64>,
-    /// Mean of the pixels, `(x, y)` px.
+    /// Medians of the pixels along x and y, px.
     pub centre: [f64; 2],
     /// Truncated mean absolute difference left, grey levels.
     pub residual: f64,
@@ -82,7 +82,7 @@ pub(super) fn affine_motion(
         return None;
     }
     let n = pixels.len() as f64;
-    let centre = [0, 1].map(|i| pixels.iter().map(|p| p[i]).sum::<f64>() / n);
+    let centre = middle(pixels);
     let spread = pixels.iter().map(|p| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2)).sum::<f64>() / n;
     let radius = spread.sqrt().max(1.0);
     let task = Task { before, after, pixels, centre, radius };
@@ -103,6 +103,15 @@ pub(super) fn affine_motion(
     let [u, v, u_x, v_x, u_y, v_y] = map;
     let flow = AffineFlow { u, v, u_x: u_x / radius, v_x: v_x / radius, u_y: u_y / radius, v_y: v_y / radius };
     Some(PlaneMotion { flow, centre, residual })
+}
+
+/// Medians of the pixels along x and y: unlike their mean, stray pixels hardly move them.
+pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|i| {
+        let mut along: Vec<f64> = pixels.iter().map(|pixel| pixel[i]).collect();
+        let half = along.len() / 2;
+        if along.is_empty() { f64::NAN } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+    })
 }
 
 /// What all levels share. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.

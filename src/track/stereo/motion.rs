@@ -62,7 +62,7 @@ impl FineMotion {
         [self.plane.flow.u, self.plane.flow.v, self.depth]
     }
 
-    /// A translation of a cluster whose pixels have the mean `centre`.
+    /// A translation of a cluster whose pixels have the middle `centre`.
     pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
         let flow = AffineFlow { u, v, ..AffineFlow::default() };
         Self { plane: PlaneMotion { flow, centre, residual: f64::NAN }, depth: w }
@@ -91,15 +91,13 @@ pub(super) struct NextView<'a> {
     pub disparity: &'a Frame<f32>,
 }
 
-/// Mean `(x, y)` of each cluster's pixels, px; NaN of empty ones.
-pub(super) fn centre(clusters: &Clusters, k: usize) -> [f64; 2] {
-    let mut sums = [0.0; 2];
-    for &i in &clusters.pixels[k] {
+/// Places `(x, y)` of a cluster's pixels, px.
+pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
+    let place = |&i: &u32| {
         let [x, y, _] = clusters.points.at(i as usize);
-        sums[0] += x;
-        sums[1] += y;
-    }
-    sums.map(|sum| sum / clusters.pixels[k].len() as f64)
+        [x, y]
+    };
+    clusters.pixels[k].iter().map(place).collect()
 }
 
 /// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from the motion before (`last`, px and disparity).
@@ -114,13 +112,7 @@ pub(super) fn fine_motions(
     let levels = from.levels.as_ref();
     let one = |k: usize| {
         let clusters = &from.clusters;
-        let pixels: Vec<[f64; 2]> = clusters.pixels[k]
-            .iter()
-            .map(|&i| {
-                let [x, y, _] = clusters.points.at(i as usize);
-                [x, y]
-            })
-            .collect();
+        let pixels = places(clusters, k);
         let starts = starts(from, next.luminance, k, last[k], options);
         let plane = affine_motion(levels?, next.levels, &pixels, &starts)?;
         let mut changes: Vec<f64> = clusters.pixels[k]

@@ -5,8 +5,8 @@ use super::clusters::Clusters;
 use super::graph::{Arc, Node, TrackGraph};
 use super::grouping::{GroupMotion, groups};
 use super::identity::{Carried, Identities};
-use super::lucas_kanade::SmoothedLevels;
-use super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, centre, fine_motions};
+use super::lucas_kanade::{SmoothedLevels, middle};
+use super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places};
 use super::options::{StereoMode, StereoTrackerOptions};
 use super::overlap::{Row, moved_overlaps};
 use super::step::{Step, Track};
@@ -271,7 +271,7 @@ impl StereoTracker {
             out.push(carried.and_then(|carried| {
                 let motion = if carried.coasting {
                     let velocity = std::array::from_fn(|i| carried.motion[i] * cell[i]);
-                    FineMotion::translation(velocity, centre(&last.clusters, k))
+                    FineMotion::translation(velocity, middle(&places(&last.clusters, k)))
                 } else {
                     measured?
                 };

@@ -12,9 +12,19 @@ const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
 /// Cells along x, y and disparity round a seed that support it, and in which there is none other.
 const SEED_REACH: [i32; D] = [2, 2, 1];
 
-/// The components with their means moved, cells; those without a motion stay.
+/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole voxels alone moves a flat one.
+const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
+
+/// The components with their means moved, cells, and as much wider as the motion is uncertain; those without a motion stay.
+///
+/// A flat component may be thinner than a hundredth of a layer. Moved by a fraction of a layer it would explain none of its own voxels; its shape is found again in the first round.
 pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Posterior {
     let mut out = posterior.clone();
+    for (matrix, nu) in out.scale_inverses.chunks_exact_mut(D * D).zip(&out.degrees_of_freedom) {
+        for i in 0..D {
+            matrix[i * D + i] += nu * UNCERTAINTY[i] * UNCERTAINTY[i];
+        }
+    }
     for (mean, motion) in out.means.chunks_exact_mut(D).zip(motions) {
         if let Some(motion) = motion {
             mean.iter_mut().zip(motion).for_each(|(mean, by)| *mean += by);
@@ -110,6 +120,8 @@ mod tests {
     fn means_are_moved_by_their_motions() {
         let got = moved(&posterior(), &[Some([1.0, -2.0, 0.5]), None]);
         assert_eq!(got.means, [12.0, 9.0, 30.5, 70.0, 50.0, 3.0]);
+        // 50 / 60 of before and a quarter.
+        assert_eq!((got.scale_inverses[0], got.scale_inverses[8], got.scale_inverses[1]), (65.0, 65.0, 0.0));
     }
 
     #[test]
