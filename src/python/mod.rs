@@ -21,6 +21,7 @@ mod progress;
 mod scenes;
 mod spare;
 mod stereo;
+mod stereo_track;
 mod track;
 
 use pyo3::prelude::*;
@@ -60,6 +61,8 @@ mod _jacoflow {
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
     #[pymodule_export]
     use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset};
+    #[pymodule_export]
+    use super::stereo_track::{PyStereoTracker, PyTrackGraph};
     #[pymodule_export]
     use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
 

@@ -18,7 +18,7 @@ fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResul
 }
 
 /// Samples times a gain, in single precision.
-fn in_levels(view: &AnyFrame, gain: f64) -> Frame<f32> {
+pub(super) fn in_levels(view: &AnyFrame, gain: f64) -> Frame<f32> {
     match view {
         AnyFrame::F64(frame) => frame.map(|&value| (value * gain) as f32),
         other => other.to_real::<f32>().map(|&value| (f64::from(value) * gain) as f32),

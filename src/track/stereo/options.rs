@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
+use crate::stereo::Method;
 
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -134,6 +135,10 @@ pub struct StereoTrackerOptions {
     pub disparity_range: [i32; 2],
     /// Least and greatest offset of rows looked for, px; default (-4, 4).
     pub row_range: [i32; 2],
+    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated at the first step that shows anything and kept (`SemiGlobal`).
+    pub row_offset: Option<f64>,
+    /// How views are matched; default classes (`paper`), semi-global (`improved`).
+    pub matching: Method,
     /// Components of the mixture; default 12 (`paper`), 16 (`improved`).
     pub components: usize,
     /// `alpha_0` of (8); default 0.1.
@@ -191,6 +196,8 @@ impl StereoTrackerOptions {
             grid: VoxelGrid::default(),
             disparity_range: [-40, 24],
             row_range: [-4, 4],
+            row_offset: None,
+            matching: if improved { Method::SemiGlobal } else { Method::Classes },
             components: if improved { 16 } else { 12 },
             weight_concentration_prior: 0.1,
             mean_precision_prior: 1e-3,

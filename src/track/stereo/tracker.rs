@@ -14,6 +14,7 @@ use super::voxels::{EdgePoints, Lattice, Voxels};
 use super::warm_start::{moved, reseed};
 use crate::error::{Error, Result};
 use crate::mixture::{CovariancePrior, MixtureOptions, Points, Posterior, Start, fit};
+use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, Method, edge_disparity};
 use crate::types::Frame;
 use std::collections::BTreeMap;
 
@@ -25,6 +26,8 @@ pub struct StereoTracker {
     options: StereoTrackerOptions,
     lattice: Option<Lattice>,
     time: usize,
+    /// Offset of the right view's rows, px, once it is known.
+    row_offset: Option<f64>,
     last: Option<Seen>,
     posterior: Option<Posterior>,
     identities: Identities,
@@ -60,6 +63,7 @@ impl StereoTracker {
     pub fn new(options: StereoTrackerOptions) -> Result<Self> {
         options.check()?;
         Ok(Self {
+            row_offset: options.row_offset,
             options,
             lattice: None,
             time: 0,
@@ -89,6 +93,30 @@ impl StereoTracker {
     /// Tracks by their ids.
     pub fn tracks(&self) -> &BTreeMap<u64, Track> {
         &self.tracks
+    }
+
+    /// The next step from both views, grey levels 0 to 255.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for views of different size, of less than 17 px or of another size than before (`left`, with both shapes), and for options of the matching out of range.
+    pub fn update(&mut self, left: &Frame<f32>, right: &Frame<f32>) -> Result<Step> {
+        self.check(left, &EdgePoints::default())?;
+        let [least, greatest] = self.options.disparity_range;
+        let [first_row, last_row] = self.options.row_range;
+        let matching = EdgeDisparityOptions {
+            method: self.options.matching,
+            disparity_range: (least, greatest),
+            row_range: (first_row, last_row),
+            row_offset: self.row_offset,
+            threads: self.options.threads,
+            ..EdgeDisparityOptions::default()
+        };
+        let found = edge_disparity(left, right, &matching)?;
+        if self.options.matching == Method::SemiGlobal && !found.values.is_empty() {
+            self.row_offset = Some(found.row_offset);
+        }
+        let EdgeDisparity { rows, columns, values: disparities, .. } = found;
+        self.update_edges(left, EdgePoints { columns, rows, disparities })
     }
 
     /// The next step from the left view (grey levels, 0 to 255) and the disparities of its edge pixels. No edge pixels give a step without clusters.
