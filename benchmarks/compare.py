@@ -19,11 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-<<<<<<< HEAD
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture")
-=======
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "stereo")
->>>>>>> stereo
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo")
 
 
 def main() -> None:
@@ -88,17 +84,14 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import tracking
 
         return tracking.sections(quick, data)
-<<<<<<< HEAD
     if name == "mixture":
         import mixture
 
         return {"Weighted mixtures, a round": mixture.table(rounds)}
-=======
     if name == "stereo":
         import stereo
 
         return stereo.sections(quick, data)
->>>>>>> stereo
     if data is None:
         return {}
     import accuracy
