@@ -13,7 +13,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 from importlib import import_module as _import_module
 from typing import Any as _Any
 
-from . import filters, io, plot, scenes, track, video
+from . import filters, io, plot, scenes, stereo, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -59,6 +59,7 @@ __all__ = [
     "quantities",
     "scenes",
     "smooth",
+    "stereo",
     "track",
     "video",
 ]

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,8 @@ __all__ = [
     "_write_frames",
     "_GaussMarkovFilter",
     "_GradientTracker",
+    "_StereoTracker",
+    "_TrackGraph",
     "_classify",
     "_derivative_kernels",
     "_detect_moving_target",
@@ -54,6 +56,9 @@ __all__ = [
     "_mixture_fit",
     "_mixture_partial_fit",
     "_observability",
+    "_edge_disparity",
+    "_edge_pixels",
+    "_estimate_row_offset",
     "Scene",
     "Sensor",
     "_scene_carriers",
@@ -905,6 +910,35 @@ class _GaussMarkovFilter:
     def covariance(self) -> NDArray[np.float64]:
         """Their covariances along x and along y, (2, 3, 3)."""
 
+@final
+class _StereoTracker:
+    def __new__(cls, options: dict[str, Any]) -> _StereoTracker: ...
+    def update(self, left: NDArray[Any], right: NDArray[Any]) -> dict[str, Any]:
+        """The next step from both views, as a dictionary."""
+    def update_disparity(self, left: NDArray[Any], disparity: NDArray[Any]) -> dict[str, Any]:
+        """The next step from the left view and its disparities, NaN where there is none, as a dictionary."""
+    def graph(self) -> _TrackGraph:
+        """Clusters of all steps so far and their arcs."""
+    def tracks(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
+        """Tracks by id: times (T,), positions (T, 3) and velocities (T, 3)."""
+
+@final
+class _TrackGraph:
+    @staticmethod
+    def from_json(json: str) -> _TrackGraph:
+        """From the text that `to_json` gives."""
+    def to_json(self) -> str:
+        """As JSON text."""
+    def nodes(self) -> list[dict[str, Any]]:
+        """Clusters as dictionaries, by time and index."""
+    def arcs(self) -> list[tuple[int, int, int, float, float]]:
+        """Arcs as (time, from, to, forward, backward)."""
+    def follow(self, time: int, index: int, threshold: float, backward: bool) -> list[tuple[int, int]]:
+        """Clusters (time, index) reached from one along arcs with at least this score."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
 def _derivative_kernels(order: int) -> list[NDArray[np.float64]]: ...
 def _local_flow(
     first: NDArray[Any], second: NDArray[Any], refine: bool, window: int, order: int, cond_max: float, min_sigma: float, step_max: float
@@ -938,6 +972,39 @@ def _observability(
     colour: _Colour | None = None,
     threads: int | None = None,
 ) -> dict[str, NDArray[Any]]: ...
+def _edge_disparity(
+    left: ArrayLike,
+    right: ArrayLike,
+    method: str,
+    disparity_range: tuple[int, int],
+    row_range: tuple[int, int],
+    row_offset: float | None,
+    subpixel: bool,
+    check: bool,
+    prior: ArrayLike | None,
+    prior_radius: int,
+    sigma: float,
+    threshold: float,
+    classes: int,
+    window: int,
+    min_support: float,
+    threads: int | None,
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], float]: ...
+def _edge_pixels(
+    view: ArrayLike, sigma: float, threshold: float, threads: int | None
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
+def _estimate_row_offset(
+    left: ArrayLike,
+    right: ArrayLike,
+    disparity_range: tuple[int, int],
+    row_range: tuple[int, int],
+    sigma: float,
+    threshold: float,
+    classes: int,
+    window: int,
+    min_support: float,
+    threads: int | None,
+) -> float: ...
 def _open_frames(spec: _Path, colour: _Colour | None, first: int, limit: int | None, step: int) -> FrameReader: ...
 def _read_flow(path: _Path, format: Literal["flo", "kitti"]) -> NDArray[np.float32]: ...
 def _read_image(path: _Path, colour: _Colour | None) -> NDArray[Any]: ...

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
+from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
 __all__ = [
     "GaussMarkovFilter",
@@ -32,7 +33,12 @@ __all__ = [
     "MeanFlow",
     "MovingTarget",
     "PixelFlow",
+    "StereoCluster",
+    "StereoStep",
+    "StereoTrack",
+    "StereoTracker",
     "Track",
+    "TrackGraph",
     "TrackResult",
     "derivative_kernels",
     "detect_moving_target",

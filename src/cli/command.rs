@@ -7,6 +7,7 @@ use super::info::InfoCommand;
 use super::interrupt::Watch;
 use super::measure::MeasureCommand;
 use super::report::Report;
+use super::stereo::StereoCommand;
 use super::synth::SynthCommand;
 use super::track::TrackCommand;
 use crate::error::Result;
@@ -23,6 +24,8 @@ pub enum Command {
     Measure(Box<MeasureCommand>),
     /// Follow moving targets: position, velocity, box, scale and rotation, with their covariance
     Track(Box<TrackCommand>),
+    /// Disparity of the edge pixels of two views
+    Stereo(Box<StereoCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
     Synth(Box<SynthCommand>),
     /// Tell what a recording or a result file holds
@@ -39,6 +42,7 @@ impl Command {
             Self::Filter(command) => command.tell.json,
             Self::Measure(command) => command.tell.json,
             Self::Track(command) => command.tell.json,
+            Self::Stereo(command) => command.tell.json,
             Self::Synth(command) => command.tell.json,
             Self::Info(command) => command.tell.json,
             Self::Demo(command) => command.tell.json,
@@ -52,6 +56,7 @@ impl Command {
             Self::Filter(command) => command.execute(watch),
             Self::Measure(command) => command.execute(watch),
             Self::Track(command) => command.execute(watch),
+            Self::Stereo(command) => command.execute(watch),
             Self::Synth(command) => command.execute(watch),
             Self::Info(command) => command.execute(watch),
             Self::Demo(command) => command.execute(watch),

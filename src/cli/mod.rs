@@ -19,6 +19,7 @@ mod progress;
 mod report;
 mod run;
 mod scene_list;
+mod stereo;
 mod synth;
 mod track;
 
@@ -36,7 +37,8 @@ use std::ffi::OsString;
     jacoflow demo -o demo\n  \
     jacoflow flow frames/ -o out/ --picture colour,divergence\n  \
     jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100\n  \
-    jacoflow track film.y4m --box 120,80,24,30 -o track.csv"
+    jacoflow track film.y4m --box 120,80,24,30 -o track.csv\n  \
+    jacoflow stereo left/ right/ -o out/ --picture pictures/"
 )]
 struct Cli {
     #[command(subcommand)]

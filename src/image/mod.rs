@@ -6,6 +6,7 @@ mod cubic;
 #[allow(dead_code)] // offered to the estimators that warp
 mod fill;
 mod finite;
+mod gradient;
 mod luminance;
 pub mod picture;
 mod preprocess;
@@ -27,6 +28,7 @@ pub use smooth::GaussianSmoother;
 pub(crate) use cubic::{cubic_at, cubic_at_all};
 pub(crate) use fill::fill_holes;
 pub(crate) use finite::all_finite;
+pub(crate) use gradient::gaussian_gradient;
 pub(crate) use pyramid::{halve_into, halve_mask, halved_noise, halved_size};
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};

@@ -1,9 +1,10 @@
-//! Frames in, results out: sources of grey frames, and readers and writers of flow, arrays, tables, tracks and pictures.
+//! Frames in, results out: sources of grey frames, and readers and writers of flow, disparity, arrays, tables, tracks and pictures.
 //!
 //! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader takes damaged and hostile files for what they
 //! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
 
 mod decode;
+mod disparity;
 mod field_format;
 mod field_npz;
 mod film;
@@ -25,6 +26,7 @@ mod track_table;
 pub mod write;
 
 pub use decode::read_image;
+pub use disparity::{DisparityFormat, DisparityMap};
 pub use field_format::FieldFormat;
 pub use field_npz::{StoredField, read_npz, read_npz_from, write_npz, write_npz_to};
 pub use film::FilmWriter;

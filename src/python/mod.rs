@@ -20,6 +20,8 @@ mod options;
 mod progress;
 mod scenes;
 mod spare;
+mod stereo;
+mod stereo_track;
 mod track;
 
 use pyo3::prelude::*;
@@ -57,6 +59,10 @@ mod _jacoflow {
     use super::observability::{classify, observability};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
+    #[pymodule_export]
+    use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset};
+    #[pymodule_export]
+    use super::stereo_track::{PyStereoTracker, PyTrackGraph};
     #[pymodule_export]
     use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
 

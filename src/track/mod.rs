@@ -1,13 +1,16 @@
-//! Trackers: one moving target each, behind one trait.
+//! Trackers: of one moving target each, behind one trait, and of everything that moves before a pair of cameras.
 //!
-//! A tracker is begun with a frame and what is known of the target in it, and is then given one frame after the other.
+//! A tracker of one target is begun with a frame and what is known of the target in it, and is then given one frame after the other; [`StereoTracker`] is told nothing
+//! beforehand and is given pairs of views.
 
 pub mod gradient;
 mod grey_levels;
+pub mod stereo;
 mod tracker;
 
 pub use gradient::GradientTracker;
 pub use grey_levels::GreyLevels;
+pub use stereo::StereoTracker;
 pub use tracker::Tracker;
 
 /// Names of the methods; a new tracker is one folder and one name here.

@@ -1,8 +1,9 @@
-//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks over them.
+//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks and disparities over them.
 //!
 //! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes it as PNG.
 
 mod digits;
+mod disparity;
 mod diverging;
 mod grey;
 mod line;
@@ -10,6 +11,7 @@ mod overlay;
 mod quiver;
 mod wheel;
 
+pub use disparity::draw_disparity;
 pub use diverging::{SignedMap, symmetric_range};
 pub use grey::{GreyRange, grey_picture};
 pub use overlay::{PathPoint, TrackOverlay, status_colour};

@@ -1,0 +1,190 @@
+"""How well clusters of edge pixels follow the objects of a scene with known truth: purity, recall, paths, identities, errors of the motion.
+
+A film's truth is one `Truth` a step. What a tracker said of it is one `Clustering` a step (edge pixels with the component of each) and the nodes and arcs of its graph.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+Integers = NDArray[np.integer]
+
+VISIBLE = 0.25
+"""Share of an object's greatest area below which it counts as hidden."""
+PURE = 0.8
+"""Share of a cluster's pixels with one label from which on its motion is compared with that object's."""
+GROSS = (2.0, 1.0)
+"""Errors of the motion that are gross: px/step in the picture, disparity/step."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A step of a scene."""
+
+    label: Integers
+    """(H, W)."""
+    motion: Array
+    """(u, v, w) to the next step, (H, W, 3), px and disparity."""
+
+
+@dataclass(frozen=True)
+class Clustering:
+    """What a tracker said of a step."""
+
+    rows: Integers
+    columns: Integers
+    component: Integers
+    """Of each of the N edge pixels."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A cluster of the graph."""
+
+    track_id: int
+    velocity: tuple[float, float, float] | None
+    """To the next step."""
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes by (step, component); scores of arcs by (step, from, to)."""
+
+    nodes: dict[tuple[int, int], Node]
+    arcs: dict[tuple[int, int, int], float]
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster seen with the truth: its majority label, that label's share, how many pixels, the true motion of those of the label."""
+
+    label: int
+    purity: float
+    pixels: int
+    motion: Array
+
+
+def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
+    """Every cluster of a step by its component."""
+    out = {}
+    labels = truth.label[clustering.rows, clustering.columns]
+    motions = truth.motion[clustering.rows, clustering.columns]
+    for component in np.unique(clustering.component):
+        mine = clustering.component == component
+        values, counts = np.unique(labels[mine], return_counts=True)
+        major = values[np.argmax(counts)]
+        motion = np.median(motions[mine & (labels == major)], axis=0)
+        out[int(component)] = Cluster(int(major), float(counts.max() / counts.sum()), int(mine.sum()), motion)
+    return out
+
+
+class Scores:
+    """Everything that is measured of one film; steps are counted from 0."""
+
+    def __init__(self, truths: Sequence[Truth], clusterings: Sequence[Clustering], graph: Graph) -> None:
+        self.truths, self.clusterings, self.graph = truths, clusterings, graph
+        self.told = [told(*step) for step in zip(truths, clusterings, strict=True)]
+
+    def purity(self) -> float:
+        """Share of edge pixels in clusters of their own majority label."""
+        clusters = [cluster for step in self.told for cluster in step.values()]
+        return sum(c.purity * c.pixels for c in clusters) / max(1, sum(c.pixels for c in clusters))
+
+    def seen(self, label: int) -> list[bool]:
+        """At which steps enough of an object is visible."""
+        areas = [int((truth.label == label).sum()) for truth in self.truths]
+        return [area >= VISIBLE * max(areas) for area in areas]
+
+    def recall(self, label: int) -> float:
+        """Share of an object's edge pixels in clusters where it is the majority, over the steps at which it is visible."""
+        right, all_ = 0, 0
+        for truth, clustering, clusters, seen in zip(self.truths, self.clusterings, self.told, self.seen(label), strict=True):
+            if seen:
+                mine = truth.label[clustering.rows, clustering.columns] == label
+                major = np.array([clusters[int(k)].label == label for k in clustering.component[mine]], bool)
+                right, all_ = right + int(major.sum()), all_ + int(mine.sum())
+        return right / max(1, all_)
+
+    def first_hidden(self, label: int) -> int:
+        """Steps until the object is hidden for the first time."""
+        seen = self.seen(label)
+        return seen.index(False) if False in seen else len(seen)
+
+    def largest(self, time: int, label: int) -> int | None:
+        """The largest cluster of an object."""
+        mine = {k: c.pixels for k, c in self.told[time].items() if c.label == label}
+        return max(mine, key=lambda k: mine[k]) if mine else None
+
+    def on(self, time: int, component: int | None, label: int) -> bool:
+        """Whether a cluster is there and is the object's."""
+        cluster = None if component is None else self.told[time].get(component)
+        return cluster is not None and cluster.label == label
+
+    def _steps(self, label: int, where: Sequence[int | None]) -> int:
+        """Over how many steps from the first the given clusters stay on an object."""
+        count = 0
+        for time, component in enumerate(where):
+            if not self.on(time, component, label):
+                break
+            count += 1
+        return count
+
+    def path(self, label: int) -> int:
+        """Over how many steps the chain of strongest arcs from the object's largest cluster stays on it, until it is hidden."""
+        at = self.largest(0, label)
+        chain = [at]
+        for time in range(self.first_hidden(label) - 1):
+            leaving = {to: score for (t, k, to), score in self.graph.arcs.items() if (t, k) == (time, at)}
+            at = max(leaving, key=lambda to: leaving[to]) if leaving else None
+            chain.append(at)
+        return self._steps(label, chain)
+
+    def index_kept(self, label: int) -> int:
+        """Over how many steps the component that is the object's largest cluster at first stays on it, until it is hidden."""
+        return self._steps(label, [self.largest(0, label)] * self.first_hidden(label))
+
+    def id_kept(self, label: int) -> int:
+        """Over how many steps of the whole film the track of its largest cluster at first stays on it."""
+        first = self.largest(0, label)
+        if first is None:
+            return 0
+        wanted = self.graph.nodes[0, first].track_id
+        by_step = [{node.track_id: k for (t, k), node in self.graph.nodes.items() if t == time} for time in range(len(self.told))]
+        return self._steps(label, [ids.get(wanted) for ids in by_step])
+
+    def ids(self, time: int, label: int) -> set[int]:
+        """Tracks of all clusters of an object."""
+        return {self.graph.nodes[time, k].track_id for k, c in self.told[time].items() if c.label == label}
+
+    def recognised(self, label: int) -> bool | None:
+        """Whether a track that was the object's before it was hidden is its again when it is visible; None where it never comes back."""
+        seen = self.seen(label)
+        hidden = self.first_hidden(label)
+        back = next((t for t in range(hidden, len(seen)) if seen[t]), None)
+        if back is None:
+            return None
+        before = set().union(*(self.ids(t, label) for t in range(max(0, hidden - 3), hidden)))
+        after = set().union(*(self.ids(t, label) for t in range(back, min(back + 2, len(seen)))))
+        return bool(before & after)
+
+    def motion_errors(self) -> dict[int, Array]:
+        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority."""
+        errors = defaultdict(list)
+        for time, clusters in enumerate(self.told[:-1]):
+            for component, cluster in clusters.items():
+                velocity = self.graph.nodes[time, component].velocity
+                if cluster.purity >= PURE and velocity is not None:
+                    errors[cluster.label].append(np.abs(np.array(velocity) - cluster.motion))
+        return {label: np.array(values) for label, values in errors.items()}
+
+
+def gross(errors: Array) -> float:
+    """Share of motions (N, 3) that are off by more than the gross errors."""
+    off = (np.hypot(errors[:, 0], errors[:, 1]) > GROSS[0]) | (errors[:, 2] > GROSS[1])
+    return float(off.mean())

@@ -1,0 +1,330 @@
+"""The stereo tracker's classes; they are offered by `jacoflow.track`."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
+
+if TYPE_CHECKING:
+    import networkx
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StereoCluster:
+    """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times in steps; NaN where nothing was measured."""
+
+    time: int
+    """Step, from 0 (no unit)."""
+    index: int
+    """Component of the mixture (no unit)."""
+    track_id: int
+    """Track that the cluster is part of (no unit)."""
+    group: int
+    """Clusters of one group move as one object; the number is that of the group's oldest track (no unit)."""
+    n_pixels: int
+    """Edge pixels in it, no unit."""
+    weight: float
+    """Weight of the component, 0 to 1, no unit."""
+    mean: Array
+    """Mean (x, y, disparity), (3,), px."""
+    covariance: Array
+    """Covariance of (x, y, disparity), (3, 3), px^2."""
+    velocity: Array
+    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step."""
+    next_velocity: Array
+    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    affine: Array
+    """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at the middle of the pixels, (6,), px/step and 1/step ("improved")."""
+    residual: float
+    """Truncated mean absolute difference of brightness that the motion leaves, in grey levels of 8 bits; one such level is the unit."""
+    coasting: bool
+    """Whether the motion is an extrapolation, because what was measured jumped or could not be measured (no unit)."""
+    depth: float
+    """Depth Z = f B / (d - d_infinity), in units of the baseline's; NaN unless the cameras are known."""
+    metric_velocity: Array
+    """Velocity (X, Y, Z) since the last step, (3,), in units of the baseline's per step; NaN unless the cameras are known."""
+
+
+@dataclass(frozen=True, eq=False)
+class StereoStep:
+    """All clusters of a step, and the N edge pixels of the left view that they are made of; lengths in px."""
+
+    time: int
+    """Step, from 0 (no unit)."""
+    clusters: list[StereoCluster]
+    """Clusters with edge pixels, by component; none where the views show no edges (no unit)."""
+    rows: NDArray[np.uint32]
+    """Rows of the edge pixels with a disparity, (N,), px."""
+    cols: NDArray[np.uint32]
+    """Their columns, (N,), px."""
+    values: NDArray[np.float32]
+    """Their disparities, (N,), px."""
+    cluster_of_pixel: NDArray[np.uint32]
+    """`index` of the cluster that each belongs to, (N,), no unit."""
+    rounds: int
+    """Rounds of the mixture, no unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class StereoTrack:
+    """One object's way through T steps, in px."""
+
+    times: NDArray[np.int64]
+    """Steps at which it was seen, (T,), ascending, no unit."""
+    positions: Array
+    """Mean (x, y, disparity) there, (T, 3), px."""
+    velocities: Array
+    """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step; NaN where not measured."""
+
+
+class TrackGraph:
+    """Clusters of all steps and the arcs between them: equation (33) of the stereo paper. Nodes are pairs (step, component), no unit.
+
+    An arc's score is `e(k, k') = e(k -> k') + e(k <- k')`, 0 to 2: the shares of both clusters' voxels that meet the other one, forwards and backwards in time.
+    """
+
+    def __init__(self, compiled: _TrackGraph | None = None) -> None:
+        self._graph = _TrackGraph.from_json('{"format": "jacoflow track graph 1", "nodes": [], "arcs": []}') if compiled is None else compiled
+
+    @property
+    def nodes(self) -> dict[tuple[int, int], StereoCluster]:
+        """Clusters by (step, component), no unit."""
+        clusters = (StereoCluster(**node) for node in self._graph.nodes())
+        return {(cluster.time, cluster.index): cluster for cluster in clusters}
+
+    @property
+    def arcs(self) -> dict[tuple[tuple[int, int], tuple[int, int]], tuple[float, float]]:
+        """Shares (forward, backward), 0 to 1 (no unit), by the two clusters that an arc connects."""
+        return {((time, start), (time + 1, end)): (forward, backward) for time, start, end, forward, backward in self._graph.arcs()}
+
+    def follow(self, t: int, k: int, threshold: float = 0.4, backward: bool = False) -> list[tuple[int, int]]:
+        """A track: the clusters (step, component), no unit, reached from (t, k) along arcs whose score is at least `threshold`, itself among them.
+
+        Raises
+        ------
+        ValueError
+            For a cluster that is not there, naming `node`.
+        """
+        if operator.index(t) < 0 or operator.index(k) < 0:
+            raise ValueError(f"node: expected a cluster of the graph, got ({t}, {k})")
+        return self._graph.follow(t, k, float(threshold), bool(backward))
+
+    def to_networkx(self) -> networkx.DiGraph[tuple[int, int]]:
+        """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.
+
+        Raises
+        ------
+        jacoflow.MissingDependencyError
+            Without networkx.
+        """
+        try:
+            import networkx
+        except ImportError as error:
+            raise MissingDependencyError('networkx is not installed; pip install "jacoflow[graph]"') from error
+        graph: networkx.DiGraph[tuple[int, int]] = networkx.DiGraph()
+        for node in self._graph.nodes():
+            graph.add_node((node["time"], node["index"]), **node)
+        for (start, end), (forward, backward) in self.arcs.items():
+            graph.add_edge(start, end, forward=forward, backward=backward, score=forward + backward)
+        return graph
+
+    def to_json(self) -> str:
+        """As JSON text with every digit; what was not measured is null. Lengths in px."""
+        return self._graph.to_json()
+
+    @classmethod
+    def from_json(cls, text: str) -> TrackGraph:
+        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text."""
+        return cls(_TrackGraph.from_json(text))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TrackGraph) and bool(self._graph == other._graph)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return TrackGraph.from_json, (self.to_json(),)
+
+
+class StereoTracker:
+    """Follows everything that moves before two cameras, which may move themselves: nothing is learnt or marked beforehand.
+
+    Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x, y, disparity), clustered by
+    a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic, whatever the number of threads.
+
+    Parameters
+    ----------
+    mode : "improved" or "paper"
+        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped.
+        "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
+    n_components : int
+        Components of the mixture; default 16 ("paper": 12).
+    weight_concentration_prior, mean_precision_prior, degrees_of_freedom_prior, covariance_prior : float
+        alpha_0, beta_0, nu_0 of (8) and (9), no unit, and the diagonal of W_0^-1, cells^2.
+    max_iter, warm_max_iter : int
+        Most rounds of the mixture from seeds, and from the carried components ("improved").
+    tol : "auto", float or None
+        Rounds end when the lower bound grows by less than this for each pixel; None: never. Default 1e-4 ("paper": None).
+    n_init : int
+        Fits from different seeds of which the best is kept; default 1.
+    prune_weight : float
+        Components with fewer pixels are left out of fits from seeds; default 0, none.
+    random_state : int
+        Seed of the fits.
+    disparity_range, row_range : (int, int), px
+        Least and greatest disparity, and offset of the right view's rows, that are looked for.
+    row_offset : float, px
+        Offset of the rows; default: found from the views, once ("improved") or at every pixel ("paper").
+    matching : "sgm" or "classes"
+        How the views are matched, see `jacoflow.stereo.edge_disparity`; default "sgm" ("paper": "classes").
+    grid : (rows, columns, layers)
+        Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`.
+    search : int
+        How far templates and depths are searched, cells and disparities; default 8.
+    luminance_levels : int
+        Levels of the reduced luminance; default 64.
+    arc_threshold : float
+        Least score of an arc that continues a track ("paper"), 0 to 2.
+    reseed_below : float
+        Components with fewer pixels begin anew where the mixture explains least ("improved").
+    predicted_windows : bool
+        Search templates within 2 cells of the last motion only ("improved"): faster, a little less sure.
+    recognition : bool
+        Whether lost tracks are waited for; default yes ("paper": no). A component that covers less than `least_overlap` of its moved self loses its track, which is waited for `patience` steps and given to a new component within
+        `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity).
+    grouping : bool
+        Whether clusters that move alike are grouped; default yes ("paper": no). `group_limits`: farthest apart (cells), motions in the picture (px) and in depth (disparity) that differ at most.
+    focal, baseline, d_infinity : float
+        Focal length (px), distance of the cameras (the unit of depths), disparity of a point at infinity (px; default 0). With the first two, clusters have a depth and a velocity in space.
+    threads : int
+        Number of threads; default the environment's, else all.
+
+    Raises
+    ------
+    ValueError
+        For options out of range; the message names the option.
+
+    Examples
+    --------
+    >>> tracker = StereoTracker(grid=(30, 40, None), disparity_range=(-8, 8), n_components=4, row_offset=0.0)
+    >>> cells = np.random.default_rng(1).integers(0, 200, (12, 20)).repeat(8, 0).repeat(8, 1).astype(np.uint8)
+    >>> for t in range(3):
+    ...     step = tracker.update(cells[:, 10 - 2 * t : 138 - 2 * t], cells[:, 13 - 2 * t : 141 - 2 * t])
+    >>> largest = max(step.clusters, key=lambda cluster: cluster.n_pixels)
+    >>> largest.velocity.round(1).tolist()[0], round(float(largest.mean[2]))
+    (2.0, 3)
+    """
+
+    def __init__(
+        self,
+        mode: Literal["improved", "paper"] = "improved",
+        *,
+        n_components: int | None = None,
+        weight_concentration_prior: float = 0.1,
+        mean_precision_prior: float = 1e-3,
+        degrees_of_freedom_prior: float = 12.1,
+        covariance_prior: float = 0.1,
+        max_iter: int = 100,
+        warm_max_iter: int = 30,
+        tol: float | Literal["auto"] | None = "auto",
+        n_init: int = 1,
+        prune_weight: float = 0.0,
+        random_state: int = 0,
+        disparity_range: tuple[int, int] = (-40, 24),
+        row_range: tuple[int, int] = (-4, 4),
+        row_offset: float | None = None,
+        matching: Literal["classes", "sgm"] | None = None,
+        grid: tuple[int, int, int | None] = (60, 80, None),
+        search: int = 8,
+        luminance_levels: int = 64,
+        arc_threshold: float = 0.4,
+        reseed_below: float = 20.0,
+        predicted_windows: bool = False,
+        recognition: bool | None = None,
+        least_overlap: float = 0.2,
+        patience: int = 10,
+        tolerance: tuple[float, float, float] = (3.0, 4.0, 1.0),
+        tolerance_per_step: tuple[float, float, float] = (0.5, 0.5, 0.2),
+        coast: int = 3,
+        jump: tuple[float, float] = (24.0, 1.5),
+        grouping: bool | None = None,
+        group_limits: tuple[float, float, float] = (3.5, 1.0, 0.15),
+        focal: float | None = None,
+        baseline: float | None = None,
+        d_infinity: float = 0.0,
+        threads: int | None = None,
+    ) -> None:
+        options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
+        self._tracker = _StereoTracker(_checked(options))
+
+    def update(self, left: ArrayLike, right: ArrayLike) -> StereoStep:
+        """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
+
+        Pixels that are not finite leave no edges round them; views without edges give a step without clusters.
+
+        Raises
+        ------
+        ValueError
+            For views of different size or of another size than before, naming both shapes.
+        """
+        return _step(self._tracker.update(_view(left), _view(right)))
+
+    def update_disparity(self, left: ArrayLike, disparity: ArrayLike) -> StereoStep:
+        """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part.
+
+        Raises
+        ------
+        ValueError
+            As `update`.
+        """
+        return _step(self._tracker.update_disparity(_view(left), _view(disparity)))
+
+    @property
+    def graph(self) -> TrackGraph:
+        """Clusters of all steps so far and their arcs; lengths in px."""
+        return TrackGraph(self._tracker.graph())
+
+    @property
+    def tracks(self) -> dict[int, StereoTrack]:
+        """Tracks by id; lengths in px."""
+        return {track: StereoTrack(*parts) for track, parts in self._tracker.tracks().items()}
+
+
+COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
+"""Options that are counts."""
+
+
+def _checked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options as the compiled part takes them; what has the wrong length or sign is refused by name."""
+    out = dict(options)
+    for name in COUNTS:
+        if out[name] is not None:
+            out[name] = operator.index(out[name])
+            if out[name] < 0:
+                raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
+    lengths = {"disparity_range": 2, "row_range": 2, "grid": 3, "tolerance": 3, "tolerance_per_step": 3, "jump": 2, "group_limits": 3}
+    for name, length in lengths.items():
+        out[name] = tuple(out[name])
+        if len(out[name]) != length:
+            raise ValueError(f"{name}: expected {length} numbers, got {len(out[name])}")
+    if any(side is not None and operator.index(side) < 0 for side in out["grid"]):
+        raise ValueError(f"grid: expected numbers of cells, got {out['grid']}")
+    return out
+
+
+def _view(view: ArrayLike) -> NDArray[Any]:
+    return view if isinstance(view, np.ndarray) else np.asarray(view)
+
+
+def _step(told: dict[str, Any]) -> StereoStep:
+    clusters = [StereoCluster(**cluster) for cluster in told.pop("clusters")]
+    return StereoStep(clusters=clusters, **told)

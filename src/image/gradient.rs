@@ -1,0 +1,219 @@
+//! Slopes of brightness: convolution with the derivatives of a Gaussian, vectorised along rows and parallel over row bands.
+
+use super::Border;
+use super::blocks::{cover, load, store};
+use crate::parallel::BAND_ROWS;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::Frame;
+use rayon::prelude::*;
+
+/// Weights of a Gaussian and of its derivative at distance 0, 1, ..., radius.
+#[derive(Debug, Clone)]
+struct Weights<T> {
+    /// `G(k) = exp(-k^2 / (2 sigma^2)) / (sigma sqrt(2 pi))`.
+    gaussian: Vec<T>,
+    /// `-G'(k) = k / sigma^2 G(k)`: what the sample `k` after is weighted with in a slope.
+    derivative: Vec<T>,
+}
+
+impl<T: SimdReal> Weights<T> {
+    fn new(sigma: f64, radius: usize) -> Self {
+        let gaussian =
+            |k: f64| (-0.5 * (k / sigma).powi(2)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+        let of = |weight: &dyn Fn(f64) -> f64| (0..=radius).map(|k| T::from_f64(weight(k as f64))).collect();
+        Self { gaussian: of(&gaussian), derivative: of(&|k| k / (sigma * sigma) * gaussian(k)) }
+    }
+}
+
+/// Slopes of `frame` along x and along y, in its levels per px: convolutions with `G'(x) G(y)` and `G(x) G'(y)` of a Gaussian of `sigma` px, sampled up to
+/// `radius` px, the border replicated.
+///
+/// They are the slopes of the plane that fits the neighbourhood best under Gaussian weights. A sample that is not finite damages every pixel whose kernel reaches it, and no
+/// other. Identical for any number of threads. `sigma` must be positive.
+pub(crate) fn gaussian_gradient<T: SimdReal>(
+    level: Level,
+    frame: &Frame<T>,
+    sigma: f64,
+    radius: usize,
+) -> (Frame<T>, Frame<T>) {
+    let (width, height) = frame.size();
+    let mut along_x = Frame::filled(width, height, T::from_f64(0.0));
+    let mut along_y = along_x.clone();
+    if frame.data().is_empty() {
+        return (along_x, along_y);
+    }
+    let weights = Weights::new(sigma, radius);
+    let bands = along_x.data_mut().par_chunks_mut(BAND_ROWS * width);
+    bands.zip(along_y.data_mut().par_chunks_mut(BAND_ROWS * width)).enumerate().for_each(|(band, (along_x, along_y))| {
+        dispatch(level, Band { frame, weights: &weights, first_row: band * BAND_ROWS, along_x, along_y });
+    });
+    (along_x, along_y)
+}
+
+/// One band of both results.
+struct Band<'a, T> {
+    frame: &'a Frame<T>,
+    weights: &'a Weights<T>,
+    first_row: usize,
+    along_x: &'a mut [T],
+    along_y: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for Band<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        // A row narrower than one vector is left to single lanes.
+        if self.frame.width() < V::LANES { self.rows::<T>() } else { self.rows::<V>() }
+    }
+}
+
+impl<T: SimdReal> Band<'_, T> {
+    #[inline(always)]
+    fn rows<V: Lanes<Scalar = T>>(self) {
+        let Self { frame, weights, first_row, along_x, along_y } = self;
+        let (width, height) = frame.size();
+        let radius = weights.gaussian.len() - 1;
+        // Both sums down the columns, with room for the border at either end.
+        let mut smooth = vec![T::from_f64(0.0); width + 2 * radius];
+        let mut slope = smooth.clone();
+        let mut pairs: Vec<(&[T], &[T])> = Vec::with_capacity(radius);
+        for (offset, (out_x, out_y)) in along_x.chunks_exact_mut(width).zip(along_y.chunks_exact_mut(width)).enumerate() {
+            let y = (first_row + offset) as isize;
+            let row = |at: isize| frame.row(Border::Replicate.index(at, height));
+            pairs.clear();
+            for k in 1..=radius as isize {
+                pairs.push((row(y - k), row(y + k)));
+            }
+            let centre = frame.row(y as usize);
+            cover!(width, V, |x, N| {
+                sum_down::<V, N>(centre, &pairs, weights, x, &mut smooth[radius + x..], &mut slope[radius + x..]);
+            });
+            for plane in [&mut smooth, &mut slope] {
+                let (first, last) = (plane[radius], plane[radius + width - 1]);
+                plane[..radius].fill(first);
+                plane[radius + width..].fill(last);
+            }
+            cover!(width, V, |x, N| sum_differences::<V, N>(&smooth[x..], &weights.derivative, &mut out_x[x..]));
+            cover!(width, V, |x, N| sum_along::<V, N>(&slope[x..], &weights.gaussian, &mut out_y[x..]));
+        }
+    }
+}
+
+/// Sums of a column weighted with `G` and with `-G'`. The middle has weight 0 in the latter and is there so that a bad sample in it is not overlooked.
+#[inline(always)]
+fn sum_down<V: Lanes, const N: usize>(
+    centre: &[V::Scalar],
+    pairs: &[(&[V::Scalar], &[V::Scalar])],
+    weights: &Weights<V::Scalar>,
+    x: usize,
+    smooth: &mut [V::Scalar],
+    slope: &mut [V::Scalar],
+) {
+    let middle = load::<V, N>(&centre[x..]);
+    let (mut sums, mut differences) = ([V::zero(); N], [V::zero(); N]);
+    for i in 0..N {
+        sums[i] = middle[i] * V::splat(weights.gaussian[0]);
+        differences[i] = middle[i] * V::zero();
+    }
+    for (k, (above, below)) in pairs.iter().enumerate() {
+        let (g, d) = (V::splat(weights.gaussian[k + 1]), V::splat(weights.derivative[k + 1]));
+        let (a, b) = (load::<V, N>(&above[x..]), load::<V, N>(&below[x..]));
+        for i in 0..N {
+            sums[i] = (a[i] + b[i]).mul_add(g, sums[i]);
+            differences[i] = (b[i] - a[i]).mul_add(d, differences[i]);
+        }
+    }
+    store::<V, N>(&sums, smooth);
+    store::<V, N>(&differences, slope);
+}
+
+/// `out[x] = sum_k weights[k] (row[x + r + k] - row[x + r - k])`.
+#[inline(always)]
+fn sum_differences<V: Lanes, const N: usize>(row: &[V::Scalar], weights: &[V::Scalar], out: &mut [V::Scalar]) {
+    let radius = weights.len() - 1;
+    let middle = load::<V, N>(&row[radius..]);
+    let mut sums = [V::zero(); N];
+    for i in 0..N {
+        sums[i] = middle[i] * V::zero();
+    }
+    for (k, &weight) in weights.iter().enumerate().skip(1) {
+        let (a, b) = (load::<V, N>(&row[radius - k..]), load::<V, N>(&row[radius + k..]));
+        for i in 0..N {
+            sums[i] = (b[i] - a[i]).mul_add(V::splat(weight), sums[i]);
+        }
+    }
+    store::<V, N>(&sums, out);
+}
+
+/// `out[x] = weights[0] row[x + r] + sum_k weights[k] (row[x + r - k] + row[x + r + k])`.
+#[inline(always)]
+fn sum_along<V: Lanes, const N: usize>(row: &[V::Scalar], weights: &[V::Scalar], out: &mut [V::Scalar]) {
+    let radius = weights.len() - 1;
+    let middle = load::<V, N>(&row[radius..]);
+    let mut sums = [V::zero(); N];
+    for i in 0..N {
+        sums[i] = middle[i] * V::splat(weights[0]);
+    }
+    for (k, &weight) in weights.iter().enumerate().skip(1) {
+        let (a, b) = (load::<V, N>(&row[radius - k..]), load::<V, N>(&row[radius + k..]));
+        for i in 0..N {
+            sums[i] = (a[i] + b[i]).mul_add(V::splat(weight), sums[i]);
+        }
+    }
+    store::<V, N>(&sums, out);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_has_its_slopes_and_a_step_its_height() {
+        let plane = Frame::from_fn(40, 40, |x, y| 3.0f64 * x as f64 - 0.5 * y as f64);
+        let (gx, gy) = gaussian_gradient(Level::detect(), &plane, 2.0, 8);
+        assert!((gx.get(20, 20) - 3.0 * 0.9996).abs() < 1e-3 && (gy.get(20, 20) + 0.5 * 0.9996).abs() < 1e-3);
+        let step = Frame::from_fn(41, 41, |_, y| if y < 20 { 0.0f64 } else { 100.0 });
+        let (gx, gy) = gaussian_gradient(Level::detect(), &step, 2.0, 8);
+        let peak = 100.0 / (2.0 * (2.0 * std::f64::consts::PI).sqrt());
+        assert!(gx.get(20, 20).abs() < 1e-9 && (gy.get(20, 20) / peak - 1.0).abs() < 0.04, "{}", gy.get(20, 20));
+    }
+
+    #[test]
+    fn every_level_agrees_with_the_direct_sum() {
+        let frame = Frame::from_fn(37, 23, |x, y| ((7 * x + 13 * y * y) % 31) as f32);
+        let (sigma, radius) = (1.0f64, 4isize);
+        let g = |k: isize| (-0.5 * (k as f64 / sigma).powi(2)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+        let d = |k: isize| -(k as f64) / (sigma * sigma) * g(k);
+        for level in Level::available() {
+            let (gx, gy) = gaussian_gradient(level, &frame, sigma, radius as usize);
+            for (x, y) in [(0usize, 0usize), (1, 20), (18, 11), (36, 22), (30, 2)] {
+                let (mut want_x, mut want_y) = (0.0, 0.0);
+                for j in -radius..=radius {
+                    for i in -radius..=radius {
+                        let column = Border::Replicate.index(x as isize - i, 37);
+                        let value = f64::from(frame.get(column, Border::Replicate.index(y as isize - j, 23)));
+                        want_x += value * d(i) * g(j);
+                        want_y += value * g(i) * d(j);
+                    }
+                }
+                assert!((f64::from(gx.get(x, y)) - want_x).abs() < 1e-4, "{level:?} {x} {y}");
+                assert!((f64::from(gy.get(x, y)) - want_y).abs() < 1e-4, "{level:?} {x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_sample_damages_its_neighbourhood_and_no_more() {
+        let mut frame = Frame::from_fn(40, 40, |x, y| (x * y) as f32);
+        frame.data_mut()[20 * 40 + 20] = f32::NAN;
+        let (gx, gy) = gaussian_gradient(Level::detect(), &frame, 2.0, 8);
+        for y in 0..40usize {
+            for x in 0..40usize {
+                let near = x.abs_diff(20) <= 8 && y.abs_diff(20) <= 8;
+                assert_eq!((gx.get(x, y).is_nan(), gy.get(x, y).is_nan()), (near, near), "{x} {y}");
+            }
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! Disparity maps in files: `.npz`, `.pfm`, and the 16-bit PNG of the KITTI benchmark.
+
+use super::decode::{check_size, png_error};
+use super::npz::{NpzReader, NpzWriter};
+use super::pfm::{FloatMap, read_pfm, write_pfm};
+use super::write::atomic;
+use crate::error::{Error, Result};
+use crate::types::Frame;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Steps of a KITTI disparity PNG in one px.
+const STEPS: f64 = 256.0;
+
+/// How a disparity map is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DisparityFormat {
+    /// `.npz`: `disparity` and `score` (H, W) of float32, NaN where there is none, and `row_offset`. The only one that keeps everything.
+    Npz,
+    /// `.pfm`: float32, infinite where there is none (the convention of Middlebury's stereo benchmark).
+    Pfm,
+    /// `.png` of 16 bit: `256 d`, 0 where there is none (A. Geiger et al., "Vision meets robotics: the KITTI dataset", 2013). It holds
+    /// disparities above 0 and below 256 px; others become unknown.
+    Kitti,
+}
+
+impl DisparityFormat {
+    /// Every format.
+    pub const ALL: [Self; 3] = [Self::Npz, Self::Pfm, Self::Kitti];
+
+    /// The word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Npz => "npz",
+            Self::Pfm => "pfm",
+            Self::Kitti => "kitti",
+        }
+    }
+
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Npz => "npz",
+            Self::Pfm => "pfm",
+            Self::Kitti => "png",
+        }
+    }
+
+    /// The format of this name.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `format` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        let known = Self::ALL.into_iter().find(|format| format.name() == name);
+        known.ok_or_else(|| Error::argument("format", "npz, pfm or kitti", format!("{name:?}")))
+    }
+
+    /// The format that a file's extension means.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_string_lossy().to_ascii_lowercase();
+        Self::ALL.into_iter().find(|format| format.extension() == extension)
+    }
+
+    /// Writes a map, whole or not at all; returns how many disparities the format could not hold.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for an empty map or a score of another size, [`Error::Io`] with the path.
+    pub fn write(self, path: &Path, map: &DisparityMap) -> Result<usize> {
+        let (width, height) = map.disparity.size();
+        if width == 0 || height == 0 || map.score.as_ref().is_some_and(|score| score.size() != (width, height)) {
+            return Err(Error::argument("disparity", "an array (H, W) and a score alike", format!("({height}, {width})")));
+        }
+        match self {
+            Self::Npz => write_npz(path, map).map(|()| 0),
+            Self::Pfm => {
+                let plane = map.disparity.data().iter().map(|&d| if d.is_finite() { d } else { f32::INFINITY });
+                write_pfm(path, &FloatMap { width, height, planes: vec![plane.collect()] }).map(|()| 0)
+            }
+            Self::Kitti => write_kitti_disparity(path, &map.disparity),
+        }
+    }
+
+    /// Reads a map; NaN where there is none.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read, [`Error::Format`] when it is not of this format or damaged.
+    pub fn read(self, path: &Path) -> Result<DisparityMap> {
+        match self {
+            Self::Npz => read_npz(path),
+            Self::Pfm => {
+                let FloatMap { width, height, planes } = read_pfm(path)?;
+                let [plane] = <[Vec<f32>; 1]>::try_from(planes)
+                    .map_err(|_| Error::format(path, "expected one plane of disparity, got three"))?;
+                let known = plane.into_iter().map(|d| if d.is_finite() { d } else { f32::NAN }).collect();
+                Frame::new(width, height, known).map(DisparityMap::plain)
+            }
+            Self::Kitti => read_kitti_disparity(path).map(DisparityMap::plain),
+        }
+    }
+}
+
+/// What a file of disparities holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DisparityMap {
+    /// `x_left - x_right` of every left pixel, px; NaN where there is none.
+    pub disparity: Frame<f32>,
+    /// How well both views agree there, 0 to 1.
+    pub score: Option<Frame<f32>>,
+    /// How many rows lower the right view shows a point.
+    pub row_offset: Option<f64>,
+}
+
+impl DisparityMap {
+    /// Disparities about which nothing else is known.
+    pub fn plain(disparity: Frame<f32>) -> Self {
+        Self { disparity, score: None, row_offset: None }
+    }
+}
+
+fn write_npz(path: &Path, map: &DisparityMap) -> Result<()> {
+    let mut npz = NpzWriter::create(path)?;
+    let shape = [map.disparity.height(), map.disparity.width()];
+    npz.array("disparity", &shape, map.disparity.data())?;
+    if let Some(score) = &map.score {
+        npz.array("score", &shape, score.data())?;
+    }
+    if let Some(rows) = map.row_offset {
+        npz.array("row_offset", &[], &[rows])?;
+    }
+    npz.finish()
+}
+
+fn read_npz(path: &Path) -> Result<DisparityMap> {
+    let mut npz = NpzReader::open(path)?;
+    let plane = |npz: &mut NpzReader<_>, name: &str| {
+        let array = npz.real_array::<f32>(name)?;
+        match array.shape[..] {
+            [height, width] => Frame::new(width, height, array.values),
+            _ => Err(Error::format(path, format!("array '{name}' has shape {:?}, expected (H, W)", array.shape))),
+        }
+    };
+    let disparity = plane(&mut npz, "disparity")?;
+    let score = if npz.contains("score") { Some(plane(&mut npz, "score")?) } else { None };
+    let row_offset =
+        if npz.contains("row_offset") { npz.real_array::<f64>("row_offset")?.values.first().copied() } else { None };
+    Ok(DisparityMap { disparity, score, row_offset })
+}
+
+/// Writes the PNG; returns how many disparities did not fit.
+fn write_kitti_disparity(path: &Path, disparity: &Frame<f32>) -> Result<usize> {
+    let mut lost = 0;
+    let mut bytes = Vec::with_capacity(2 * disparity.data().len());
+    for &value in disparity.data() {
+        let sample = (f64::from(value) * STEPS).round();
+        let held = (1.0..=65535.0).contains(&sample);
+        lost += usize::from(value.is_finite() && !held);
+        bytes.extend(if held { sample as u16 } else { 0 }.to_be_bytes());
+    }
+    atomic(path, |file| {
+        let mut encoder = png::Encoder::new(file, disparity.width() as u32, disparity.height() as u32);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let written = encoder.write_header().and_then(|mut png| {
+            png.write_image_data(&bytes)?;
+            png.finish()
+        });
+        written.map_err(|e| Error::io(path, e.into()))
+    })?;
+    Ok(lost)
+}
+
+fn read_kitti_disparity(path: &Path) -> Result<Frame<f32>> {
+    let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| png_error(path, e))?;
+    let info = reader.info();
+    let (width, height) = (info.width as usize, info.height as usize);
+    if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
+        let message = format!("not a disparity PNG: expected 16-bit grey, got {:?} {:?}", info.bit_depth, info.color_type);
+        return Err(Error::format(path, message));
+    }
+    if info.interlaced {
+        return Err(Error::format(path, "an interlaced PNG; disparity PNGs are not interlaced"));
+    }
+    check_size(path, width, height)?;
+    let mut values = Vec::new();
+    while let Some(row) = reader.next_row().map_err(|e| png_error(path, e))? {
+        for p in row.data().chunks_exact(2) {
+            let sample = u16::from_be_bytes([p[0], p[1]]);
+            values.push(if sample > 0 { f32::from(sample) / STEPS as f32 } else { f32::NAN });
+        }
+    }
+    Frame::new(width, height, values).map_err(|_| Error::format(path, "cut off"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map() -> DisparityMap {
+        let disparity = Frame::new(3, 2, vec![1.5, f32::NAN, 255.5, 0.25, -3.0, 300.0]).unwrap();
+        let score = Some(Frame::new(3, 2, vec![0.5, f32::NAN, 1.0, 0.25, 0.75, 0.5]).unwrap());
+        DisparityMap { disparity, score, row_offset: Some(-1.25) }
+    }
+
+    fn bits(frame: &Frame<f32>) -> Vec<u32> {
+        frame.data().iter().map(|v| v.to_bits()).collect()
+    }
+
+    #[test]
+    fn maps_come_back_as_far_as_the_format_holds_them() {
+        let folder = tempfile::tempdir().unwrap();
+        for (format, lost) in [(DisparityFormat::Npz, 0), (DisparityFormat::Pfm, 0), (DisparityFormat::Kitti, 2)] {
+            let path = folder.path().join(format!("a.{}", format.extension()));
+            assert_eq!(DisparityFormat::of(&path), Some(format));
+            assert_eq!(DisparityFormat::parse(format.name()).unwrap(), format);
+            assert_eq!(format.write(&path, &map()).unwrap(), lost);
+            let back = format.read(&path).unwrap();
+            let mut want = map().disparity;
+            if lost > 0 {
+                want.data_mut()[4..].fill(f32::NAN);
+            }
+            assert_eq!(bits(&back.disparity), bits(&want), "{format:?}");
+            if format == DisparityFormat::Npz {
+                assert_eq!((bits(&back.score.unwrap()), back.row_offset), (bits(&map().score.unwrap()), Some(-1.25)));
+            }
+            let whole = std::fs::read(&path).unwrap();
+            for cut in [0, 5, whole.len() / 2] {
+                std::fs::write(&path, &whole[..cut]).unwrap();
+                assert!(matches!(format.read(&path), Err(Error::Format { .. })), "{format:?} {cut}");
+            }
+            assert!(matches!(format.read(&folder.path().join("none")), Err(Error::Io { .. })));
+            let empty = DisparityMap::plain(Frame::default());
+            assert!(format.write(&path, &empty).unwrap_err().to_string().starts_with("disparity: "));
+        }
+        assert!(DisparityFormat::parse("flo").unwrap_err().to_string().starts_with("format: "));
+        assert_eq!(DisparityFormat::of(Path::new("a.flo")), None);
+    }
+
+    #[test]
+    fn pictures_of_another_kind_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        ::image::GrayImage::new(3, 3).save(&path).unwrap();
+        assert!(DisparityFormat::Kitti.read(&path).unwrap_err().to_string().contains("16-bit grey"));
+        let path = folder.path().join("a.pfm");
+        write_pfm(&path, &FloatMap { width: 1, height: 1, planes: vec![vec![0.0]; 3] }).unwrap();
+        assert!(matches!(DisparityFormat::Pfm.read(&path), Err(Error::Format { .. })));
+    }
+}

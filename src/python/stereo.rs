@@ -1,0 +1,130 @@
+//! Disparity for Python: two views in, arrays out; what a user meets is in `jacoflow.stereo`.
+
+use super::arrays::{self, ColourRule};
+use crate::parallel::Threads;
+use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method};
+use crate::track::GreyLevels;
+use crate::types::{AnyFrame, Frame};
+use pyo3::prelude::*;
+
+/// Views in 8-bit grey levels; the first decides what the white of floats is.
+fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[Frame<f32>; N]> {
+    let mut frames = Vec::with_capacity(N);
+    for (name, view) in views {
+        frames.push(arrays::frame(name, view, ColourRule::Luminance)?);
+    }
+    let levels = frames.first().map(GreyLevels::decide);
+    Ok(std::array::from_fn(|i| in_levels(&frames[i], levels.map_or(1.0, |levels| levels.gain(&frames[i])))))
+}
+
+/// Samples times a gain, in single precision.
+pub(super) fn in_levels(view: &AnyFrame, gain: f64) -> Frame<f32> {
+    match view {
+        AnyFrame::F64(frame) => frame.map(|&value| (value * gain) as f32),
+        other => other.to_real::<f32>().map(|&value| (f64::from(value) * gain) as f32),
+    }
+}
+
+/// The arguments that both functions share.
+fn options(
+    method: &str,
+    disparity_range: (i32, i32),
+    row_range: (i32, i32),
+    sigma: f64,
+    threshold: f64,
+    classes: usize,
+    window: usize,
+    min_support: f64,
+    threads: Option<usize>,
+) -> PyResult<EdgeDisparityOptions> {
+    Ok(EdgeDisparityOptions {
+        method: Method::parse(method)?,
+        disparity_range,
+        row_range,
+        sigma,
+        threshold,
+        classes,
+        window,
+        min_support,
+        threads: Threads::new(threads)?,
+        ..EdgeDisparityOptions::default()
+    })
+}
+
+/// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and scores (N,), then the row offset.
+#[pyfunction(name = "_edge_disparity")]
+pub fn edge_disparity<'py>(
+    left: &Bound<'py, PyAny>,
+    right: &Bound<'py, PyAny>,
+    method: &str,
+    disparity_range: (i32, i32),
+    row_range: (i32, i32),
+    row_offset: Option<f64>,
+    subpixel: bool,
+    check: bool,
+    prior: Option<&Bound<'py, PyAny>>,
+    prior_radius: u32,
+    sigma: f64,
+    threshold: f64,
+    classes: usize,
+    window: usize,
+    min_support: f64,
+    threads: Option<usize>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, f64)> {
+    let py = left.py();
+    let common = options(method, disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
+    let [left, right] = grey_levels([("left", left), ("right", right)])?;
+    let prior = prior.map(|prior| arrays::frame("prior", prior, ColourRule::Refuse)).transpose()?;
+    let prior = prior.map(|prior| prior.to_real::<f32>());
+    let options = EdgeDisparityOptions { row_offset, subpixel, check, prior, prior_radius, ..common };
+    let found = py.detach(|| stereo::edge_disparity(&left, &right, &options))?;
+    let count = [found.rows.len()];
+    Ok((
+        arrays::from_frame(py, found.disparity)?,
+        arrays::owned(py, &count, found.rows)?.into_any(),
+        arrays::owned(py, &count, found.columns)?.into_any(),
+        arrays::owned(py, &count, found.values)?.into_any(),
+        arrays::owned(py, &count, found.scores)?.into_any(),
+        found.row_offset,
+    ))
+}
+
+/// The compiled part of `jacoflow.stereo.estimate_row_offset`: rows.
+#[pyfunction(name = "_estimate_row_offset")]
+pub fn estimate_row_offset(
+    left: &Bound<'_, PyAny>,
+    right: &Bound<'_, PyAny>,
+    disparity_range: (i32, i32),
+    row_range: (i32, i32),
+    sigma: f64,
+    threshold: f64,
+    classes: usize,
+    window: usize,
+    min_support: f64,
+    threads: Option<usize>,
+) -> PyResult<f64> {
+    let options =
+        options("sgm", disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
+    let py = left.py();
+    let [left, right] = grey_levels([("left", left), ("right", right)])?;
+    Ok(py.detach(|| stereo::estimate_row_offset(&left, &right, &options))?)
+}
+
+/// The compiled part of `jacoflow.stereo.edge_pixels`: rows and columns (N,).
+#[pyfunction(name = "_edge_pixels")]
+pub fn edge_pixels<'py>(
+    view: &Bound<'py, PyAny>,
+    sigma: f64,
+    threshold: f64,
+    threads: Option<usize>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let py = view.py();
+    let threads = Threads::new(threads)?;
+    let options = EdgeDisparityOptions { sigma, threshold, ..EdgeDisparityOptions::default() };
+    options.check()?;
+    let [view] = grey_levels([("view", view)])?;
+    let settings = EdgeSettings { sigma, threshold, classes: options.classes };
+    let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
+    let count = [map.len()];
+    Ok((arrays::owned(py, &count, map.rows)?.into_any(), arrays::owned(py, &count, map.columns)?.into_any()))
+}

@@ -1,0 +1,44 @@
+//! A view moved by rows, so that both cameras' rows are the same.
+
+use crate::image::{Border, Interpolation};
+use crate::parallel::for_each_band;
+use crate::types::Frame;
+
+/// The view whose row `y` is row `y + offset` of `view`: cubic convolution between rows, the border replicated.
+pub(super) fn rows_moved(view: &Frame<f32>, offset: f64) -> Frame<f32> {
+    let (width, height) = view.size();
+    let whole = offset.floor();
+    let weights = Interpolation::Bicubic.weights(offset - whole).map(|w| w as f32);
+    let mut out = Frame::filled(width, height, 0.0f32);
+    for_each_band(out.data_mut(), width, |_, rows, band| {
+        for (y, out) in rows.zip(band.chunks_exact_mut(width)) {
+            for (j, &weight) in weights.iter().enumerate() {
+                // A row that has no part in the sum must not spoil it with NaN.
+                if weight != 0.0 {
+                    let at = Border::Replicate.index(y as isize + whole as isize + j as isize - 1, height);
+                    for (out, value) in out.iter_mut().zip(view.row(at)) {
+                        *out += weight * value;
+                    }
+                }
+            }
+        }
+    });
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_rows_are_copied_and_slopes_kept_between_them() {
+        let view = Frame::from_fn(5, 20, |x, y| (x + 3 * y) as f32);
+        let moved = rows_moved(&view, 2.0);
+        assert_eq!(moved.row(3), view.row(5));
+        assert_eq!(moved.row(19), view.row(19));
+        let between = rows_moved(&view, -0.25);
+        for y in 3..17 {
+            assert!((between.get(1, y) - (1.0 + 3.0 * (y as f32 - 0.25))).abs() < 1e-4);
+        }
+    }
+}

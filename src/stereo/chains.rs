@@ -1,0 +1,185 @@
+//! Costs summed along chains of edge pixels: the sparse semi-global matching of section 6.2.
+//!
+//! For each of 8 directions r let q be the nearest edge pixel behind p along r, at most 16 px away, g its distance:
+//! `L_r(p, d) = C(p, d) + min{L_r(q, d), L_r(q, d +- 1) + P1 e^{-g/16}, min L_r(q, .) + P2 e^{-g/16}} - min L_r(q, .)`, and `C(p, d)` where there is none.
+//! Two sweeps, one from above and one from below, carry four directions each. Only the last rows of `L_r` are kept: they stay in the processor's caches.
+
+use super::cost::{CHUNK, UNIT};
+use super::edges::EdgeMap;
+use crate::simd::{Kernel, Lanes, Level, dispatch};
+
+/// How far back along a direction an edge pixel is looked for, px.
+const FARTHEST: usize = 16;
+/// Cost of a change by one candidate, and of any larger one, grey levels/px.
+const PENALTIES: [f64; 2] = [1.0, 6.0];
+/// Directions of one sweep: along the row, down the column, and both diagonals.
+const DIRECTIONS: usize = 4;
+/// Stands beside the first and the last candidate: no path comes from there.
+const WALL: u16 = 60000;
+/// No edge pixel yet.
+const NONE: u32 = u32::MAX;
+
+/// From which side a sweep comes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum From {
+    Above,
+    Below,
+}
+
+/// `sum_r L_r` over the four directions of a sweep, as `costs` is laid out, `padded` candidates for each edge pixel.
+pub(super) fn sweep(edges: &EdgeMap, costs: &[u16], padded: usize, from: From) -> Vec<u16> {
+    let mut total = vec![0u16; costs.len()];
+    dispatch(Level::detect(), Sweep { edges, costs, padded, from, total: &mut total });
+    total
+}
+
+struct Sweep<'a> {
+    edges: &'a EdgeMap,
+    costs: &'a [u16],
+    padded: usize,
+    from: From,
+    total: &'a mut [u16],
+}
+
+/// Penalties at every distance, in units of cost.
+fn penalties() -> [[u16; 2]; FARTHEST + 1] {
+    std::array::from_fn(|gap| {
+        PENALTIES.map(|p| (p * f64::from(UNIT) * (-(gap as f64) / FARTHEST as f64).exp()).round() as u16)
+    })
+}
+
+/// Most edge pixels in any `FARTHEST + 1` rows that follow one another, at least 1.
+fn most_in_reach(rows: &[u32]) -> usize {
+    let mut first = 0;
+    let mut most = 1;
+    for (i, &row) in rows.iter().enumerate() {
+        while (row - rows[first]) as usize > FARTHEST {
+            first += 1;
+        }
+        most = most.max(i - first + 1);
+    }
+    most
+}
+
+/// The edge pixels met last, by what they share with one that follows in a direction.
+struct Last {
+    row: u32,
+    column: Vec<u32>,
+    falling: Vec<u32>,
+    rising: Vec<u32>,
+}
+
+impl Last {
+    fn new(width: usize, height: usize) -> Self {
+        let diagonals = vec![NONE; width + height];
+        Self { row: NONE, column: vec![NONE; width], falling: diagonals.clone(), rising: diagonals }
+    }
+
+    /// Those behind a pixel, one a direction; the pixel takes their place.
+    #[inline(always)]
+    fn replace(&mut self, x: usize, y: usize, step: u32) -> [u32; DIRECTIONS] {
+        let (falling, rising) = (x + self.falling.len() - self.column.len() - 1 - y, x + y);
+        let behind = [self.row, self.column[x], self.falling[falling], self.rising[rising]];
+        self.row = step;
+        self.column[x] = step;
+        self.falling[falling] = step;
+        self.rising[rising] = step;
+        behind
+    }
+}
+
+/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions of the level.
+impl Kernel<f32> for Sweep<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f32>>(self) {
+        let Self { edges, costs, padded, from, total } = self;
+        let (width, height) = edges.class.size();
+        let (count, penalties) = (edges.len(), penalties());
+        let kept = most_in_reach(&edges.rows);
+        let block = padded + 2 * CHUNK;
+        let mut paths = vec![WALL; DIRECTIONS * kept * block];
+        let mut least = vec![0u16; DIRECTIONS * kept];
+        let mut last = Last::new(width, height);
+        for step in 0..count {
+            let of = |step: usize| if from == From::Above { step } else { count - 1 - step };
+            let edge = of(step);
+            let (x, y) = (edges.columns[edge] as usize, edges.rows[edge] as usize);
+            let behind = last.replace(x, y, step as u32);
+            let cost = &costs[edge * padded..(edge + 1) * padded];
+            let sum = &mut total[edge * padded..(edge + 1) * padded];
+            for r in 0..DIRECTIONS {
+                let slot = r * kept + step % kept;
+                let mut gap = usize::MAX;
+                if behind[r] != NONE {
+                    let q = of(behind[r] as usize);
+                    let (dx, dy) = (x.abs_diff(edges.columns[q] as usize), y.abs_diff(edges.rows[q] as usize));
+                    // What was met last may be in a row above.
+                    gap = if r == 0 && dy > 0 { usize::MAX } else { dx.max(dy) };
+                }
+                least[slot] = if gap <= FARTHEST {
+                    let q = r * kept + behind[r] as usize % kept;
+                    let ranges = [q * block..(q + 1) * block, slot * block..(slot + 1) * block];
+                    let [before, path] = paths.get_disjoint_mut(ranges).expect("blocks of two pixels");
+                    continue_path(before, least[q], penalties[gap], cost, path, sum)
+                } else {
+                    begin_path(cost, &mut paths[slot * block..(slot + 1) * block], sum)
+                };
+            }
+        }
+    }
+}
+
+/// `L_r = C`; returns the least.
+#[inline(always)]
+fn begin_path(cost: &[u16], path: &mut [u16], sum: &mut [u16]) -> u16 {
+    let mut least = [WALL; CHUNK];
+    for k in (0..cost.len()).step_by(CHUNK) {
+        let (cost, path, sum) = (chunk(cost, k), chunk_mut(path, k + CHUNK), chunk_mut(sum, k));
+        for i in 0..CHUNK {
+            path[i] = cost[i];
+            sum[i] += cost[i];
+            least[i] = least[i].min(cost[i]);
+        }
+    }
+    smallest(&least)
+}
+
+/// `L_r` from that of the pixel behind, whose least value is `least`; returns the least.
+#[inline(always)]
+fn continue_path(before: &[u16], least: u16, [near, far]: [u16; 2], cost: &[u16], path: &mut [u16], sum: &mut [u16]) -> u16 {
+    let jump = least + far;
+    let mut lowest = [WALL; CHUNK];
+    for k in (0..cost.len()).step_by(CHUNK) {
+        let (same, below, above) = (chunk(before, k + CHUNK), chunk(before, k + CHUNK - 1), chunk(before, k + CHUNK + 1));
+        let (cost, path, sum) = (chunk(cost, k), chunk_mut(path, k + CHUNK), chunk_mut(sum, k));
+        for i in 0..CHUNK {
+            let beside = below[i].min(above[i]).saturating_add(near);
+            let value = cost[i] + (same[i].min(beside).min(jump) - least);
+            path[i] = value;
+            sum[i] += value;
+            lowest[i] = lowest[i].min(value);
+        }
+    }
+    smallest(&lowest)
+}
+
+#[inline(always)]
+fn smallest(values: &[u16; CHUNK]) -> u16 {
+    let mut least = values[0];
+    for value in values {
+        least = least.min(*value);
+    }
+    least
+}
+
+#[inline(always)]
+fn chunk(values: &[u16], at: usize) -> &[u16; CHUNK] {
+    values[at..].first_chunk().expect("whole chunks")
+}
+
+#[inline(always)]
+fn chunk_mut(values: &mut [u16], at: usize) -> &mut [u16; CHUNK] {
+    values[at..].first_chunk_mut().expect("whole chunks")
+}

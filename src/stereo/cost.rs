@@ -1,0 +1,171 @@
+//! What it costs to call two pixels one point: section 6.2.
+//!
+//! `C(p, d)` is the mean over 5 x 5 px of `min(|g_x - g_x'| + |g_y - g_y'|, 6)`, gradients with a Gaussian of 1 px. Gradients are kept in sixteenths of a grey level/px, which is
+//! far below their noise, so that 16 candidates are compared at a time and sums are exact whatever their order.
+
+use super::edges::EdgeMap;
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, dispatch};
+use crate::types::Frame;
+use rayon::prelude::*;
+
+/// Candidates compared at a time.
+pub(super) const CHUNK: usize = 16;
+/// Pixels on each side of the middle of the window.
+const RADIUS: usize = 2;
+/// Side of the window, px.
+const SIDE: usize = 2 * RADIUS + 1;
+/// Steps of a gradient in one grey level/px.
+const STEPS: f32 = 16.0;
+/// Difference of two gradients that counts as any larger one, grey levels/px.
+const TRUNCATION: u16 = 6;
+/// Cost of one grey level/px.
+pub(super) const UNIT: u16 = STEPS as u16 * (SIDE * SIDE) as u16;
+/// The highest cost: no pixel of the window is alike.
+pub(super) const HIGHEST: u16 = TRUNCATION * UNIT;
+/// Gradients beyond this are told as this, steps.
+const LARGEST: f32 = 8000.0;
+/// Stands for what is unknown or outside, by the side of the view: further from every gradient, and from the other side's, than the truncation.
+const UNKNOWN: [i16; 2] = [-16000, 16000];
+/// Edge pixels of one task.
+const TASK: usize = 256;
+
+/// Which view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+/// Gradients of a view in steps, with a border wide enough for every candidate.
+pub(super) struct Coded {
+    stride: usize,
+    border: usize,
+    x: Vec<i16>,
+    y: Vec<i16>,
+}
+
+impl Coded {
+    /// Of both slopes of a view, with room for candidates up to `reach` px beside every pixel.
+    pub(super) fn new(along_x: &Frame<f32>, along_y: &Frame<f32>, side: Side, reach: usize) -> Self {
+        let border = reach + RADIUS + CHUNK;
+        let stride = along_x.width() + 2 * border;
+        let unknown = UNKNOWN[side as usize];
+        let code = |slopes: &Frame<f32>| {
+            let mut plane = vec![unknown; stride * (slopes.height() + 2 * RADIUS)];
+            for_each_band(&mut plane, stride, |_, rows, band| {
+                for (row, out) in rows.zip(band.chunks_exact_mut(stride)) {
+                    let Some(y) = row.checked_sub(RADIUS).filter(|y| *y < slopes.height()) else { continue };
+                    for (out, &slope) in out[border..].iter_mut().zip(slopes.row(y)) {
+                        if slope.is_finite() {
+                            *out = (slope * STEPS).clamp(-LARGEST, LARGEST).round_ties_even() as i16;
+                        }
+                    }
+                }
+            });
+            plane
+        };
+        Self { stride, border, x: code(along_x), y: code(along_y) }
+    }
+}
+
+/// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x + first + k` of the other view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Candidates {
+    /// Where the first lies, px from the pixel.
+    pub first: i32,
+    /// How many.
+    pub count: usize,
+}
+
+impl Candidates {
+    /// Their number up to whole chunks.
+    pub(super) fn padded(self) -> usize {
+        self.count.next_multiple_of(CHUNK)
+    }
+
+    /// How far from the pixel they lie at most, px.
+    pub(super) fn reach(self) -> usize {
+        (self.first.unsigned_abs() as usize).max((self.first + self.padded() as i32).unsigned_abs() as usize)
+    }
+
+    /// The candidates of a pixel in column `x` that lie in a view of `width` px; may be empty.
+    pub(super) fn inside(self, x: u32, width: usize) -> std::ops::Range<usize> {
+        let at = i64::from(x) + i64::from(self.first);
+        let first = (-at).max(0);
+        let end = (width as i64 - at).clamp(first, (self.count as i64).max(first));
+        first as usize..end as usize
+    }
+}
+
+/// Costs of all candidates of all edge pixels, `candidates.padded()` for each, in the order of the edges. What `allowed` leaves out costs the most.
+pub(super) fn costs(
+    edges: &EdgeMap,
+    own: &Coded,
+    other: &Coded,
+    candidates: Candidates,
+    allowed: impl Fn(usize) -> std::ops::Range<usize> + Sync,
+) -> Vec<u16> {
+    let padded = candidates.padded();
+    let mut costs = vec![HIGHEST; edges.len() * padded];
+    costs.par_chunks_mut(TASK * padded).enumerate().for_each(|(task, out)| {
+        for (i, out) in out.chunks_exact_mut(padded).enumerate() {
+            let edge = task * TASK + i;
+            let allowed = allowed(edge);
+            if allowed.is_empty() {
+                continue;
+            }
+            let (x, y) = (edges.columns[edge] as usize, edges.rows[edge] as usize);
+            let window = y * own.stride + own.border + x - RADIUS;
+            let others = y * other.stride + other.border + x - RADIUS;
+            let others = (others as isize + candidates.first as isize) as usize;
+            let chunks = allowed.start / CHUNK..allowed.end.div_ceil(CHUNK);
+            dispatch(Level::detect(), OnePixel { own, other, window, others, chunks, out });
+            out[..allowed.start].fill(HIGHEST);
+            out[allowed.end..].fill(HIGHEST);
+        }
+    });
+    costs
+}
+
+/// The costs of one edge pixel.
+struct OnePixel<'a> {
+    own: &'a Coded,
+    other: &'a Coded,
+    /// The first pixel of the window, and of that of the first candidate.
+    window: usize,
+    others: usize,
+    chunks: std::ops::Range<usize>,
+    out: &'a mut [u16],
+}
+
+/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions of the level.
+impl Kernel<f32> for OnePixel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f32>>(self) {
+        let Self { own, other, window, others, chunks, out } = self;
+        for chunk in chunks {
+            let mut sums = [0u16; CHUNK];
+            for j in 0..SIDE {
+                let (at, first) = (window + j * own.stride, others + j * other.stride + chunk * CHUNK);
+                let mine: (&[i16; SIDE], &[i16; SIDE]) = (chunk_of(&own.x[at..]), chunk_of(&own.y[at..]));
+                let theirs: (&[i16; 24], &[i16; 24]) = (chunk_of(&other.x[first..]), chunk_of(&other.y[first..]));
+                for i in 0..SIDE {
+                    for k in 0..CHUNK {
+                        let difference = theirs.0[i + k].abs_diff(mine.0[i]) + theirs.1[i + k].abs_diff(mine.1[i]);
+                        sums[k] += difference.min(TRUNCATION * STEPS as u16);
+                    }
+                }
+            }
+            out[chunk * CHUNK..(chunk + 1) * CHUNK].copy_from_slice(&sums);
+        }
+    }
+}
+
+/// The first `N` values.
+#[inline(always)]
+fn chunk_of<const N: usize>(values: &[i16]) -> &[i16; N] {
+    values.first_chunk().expect("the border is as wide as the candidates reach")
+}

@@ -1,0 +1,116 @@
+//! The one door: two views in, the disparity of the left edge pixels out.
+
+use super::align::rows_moved;
+use super::classes::{match_classes, most_frequent_row};
+use super::edges::{EdgeMap, EdgeSettings};
+use super::options::{EdgeDisparityOptions, Method};
+use super::row_offset::row_offset_of;
+use super::semi_global::{Match, View, match_views};
+use super::subpixel::refine;
+use crate::error::Result;
+use crate::types::Frame;
+
+/// Disparities of the left view's edge pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeDisparity {
+    /// `x_left - x_right` of every left pixel, (H, W), px; NaN where there is none.
+    pub disparity: Frame<f32>,
+    /// Rows of the pixels that have one, in row-major order.
+    pub rows: Vec<u32>,
+    /// Their columns.
+    pub columns: Vec<u32>,
+    /// Their disparities, px.
+    pub values: Vec<f32>,
+    /// How well both views agree there, 0 to 1: share of the window's classed pixels whose class agrees, or 1 less the matching cost over its truncation.
+    pub scores: Vec<f32>,
+    /// How many rows lower the right view shows a point: the one given, the estimate, or the most frequent one of the class matching (0 without matches).
+    pub row_offset: f64,
+}
+
+impl EdgeDisparity {
+    /// From the disparity and score of every edge pixel that has one.
+    fn new(edges: &EdgeMap, found: impl Iterator<Item = Option<(f32, f32)>>, row_offset: f64) -> Self {
+        let (width, height) = edges.class.size();
+        let disparity = Frame::filled(width, height, f32::NAN);
+        let (rows, columns, values, scores) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { disparity, rows, columns, values, scores, row_offset };
+        for ((&row, &column), found) in edges.rows.iter().zip(&edges.columns).zip(found) {
+            if let Some((disparity, score)) = found {
+                all.disparity.row_mut(row as usize)[column as usize] = disparity;
+                all.rows.push(row);
+                all.columns.push(column);
+                all.values.push(disparity);
+                all.scores.push(score);
+            }
+        }
+        all
+    }
+}
+
+/// Disparity `d = x_left - x_right` of the edge pixels of the left view, in px, with `(x, y)` on the left at `(x - d, y + e)` on the right, `e` the row offset.
+///
+/// Views are (H, W) in 8-bit grey levels, which the thresholds are in. Samples that are not finite leave no edge where the gradient's kernel reaches them. A view without edges
+/// gives an empty result. Source: the stereo paper, (1) to (5), and [`Method::SemiGlobal`]. Bit-identical for any number of threads.
+///
+/// # Errors
+/// [`Error::Argument`](crate::Error::Argument) for an option out of range, views (or a prior) of different size, or views smaller than 17 px.
+pub fn edge_disparity(
+    left: &Frame<f32>,
+    right: &Frame<f32>,
+    options: &EdgeDisparityOptions,
+) -> Result<EdgeDisparity> {
+    options.check_views(left, right)?;
+    Ok(options.threads.install(|| match options.method {
+        Method::Classes => by_classes(left, right, options),
+        Method::SemiGlobal => by_semi_global(left, right, options),
+    }))
+}
+
+/// Class matching with the rows that the options ask for.
+fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+    let settings = EdgeSettings::of(options);
+    let (edges, right) = (EdgeMap::new(left, &settings), EdgeMap::new(right, &settings));
+    let rows = options.row_offset.map_or(options.row_range, |e| (e.round() as i32, e.round() as i32));
+    let matches = match_classes(&edges, &right, options, rows, 1);
+    let row_offset = options.row_offset.unwrap_or_else(|| f64::from(most_frequent_row(&matches, rows)));
+    EdgeDisparity::new(&edges, matches.iter().map(|m| m.map(|m| (m.disparity as f32, m.support))), row_offset)
+}
+
+/// Semi-global matching after the rows are aligned.
+fn by_semi_global(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+    let settings = EdgeSettings::of(options);
+    let view = View::new(left, &settings);
+    let row_offset = options.row_offset.unwrap_or_else(|| row_offset_of(left, &view, right, options));
+    let matches = match_aligned(left, &view, right, row_offset, options);
+    EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), row_offset)
+}
+
+/// Matches of the left edge pixels with the right view moved up by `row_offset`.
+pub(super) fn match_aligned(
+    left: &Frame<f32>,
+    view: &View,
+    right: &Frame<f32>,
+    row_offset: f64,
+    options: &EdgeDisparityOptions,
+) -> Vec<Option<Match>> {
+    let aligned = rows_moved(right, row_offset);
+    let mut matches = match_views(view, &View::new(&aligned, &EdgeSettings::of(options)), options);
+    // A row that the right view does not have was replicated from its border.
+    let last = left.height() as f64 - 1.0;
+    for (found, &row) in matches.iter_mut().zip(&view.edges.rows) {
+        if !(0.0..=last).contains(&(f64::from(row) + row_offset)) {
+            *found = None;
+        }
+    }
+    if options.subpixel {
+        refine(left, view, &aligned, &mut matches);
+    }
+    matches
+}
+
+impl EdgeSettings {
+    /// Those of a matcher.
+    pub(super) fn of(options: &EdgeDisparityOptions) -> Self {
+        Self { sigma: options.sigma, threshold: options.threshold, classes: options.classes }
+    }
+}

@@ -1,0 +1,220 @@
+//! How disparity is looked for.
+
+use crate::error::{Error, Result};
+use crate::parallel::Threads;
+use crate::types::Frame;
+
+/// Smallest side of a view, px: the window of the gradient.
+pub const LEAST_VIEW: usize = 17;
+/// Widest window of the class matching, px: its rows are compared 32 pixels at a time.
+const WIDEST_WINDOW: usize = 31;
+/// Most disparities, and most rows, that can be searched.
+const MOST_CANDIDATES: i64 = 1024;
+
+/// What says that two edge pixels are one point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Agreement of the classes of gradient direction in a window, section 3 of the stereo paper: whole disparities, each with a row offset of its own.
+    Classes,
+    /// Gradients compared and smoothed along chains of edge pixels from eight sides, checked from the right view, refined to fractions of a pixel. The default.
+    #[default]
+    SemiGlobal,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 2] = [Self::Classes, Self::SemiGlobal];
+
+    /// The word used in Python and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Classes => "classes",
+            Self::SemiGlobal => "sgm",
+        }
+    }
+
+    /// The method of this name.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `method` for another word.
+    pub fn parse(name: &str) -> Result<Self> {
+        let known = Self::ALL.into_iter().find(|method| method.name() == name);
+        known.ok_or_else(|| Error::argument("method", "\"classes\" or \"sgm\"", format!("{name:?}")))
+    }
+}
+
+/// Options of [`edge_disparity`](super::edge_disparity) and [`estimate_row_offset`](super::estimate_row_offset). Grey levels are those of 8 bit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeDisparityOptions {
+    /// How views are matched; default [`Method::SemiGlobal`].
+    pub method: Method,
+    /// Least and greatest disparity `x_left - x_right`, px, both included; default -40 to 24.
+    pub disparity_range: (i32, i32),
+    /// Least and greatest row offset `y_right - y_left`, rows, both included, that are searched where `row_offset` is not given; default -4 to 4.
+    pub row_range: (i32, i32),
+    /// How many rows lower the right view shows a point. `None` (default): searched at every pixel by [`Method::Classes`], estimated beforehand for
+    /// [`Method::SemiGlobal`]. The class matching rounds it to whole rows.
+    pub row_offset: Option<f64>,
+    /// Fractions of a pixel ([`Method::SemiGlobal`] only; classes give whole px); default true.
+    pub subpixel: bool,
+    /// Keep only what matching from the right view confirms ([`Method::SemiGlobal`] only); default true.
+    pub check: bool,
+    /// Expected disparity of every left pixel, px; NaN: nothing is expected. Default: nothing anywhere.
+    pub prior: Option<Frame<f32>>,
+    /// How far from the expected one disparity is looked for, px; default 3.
+    pub prior_radius: u32,
+    /// Standard deviation of the Gaussian behind gradients and edges, px; default 2, cut off at four times that.
+    pub sigma: f64,
+    /// Least magnitude of the gradient that has a direction, grey levels/px; default 2.
+    pub threshold: f64,
+    /// Signed classes of gradient direction over the whole turn; default 12, of 30 degrees each.
+    pub classes: usize,
+    /// Side of the window of the class matching, px, odd; default 17.
+    pub window: usize,
+    /// Least share of the window's classed pixels that agree; default 0.3.
+    pub min_support: f64,
+    /// Threads; the result is the same for any number.
+    pub threads: Threads,
+}
+
+impl Default for EdgeDisparityOptions {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            disparity_range: (-40, 24),
+            row_range: (-4, 4),
+            row_offset: None,
+            subpixel: true,
+            check: true,
+            prior: None,
+            prior_radius: 3,
+            sigma: 2.0,
+            threshold: 2.0,
+            classes: 12,
+            window: 17,
+            min_support: 0.3,
+            threads: Threads::default(),
+        }
+    }
+}
+
+/// A range of candidates: least first, and not too many.
+fn check_range(name: &'static str, (least, greatest): (i32, i32)) -> Result<()> {
+    let count = i64::from(greatest) - i64::from(least) + 1;
+    let far = i64::from(least).abs().max(i64::from(greatest).abs());
+    if (1..=MOST_CANDIDATES).contains(&count) && far <= 1 << 15 {
+        return Ok(());
+    }
+    let expected = format!("least and greatest px, at most {MOST_CANDIDATES} values within 32768 px of 0");
+    Err(Error::argument(name, expected, format!("({least}, {greatest})")))
+}
+
+impl EdgeDisparityOptions {
+    /// Checks every option by itself.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        check_range("disparity_range", self.disparity_range)?;
+        check_range("row_range", self.row_range)?;
+        if let Some(rows) = self.row_offset.filter(|rows| !(rows.abs() <= 32768.0)) {
+            return Err(Error::argument("row_offset", "rows, finite and within 32768 of 0", rows));
+        }
+        if !(0.5..=16.0).contains(&self.sigma) {
+            return Err(Error::argument("sigma", "0.5 to 16 px", self.sigma));
+        }
+        if !(self.threshold > 0.0 && self.threshold.is_finite()) {
+            return Err(Error::argument("threshold", "grey levels/px, above 0 and finite", self.threshold));
+        }
+        if !(2..=64).contains(&self.classes) {
+            return Err(Error::argument("classes", "2 to 64 directions", self.classes));
+        }
+        if !(3..=WIDEST_WINDOW).contains(&self.window) || self.window.is_multiple_of(2) {
+            return Err(Error::argument("window", format!("an odd number, 3 to {WIDEST_WINDOW} px"), self.window));
+        }
+        if !(0.0..=1.0).contains(&self.min_support) {
+            return Err(Error::argument("min_support", "a share, 0 to 1", self.min_support));
+        }
+        self.threads.check().map(|_| ())
+    }
+
+    /// Checks the options and that both views, and the prior, fit one another.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option or, with both shapes, `right`.
+    pub(super) fn check_views(&self, left: &Frame<f32>, right: &Frame<f32>) -> Result<()> {
+        self.check()?;
+        let shape = |frame: &Frame<f32>| format!("({}, {})", frame.height(), frame.width());
+        let got = || format!("left {} and right {}", shape(left), shape(right));
+        if left.size() != right.size() {
+            return Err(Error::argument("right", "two views (H, W) of one size", got()));
+        }
+        if left.width().min(left.height()) < LEAST_VIEW {
+            return Err(Error::argument("right", format!("views of at least {LEAST_VIEW} x {LEAST_VIEW} px"), got()));
+        }
+        match &self.prior {
+            Some(prior) if prior.size() != left.size() => {
+                let expected = format!("the views' shape {}", shape(left));
+                Err(Error::argument("prior", expected, format!("shape {}", shape(prior))))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Disparities that are to be looked for at a pixel, px, both included; none where what is expected lies outside the range.
+    pub(super) fn candidates(&self, x: usize, y: usize) -> Option<(i32, i32)> {
+        let (least, greatest) = self.disparity_range;
+        let expected = self.prior.as_ref().map_or(f32::NAN, |prior| prior.get(x, y));
+        if !expected.is_finite() {
+            return Some((least, greatest));
+        }
+        let (near, reach) = (f64::from(expected), f64::from(self.prior_radius));
+        let low = (near - reach).ceil().max(f64::from(least)) as i32;
+        let high = (near + reach).floor().min(f64::from(greatest)) as i32;
+        (low <= high).then_some((low, high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_options_are_named() {
+        let default = EdgeDisparityOptions::default;
+        let wrong = [
+            ("disparity_range", EdgeDisparityOptions { disparity_range: (5, 4), ..default() }),
+            ("row_range", EdgeDisparityOptions { row_range: (-1000, 1000), ..default() }),
+            ("row_offset", EdgeDisparityOptions { row_offset: Some(f64::NAN), ..default() }),
+            ("sigma", EdgeDisparityOptions { sigma: f64::NAN, ..default() }),
+            ("threshold", EdgeDisparityOptions { threshold: 0.0, ..default() }),
+            ("classes", EdgeDisparityOptions { classes: 1, ..default() }),
+            ("window", EdgeDisparityOptions { window: 16, ..default() }),
+            ("min_support", EdgeDisparityOptions { min_support: 1.5, ..default() }),
+        ];
+        for (name, options) in wrong {
+            let message = options.check().unwrap_err().to_string();
+            assert!(message.starts_with(&format!("{name}: ")), "{message}");
+        }
+        default().check().unwrap();
+    }
+
+    #[test]
+    fn views_that_do_not_fit_are_told_with_both_shapes() {
+        let view = |width, height| Frame::filled(width, height, 0.0f32);
+        let options = EdgeDisparityOptions::default();
+        let message = options.check_views(&view(20, 30), &view(21, 30)).unwrap_err().to_string();
+        assert!(message.contains("(30, 20)") && message.contains("(30, 21)"), "{message}");
+        assert!(options.check_views(&view(16, 30), &view(16, 30)).is_err());
+        let with_prior = EdgeDisparityOptions { prior: Some(view(3, 3)), ..options };
+        assert!(with_prior.check_views(&view(20, 30), &view(20, 30)).unwrap_err().to_string().starts_with("prior"));
+    }
+
+    #[test]
+    fn the_prior_narrows_the_search() {
+        let prior = Frame::new(4, 1, vec![f32::NAN, 2.4, 23.0, 40.0]).unwrap();
+        let options = EdgeDisparityOptions { prior: Some(prior), ..EdgeDisparityOptions::default() };
+        let at = |x| options.candidates(x, 0);
+        assert_eq!([at(0), at(1), at(2), at(3)], [Some((-40, 24)), Some((0, 5)), Some((20, 24)), None]);
+    }
+}

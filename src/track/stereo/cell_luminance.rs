@@ -1,0 +1,161 @@
+//! Luminance reduced to the cells of the grid, and templates compared in it: equation (29) of the stereo paper.
+
+use super::voxels::Lattice;
+use crate::types::Frame;
+
+/// Level of a cell without a finite pixel.
+const NONE: i32 = -1;
+
+/// Mean luminance of each cell in whole levels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellLuminance {
+    columns: i32,
+    rows: i32,
+    levels: Vec<i32>,
+}
+
+/// The best shift of a template.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Match {
+    /// Shift `(dx, dy)`, cells.
+    pub shift: [i32; 2],
+    /// Mean absolute difference there, levels.
+    pub difference: f64,
+}
+
+/// Where a template is looked for: shifts up to `reach` cells about `centre` along x and y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Window {
+    pub centre: [i32; 2],
+    pub reach: i32,
+}
+
+impl CellLuminance {
+    /// Averages grey levels (0 to 255) over cells: `floor(Y levels / 256)`. Pixels that are not finite are left out.
+    pub fn new(frame: &Frame<f32>, lattice: &Lattice, levels: usize) -> Self {
+        let (columns, rows) = (lattice.grid.columns, lattice.grid.rows);
+        let (cell_columns, cell_rows) = (lattice.cell_columns(), lattice.cell_rows());
+        let (mut sums, mut counts) = (vec![0.0f64; columns * rows], vec![0u32; columns * rows]);
+        for y in 0..frame.height() {
+            let first = usize::from(cell_rows[y]) * columns;
+            for (&value, &column) in frame.row(y).iter().zip(&cell_columns) {
+                if value.is_finite() {
+                    sums[first + usize::from(column)] += f64::from(value);
+                    counts[first + usize::from(column)] += 1;
+                }
+            }
+        }
+        let scale = levels as f64 / 256.0;
+        let level = |(sum, count): (f64, u32)| match count {
+            0 => NONE,
+            _ => (sum / f64::from(count) * scale).floor().clamp(0.0, levels as f64 - 1.0) as i32,
+        };
+        let levels = sums.into_iter().zip(counts).map(level).collect();
+        Self { columns: columns as i32, rows: rows as i32, levels }
+    }
+
+    /// Level at a cell, where it is in the picture and has one.
+    fn level(&self, x: i32, y: i32) -> Option<i32> {
+        let inside = (0..self.columns).contains(&x) && (0..self.rows).contains(&y);
+        if !inside {
+            return None;
+        }
+        Some(self.levels[(y * self.columns + x) as usize]).filter(|&level| level != NONE)
+    }
+
+    /// Moves the template, cells of `self`, over `next`: the shift with the least mean absolute difference over what stays in the picture, at least half of it (29).
+    /// The shorter one of equals; `None` where no shift keeps half.
+    pub fn find(&self, template: &[[u16; 2]], next: &Self, window: Window) -> Option<Match> {
+        let cells: Vec<(i32, i32, i32)> = template
+            .iter()
+            .filter_map(|&[x, y]| self.level(i32::from(x), i32::from(y)).map(|level| (i32::from(x), i32::from(y), level)))
+            .collect();
+        let mut best: Option<Match> = None;
+        let length = |[x, y]: [i32; 2]| x * x + y * y;
+        for dy in window.centre[1] - window.reach..=window.centre[1] + window.reach {
+            for dx in window.centre[0] - window.reach..=window.centre[0] + window.reach {
+                let (mut sum, mut count) = (0, 0);
+                for &(x, y, level) in &cells {
+                    if let Some(other) = next.level(x + dx, y + dy) {
+                        sum += (level - other).abs();
+                        count += 1;
+                    }
+                }
+                if count == 0 || 2 * count < template.len() {
+                    continue;
+                }
+                let (shift, difference) = ([dx, dy], f64::from(sum) / count as f64);
+                let better = best.is_none_or(|best| {
+                    difference < best.difference || difference == best.difference && length(shift) < length(best.shift)
+                });
+                if better {
+                    best = Some(Match { shift, difference });
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::options::VoxelGrid;
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    fn lattice() -> Lattice {
+        Lattice { grid: VoxelGrid { columns: 20, rows: 15, layers: 4, first_disparity: 0 }, size: (160, 120) }
+    }
+
+    /// Blocks of random grey as large as cells, moved by whole cells.
+    fn picture(dx: i32, dy: i32) -> CellLuminance {
+        let rng = CounterRng::new(5);
+        let value = |x: usize, y: usize| {
+            let (x, y) = (x as i32 / 8 - dx + 64, y as i32 / 8 - dy + 64);
+            (255.0 * rng.uniform((y * 200 + x) as u64)) as f32
+        };
+        CellLuminance::new(&Frame::from_fn(160, 120, value), &lattice(), 64)
+    }
+
+    const ALL: Window = Window { centre: [0, 0], reach: 8 };
+
+    #[test]
+    fn a_moved_picture_is_found_again() {
+        let template: Vec<_> = (5..9).flat_map(|y| (6..11).map(move |x| [x, y])).collect();
+        for (dx, dy) in [(0, 0), (3, -2), (-6, 5)] {
+            let found = picture(0, 0).find(&template, &picture(dx, dy), ALL).unwrap();
+            assert_eq!(found, Match { shift: [dx, dy], difference: 0.0 });
+        }
+        let near = Window { centre: [2, -2], reach: 2 };
+        assert_eq!(picture(0, 0).find(&template, &picture(3, -2), near).unwrap().shift, [3, -2]);
+    }
+
+    #[test]
+    fn of_equal_shifts_the_shortest_is_taken() {
+        let flat = CellLuminance::new(&Frame::filled(160, 120, 90.0), &lattice(), 64);
+        assert_eq!(flat.find(&[[10, 7]], &flat, ALL).unwrap(), Match { shift: [0, 0], difference: 0.0 });
+    }
+
+    #[test]
+    fn half_of_the_template_must_stay_in_the_picture() {
+        let template: Vec<_> = (0..4).map(|x| [x, 7]).collect();
+        let left = Window { centre: [-3, 0], reach: 0 };
+        assert_eq!(picture(0, 0).find(&template, &picture(0, 0), left), None);
+        let two = Window { centre: [-2, 0], reach: 0 };
+        assert!(picture(0, 0).find(&template, &picture(0, 0), two).is_some());
+    }
+
+    #[test]
+    fn levels_are_means_cut_down() {
+        let mut frame = Frame::filled(160, 120, 7.9f32);
+        frame.row_mut(0)[0] = f32::NAN;
+        frame.row_mut(0)[8..16].fill(255.0);
+        for y in 112..120 {
+            frame.row_mut(y)[..8].fill(f32::NAN);
+        }
+        let cells = CellLuminance::new(&frame, &lattice(), 64);
+        // (255 + 7 x 7.9) / 8 = 38.79, a quarter of it 9.7.
+        assert_eq!((cells.level(0, 0), cells.level(1, 0)), (Some(1), Some(9)));
+        assert_eq!((cells.level(0, 14), cells.level(-1, 0), cells.level(20, 0)), (None, None, None));
+    }
+}

@@ -1,0 +1,97 @@
+//! Voxels and edge pixels by the component that they belong to.
+
+use super::voxels::{EdgePoints, Lattice, Voxels};
+
+/// Label of a place that no cluster is at.
+const NOBODY: u16 = u16::MAX;
+
+/// The clusters of a step; those of the components that nothing belongs to are empty.
+#[derive(Debug, Clone)]
+pub(super) struct Clusters {
+    pub voxels: Voxels,
+    pub points: EdgePoints,
+    /// Voxels of each cluster.
+    pub members: Vec<Vec<u32>>,
+    /// Edge pixels of each cluster.
+    pub pixels: Vec<Vec<u32>>,
+    /// Cluster of each edge pixel.
+    pub of_point: Vec<u32>,
+    /// Cluster of each voxel of the dense grid.
+    dense: Vec<u16>,
+}
+
+impl Clusters {
+    /// From the component of each voxel, `components` of them in all.
+    pub fn new(points: EdgePoints, voxels: Voxels, labels: &[u32], components: usize) -> Self {
+        let mut dense = vec![NOBODY; voxels.lattice.volume()];
+        let mut members = vec![vec![]; components];
+        for (n, (&cell, &label)) in voxels.cells.iter().zip(labels).enumerate() {
+            dense[voxels.lattice.index(cell)] = label as u16;
+            members[label as usize].push(n as u32);
+        }
+        let of_point: Vec<u32> = voxels.of_point.iter().map(|&n| labels[n as usize]).collect();
+        let mut pixels = vec![vec![]; components];
+        for (i, &label) in of_point.iter().enumerate() {
+            pixels[label as usize].push(i as u32);
+        }
+        Self { voxels, points, members, pixels, of_point, dense }
+    }
+
+    /// The grid.
+    pub fn lattice(&self) -> &Lattice {
+        &self.voxels.lattice
+    }
+
+    /// Number of components, empty ones too.
+    pub fn components(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Cluster that a voxel belongs to.
+    pub fn at(&self, voxel: [u16; 3]) -> Option<usize> {
+        Some(self.dense[self.lattice().index(voxel)]).filter(|&label| label != NOBODY).map(usize::from)
+    }
+
+    /// Voxels of a cluster.
+    pub fn cells(&self, cluster: usize) -> impl Iterator<Item = [u16; 3]> + '_ {
+        self.members[cluster].iter().map(|&n| self.voxels.cells[n as usize])
+    }
+
+    /// Distinct `(ix, iy)` of a cluster: its template.
+    pub fn template(&self, cluster: usize) -> Vec<[u16; 2]> {
+        let mut cells: Vec<_> = self.cells(cluster).map(|[x, y, _]| [y, x]).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells.into_iter().map(|[y, x]| [x, y]).collect()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::voxels::tests::lattice;
+    use super::*;
+
+    /// One edge pixel in each given voxel of the default grid, with its cluster.
+    pub fn made_up(cells: &[([u16; 3], u32)], components: usize) -> Clusters {
+        let points = EdgePoints {
+            columns: cells.iter().map(|(cell, _)| 8 * u32::from(cell[0]) + 4).collect(),
+            rows: cells.iter().map(|(cell, _)| 8 * u32::from(cell[1]) + 4).collect(),
+            disparities: cells.iter().map(|(cell, _)| f32::from(cell[2]) - 40.0).collect(),
+        };
+        let voxels = Voxels::count(&points, lattice());
+        let mut labels = vec![0; voxels.cells.len()];
+        for (i, (_, label)) in cells.iter().enumerate() {
+            labels[voxels.of_point[i] as usize] = *label;
+        }
+        Clusters::new(points, voxels, &labels, components)
+    }
+
+    #[test]
+    fn voxels_and_pixels_know_their_cluster() {
+        let clusters = made_up(&[([1, 2, 3], 0), ([1, 2, 9], 2), ([1, 2, 9], 2), ([4, 2, 9], 2), ([4, 2, 8], 2)], 4);
+        assert_eq!((clusters.at([1, 2, 3]), clusters.at([1, 2, 9]), clusters.at([0, 0, 0])), (Some(0), Some(2), None));
+        assert_eq!(clusters.of_point, [0, 2, 2, 2, 2]);
+        assert_eq!((clusters.members[2].len(), clusters.pixels[2].len(), clusters.pixels[1].len()), (3, 4, 0));
+        assert_eq!(clusters.template(2), [[1, 2], [4, 2]]);
+    }
+}

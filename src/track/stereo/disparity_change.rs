@@ -1,0 +1,74 @@
+//! Motion in depth at edge pixels: the disparity at the moved pixels less that at the pixels themselves.
+
+use crate::types::Frame;
+
+/// Farthest that an edge pixel of the next step is from where a pixel went, px.
+const REACH: f64 = 1.0;
+/// Least deviation, disparity.
+const LEAST_DEVIATION: f64 = 0.03;
+/// Mean absolute deviation from the median, to the deviation of a normal distribution.
+const MAD: f64 = 1.4826;
+/// Rounds of weighting.
+const ROUNDS: usize = 5;
+
+/// The disparity of the pixel of `map` nearest to `(x, y)`, at most one pixel away.
+pub(super) fn nearest(map: &Frame<f32>, x: f64, y: f64) -> Option<f64> {
+    let (width, height) = (map.width() as i64, map.height() as i64);
+    let (column, row) = (x.round() as i64, y.round() as i64);
+    let mut best: Option<(f64, f64)> = None;
+    for j in (row - 1).max(0)..=(row + 1).min(height - 1) {
+        for i in (column - 1).max(0)..=(column + 1).min(width - 1) {
+            let value = map.get(i as usize, j as usize);
+            let distance = (i as f64 - x).powi(2) + (j as f64 - y).powi(2);
+            if value.is_finite() && distance <= REACH * REACH && best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, f64::from(value)));
+            }
+        }
+    }
+    best.map(|(_, value)| value)
+}
+
+/// Mean of numbers among outliers: from the median, weights `1 / (1 + (e / 2 s)^2)^2`. `None` of fewer than three.
+pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
+    if values.len() < 3 {
+        return None;
+    }
+    let middle = values.len() / 2;
+    let mut mean = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let mut sizes: Vec<f64> = values.iter().map(|value| (value - mean).abs()).collect();
+    let deviation = (MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_DEVIATION);
+    for _ in 0..ROUNDS {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for value in &*values {
+            let outlying = 1.0 + ((value - mean) / (2.0 * deviation)).powi(2);
+            let weight = 1.0 / (outlying * outlying);
+            sum += weight * value;
+            weights += weight;
+        }
+        mean = sum / weights;
+    }
+    mean.is_finite().then_some(mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_within_a_pixel_counts() {
+        let mut map = Frame::filled(5, 5, f32::NAN);
+        map.row_mut(2)[2] = 7.0;
+        map.row_mut(2)[3] = 9.0;
+        assert_eq!((nearest(&map, 2.4, 2.0), nearest(&map, 2.6, 2.1)), (Some(7.0), Some(9.0)));
+        assert_eq!((nearest(&map, 1.2, 2.0), nearest(&map, 0.9, 2.0)), (Some(7.0), None));
+        assert_eq!((nearest(&map, -7.0, 2.0), nearest(&map, 2.0, 99.0)), (None, None));
+    }
+
+    #[test]
+    fn outliers_hardly_move_the_mean() {
+        let mut values: Vec<f64> = (0..60).map(|i| 0.4 + 0.1 * f64::from(i).sin()).chain([9.0; 20]).collect();
+        assert!((robust_mean(&mut values).unwrap() - 0.4).abs() < 0.03);
+        assert_eq!(robust_mean(&mut [1.0, 2.0]), None);
+        assert!((robust_mean(&mut [0.25; 5]).unwrap() - 0.25).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,265 @@
+//! The graph of clusters over time: nodes (step, cluster), arcs scored by equation (33) of the stereo paper.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A cluster of one step. Lengths in px, times in steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node {
+    /// Step, from 0.
+    pub time: usize,
+    /// Component.
+    pub index: usize,
+    /// Track that it is part of.
+    pub track_id: u64,
+    /// Group of clusters that move as one.
+    pub group: u64,
+    /// Edge pixels.
+    pub n_pixels: usize,
+    /// Weight of the component, 0 to 1.
+    pub weight: f64,
+    /// Mean `(x, y, d)`: px, px, disparity.
+    pub mean: [f64; 3],
+    /// Covariance of `(x, y, d)`, px^2.
+    pub covariance: [[f64; 3]; 3],
+    /// Motion `(u, v, w)` since the last step, px/step and disparity/step; none where it was not measured.
+    pub velocity: Option<[f64; 3]>,
+    /// Motion `(u, v, w)` to the next step, as soon as that is known.
+    pub next_velocity: Option<[f64; 3]>,
+    /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle of the pixels (medians along x and y).
+    pub affine: Option<[f64; 6]>,
+    /// Truncated mean absolute difference of brightness that this motion leaves, grey levels.
+    pub residual: Option<f64>,
+    /// Whether the motion is an extrapolation.
+    pub coasting: bool,
+    /// Depth, in units of the baseline, where the cameras are known.
+    pub depth: Option<f64>,
+    /// Velocity `(X, Y, Z)` since the last step in units of the baseline, where the cameras are known.
+    pub metric_velocity: Option<[f64; 3]>,
+}
+
+/// An arc between clusters of successive steps.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Arc {
+    /// Step of the earlier cluster.
+    pub time: usize,
+    /// Component at that step.
+    pub from: usize,
+    /// Component at the next one.
+    pub to: usize,
+    /// `e(k -> k')`, 0 to 1: share of the earlier one's voxels that meet the later one.
+    pub forward: f64,
+    /// `e(k <- k')`, 0 to 1: share of the later one's voxels that meet the earlier one.
+    pub backward: f64,
+}
+
+impl Arc {
+    /// `e(k, k')` of (33), 0 to 2.
+    pub fn score(&self) -> f64 {
+        self.forward + self.backward
+    }
+}
+
+/// Clusters of all steps and how they are connected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TrackGraph {
+    nodes: BTreeMap<(usize, usize), Node>,
+    /// Arcs by (time, from, to).
+    arcs: BTreeMap<(usize, usize, usize), Arc>,
+}
+
+/// A graph as it is written.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    format: String,
+    nodes: Vec<Node>,
+    arcs: Vec<Arc>,
+}
+
+/// What a written graph calls itself.
+const FORMAT: &str = "jacoflow track graph 1";
+
+impl TrackGraph {
+    /// Puts a node in, in place of one with the same time and index.
+    pub fn insert(&mut self, node: Node) {
+        self.nodes.insert((node.time, node.index), node);
+    }
+
+    /// Puts an arc in between nodes that are there.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `arc` where one of its nodes is missing or a share is not between 0 and 1.
+    pub fn connect(&mut self, arc: Arc) -> Result<()> {
+        for node in [(arc.time, arc.from), (arc.time + 1, arc.to)] {
+            if !self.nodes.contains_key(&node) {
+                return Err(Error::argument("arc", "two clusters of the graph", format!("no cluster {node:?}")));
+            }
+        }
+        if [arc.forward, arc.backward].iter().any(|share| !(0.0..=1.0).contains(share)) {
+            let got = format!("{} and {}", arc.forward, arc.backward);
+            return Err(Error::argument("arc", "shares of 0 to 1", got));
+        }
+        self.arcs.insert((arc.time, arc.from, arc.to), arc);
+        Ok(())
+    }
+
+    /// All nodes, by time and index.
+    pub fn nodes(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.values()
+    }
+
+    /// All arcs, by time and indices.
+    pub fn arcs(&self) -> impl Iterator<Item = &Arc> {
+        self.arcs.values()
+    }
+
+    /// The cluster `index` of a step.
+    pub fn node(&self, time: usize, index: usize) -> Option<&Node> {
+        self.nodes.get(&(time, index))
+    }
+
+    /// The same, to be changed.
+    pub(super) fn node_mut(&mut self, time: usize, index: usize) -> Option<&mut Node> {
+        self.nodes.get_mut(&(time, index))
+    }
+
+    /// Arcs that leave a cluster.
+    pub fn leaving(&self, time: usize, index: usize) -> impl Iterator<Item = &Arc> {
+        self.arcs.range((time, index, 0)..=(time, index, usize::MAX)).map(|(_, arc)| arc)
+    }
+
+    /// Arcs that enter a cluster.
+    pub fn entering(&self, time: usize, index: usize) -> impl Iterator<Item = &Arc> {
+        let before = time.checked_sub(1);
+        let arcs = before.map(|time| self.arcs.range((time, 0, 0)..=(time, usize::MAX, usize::MAX)));
+        arcs.into_iter().flatten().map(|(_, arc)| arc).filter(move |arc| arc.to == index)
+    }
+
+    /// A track: the clusters `(time, index)` reached from one along arcs whose score is at least `threshold`, forwards in time or backwards; itself among them.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `node` where there is no such cluster, `threshold` for one that is not a number.
+    pub fn follow(&self, time: usize, index: usize, threshold: f64, backward: bool) -> Result<Vec<(usize, usize)>> {
+        if threshold.is_nan() {
+            return Err(Error::argument("threshold", "a score, 0 to 2", threshold));
+        }
+        if self.node(time, index).is_none() {
+            return Err(Error::argument("node", "a cluster of the graph", format!("({time}, {index})")));
+        }
+        let mut reached = BTreeSet::from([(time, index)]);
+        let mut front = vec![(time, index)];
+        while let Some((time, index)) = front.pop() {
+            let mut visit = |arc: &Arc, next: (usize, usize)| {
+                if arc.score() >= threshold && reached.insert(next) {
+                    front.push(next);
+                }
+            };
+            if backward {
+                self.entering(time, index).for_each(|arc| visit(arc, (arc.time, arc.from)));
+            } else {
+                self.leaving(time, index).for_each(|arc| visit(arc, (arc.time + 1, arc.to)));
+            }
+        }
+        Ok(reached.into_iter().collect())
+    }
+
+    /// As JSON text; what was not measured is `null`.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] where it cannot be written.
+    pub fn to_json(&self) -> Result<String> {
+        let written = Written {
+            format: FORMAT.into(),
+            nodes: self.nodes().cloned().collect(),
+            arcs: self.arcs().copied().collect(),
+        };
+        serde_json::to_string(&written).map_err(|error| Error::Numerical(format!("track graph: {error}")))
+    }
+
+    /// From [`TrackGraph::to_json`], number for number.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `json` for text that is no graph, `arc` for arcs between clusters that are missing.
+    pub fn from_json(json: &str) -> Result<Self> {
+        let refuse = |got: String| Error::argument("json", "a graph as to_json writes it", got);
+        let written: Written = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;
+        if written.format != FORMAT {
+            return Err(refuse(format!("format {:?}", written.format)));
+        }
+        let mut graph = Self::default();
+        written.nodes.into_iter().for_each(|node| graph.insert(node));
+        for arc in written.arcs {
+            graph.connect(arc)?;
+        }
+        Ok(graph)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node(time: usize, index: usize) -> Node {
+        Node {
+            time,
+            index,
+            track_id: 7,
+            group: 7,
+            n_pixels: 100,
+            weight: 0.1 + 0.2,
+            mean: [1.0 / 3.0, 2.0, -3.5],
+            covariance: [[1.0, 0.0, 0.1], [0.0, 1.0, 0.0], [0.1, 0.0, 1.0]],
+            velocity: None,
+            next_velocity: Some([0.1, -0.2, 0.3]),
+            affine: None,
+            residual: Some(1e-300),
+            coasting: false,
+            depth: None,
+            metric_velocity: None,
+        }
+    }
+
+    /// 0 - 1 - 2 by strong arcs, and a weak one to another cluster from which a strong one goes on.
+    fn graph() -> TrackGraph {
+        let mut graph = TrackGraph::default();
+        for (time, index) in [(0, 0), (1, 1), (1, 2), (2, 3), (2, 4)] {
+            graph.insert(node(time, index));
+        }
+        for (time, from, to, forward, backward) in
+            [(0, 0, 1, 0.3, 0.1), (0, 0, 2, 0.2, 0.19), (1, 1, 3, 1.0, 1.0), (1, 2, 4, 0.5, 0.5)]
+        {
+            graph.connect(Arc { time, from, to, forward, backward }).unwrap();
+        }
+        graph
+    }
+
+    #[test]
+    fn tracks_follow_arcs_of_the_sum_that_reaches_the_threshold() {
+        let graph = graph();
+        assert_eq!(graph.follow(0, 0, 0.4, false).unwrap(), [(0, 0), (1, 1), (2, 3)]);
+        assert_eq!(graph.follow(0, 0, 0.3, false).unwrap(), [(0, 0), (1, 1), (1, 2), (2, 3), (2, 4)]);
+        assert_eq!(graph.follow(2, 3, 0.4, true).unwrap(), [(0, 0), (1, 1), (2, 3)]);
+        assert_eq!(graph.follow(2, 4, 0.4, true).unwrap(), [(1, 2), (2, 4)]);
+        assert_eq!(graph.entering(1, 2).count(), 1);
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused_by_name() {
+        let mut graph = graph();
+        assert!(graph.follow(5, 0, 0.4, false).unwrap_err().to_string().starts_with("node: "));
+        assert!(graph.follow(0, 0, f64::NAN, false).unwrap_err().to_string().starts_with("threshold: "));
+        let arc = Arc { time: 0, from: 0, to: 9, forward: 0.5, backward: 0.5 };
+        assert!(graph.connect(arc).unwrap_err().to_string().starts_with("arc: "));
+        assert!(graph.connect(Arc { to: 1, forward: 1.5, ..arc }).unwrap_err().to_string().starts_with("arc: "));
+        assert!(TrackGraph::from_json("{}").unwrap_err().to_string().starts_with("json: "));
+        let other = graph.to_json().unwrap().replace("graph 1", "graph 2");
+        assert!(TrackGraph::from_json(&other).unwrap_err().to_string().contains("graph 2"));
+    }
+
+    #[test]
+    fn json_gives_back_every_number() {
+        let graph = graph();
+        assert_eq!(TrackGraph::from_json(&graph.to_json().unwrap()).unwrap(), graph);
+    }
+}

@@ -1,0 +1,135 @@
+//! Clusters that touch and move alike are one object.
+
+use super::clusters::Clusters;
+use super::options::Grouping;
+
+/// Motion of a cluster, as grouping needs it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct GroupMotion {
+    /// `(u, v, u_x, v_x, u_y, v_y)` at `centre`.
+    pub affine: [f64; 6],
+    /// Where, `(x, y)` px.
+    pub centre: [f64; 2],
+    /// Motion in depth, disparity per step.
+    pub depth: f64,
+}
+
+impl GroupMotion {
+    fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let [u, v, u_x, v_x, u_y, v_y] = self.affine;
+        let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
+        [u + u_x * dx + u_y * dy, v + v_x * dx + v_y * dy]
+    }
+}
+
+/// The least member of each cluster's group: joins clusters no farther apart in the picture than the reach whose affine motions differ, in the median over the pixels
+/// of both, by no more than asked, and whose motions in depth agree. Clusters without a motion stay alone.
+pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limits: &Grouping) -> Vec<usize> {
+    let count = clusters.components();
+    let mut parent: Vec<usize> = (0..count).collect();
+    let touching = neighbours(clusters, limits.reach);
+    for (a, b) in touching {
+        let (Some(first), Some(second)) = (motions[a], motions[b]) else { continue };
+        let alike = (first.depth - second.depth).abs() <= limits.depth_motion
+            && median_difference(clusters, [a, b], [&first, &second]) <= limits.motion;
+        if alike {
+            let (a, b) = (root(&parent, a), root(&parent, b));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    (0..count).map(|k| root(&parent, k)).collect()
+}
+
+fn root(parent: &[usize], mut k: usize) -> usize {
+    while parent[k] != k {
+        k = parent[k];
+    }
+    k
+}
+
+/// Pairs of clusters with cells no farther apart than `reach`, the smaller index first, in order.
+fn neighbours(clusters: &Clusters, reach: f64) -> Vec<(usize, usize)> {
+    let grid = clusters.lattice().grid;
+    let count = clusters.components();
+    // Who is in each cell of the picture.
+    let mut there: Vec<Vec<u16>> = vec![vec![]; grid.columns * grid.rows];
+    for k in 0..count {
+        for [x, y] in clusters.template(k) {
+            there[usize::from(y) * grid.columns + usize::from(x)].push(k as u16);
+        }
+    }
+    let span = reach.max(0.0).floor() as i32;
+    let offsets: Vec<(i32, i32)> = (-span..=span)
+        .flat_map(|dy| (-span..=span).map(move |dx| (dx, dy)))
+        .filter(|&(dx, dy)| f64::from(dx * dx + dy * dy) <= reach * reach && (dy, dx) >= (0, 0))
+        .collect();
+    let mut touch = vec![false; count * count];
+    for y in 0..grid.rows as i32 {
+        for x in 0..grid.columns as i32 {
+            let here = &there[y as usize * grid.columns + x as usize];
+            if here.is_empty() {
+                continue;
+            }
+            for &(dx, dy) in &offsets {
+                let (i, j) = (x + dx, y + dy);
+                if !(0..grid.columns as i32).contains(&i) || !(0..grid.rows as i32).contains(&j) {
+                    continue;
+                }
+                for &b in &there[j as usize * grid.columns + i as usize] {
+                    for &a in here {
+                        touch[usize::from(a.min(b)) * count + usize::from(a.max(b))] = true;
+                    }
+                }
+            }
+        }
+    }
+    (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).filter(|&(a, b)| touch[a * count + b]).collect()
+}
+
+/// Median distance of two motions over the pixels of both clusters, px.
+fn median_difference(clusters: &Clusters, both: [usize; 2], motions: [&GroupMotion; 2]) -> f64 {
+    let pixels = both.iter().flat_map(|&k| &clusters.pixels[k]);
+    let mut differences: Vec<f64> = pixels
+        .map(|&i| {
+            let [x, y, _] = clusters.points.at(i as usize);
+            let [[u, v], [s, t]] = [motions[0].at(x, y), motions[1].at(x, y)];
+            (u - s).hypot(v - t)
+        })
+        .collect();
+    if differences.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = differences.len() / 2;
+    *differences.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clusters::tests::made_up;
+    use super::*;
+
+    fn moving(u: f64, depth: f64) -> Option<GroupMotion> {
+        Some(GroupMotion { affine: [u, 0.0, 0.0, 0.0, 0.0, 0.0], centre: [0.0, 0.0], depth })
+    }
+
+    #[test]
+    fn neighbours_that_move_alike_are_one() {
+        // In a row, 3 cells apart but for the last, which is 5 apart.
+        let cells = [([10, 5, 9], 0), ([13, 5, 30], 1), ([16, 5, 9], 2), ([19, 5, 9], 3), ([24, 5, 9], 4)];
+        let clusters = made_up(&cells, 6);
+        let motions = [moving(3.0, 0.0), moving(3.9, 0.1), moving(5.5, 0.0), moving(5.4, 0.3), moving(5.4, 0.3), None];
+        assert_eq!(groups(&clusters, &motions, &Grouping::default()), [0, 0, 2, 3, 4, 5]);
+        let far = Grouping { reach: 5.0, ..Grouping::default() };
+        assert_eq!(groups(&clusters, &motions, &far), [0, 0, 2, 3, 3, 5]);
+    }
+
+    #[test]
+    fn affine_motions_are_compared_where_the_pixels_are() {
+        let clusters = made_up(&[([10, 5, 9], 0), ([12, 5, 9], 1)], 2);
+        // Both x - 90 about different centres.
+        let growing = |centre: f64| {
+            Some(GroupMotion { affine: [centre - 90.0, 0.0, 1.0, 0.0, 0.0, 0.0], centre: [centre, 0.0], depth: 0.0 })
+        };
+        assert_eq!(groups(&clusters, &[growing(0.0), growing(200.0)], &Grouping::default()), [0, 0]);
+    }
+}

@@ -1,0 +1,224 @@
+//! Which track each component is: kept while it covers its moved self, rested when lost, recognised; section 6.6 of the stereo tracker's design.
+
+use super::options::Recognition;
+
+/// What is known of the track of a component.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Identity {
+    pub id: u64,
+    /// Last good motion, cells along x, y and disparity per step.
+    pub velocity: Option<[f64; 3]>,
+    /// Steps of like motion.
+    pub steady: usize,
+    /// Steps coasted in a row.
+    pub coasted: usize,
+    /// Mean at the last step, cells.
+    pub position: [f64; 3],
+}
+
+/// What a component does from one step to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Carried {
+    /// Motion, cells.
+    pub motion: [f64; 3],
+    /// Whether it is an extrapolation.
+    pub coasting: bool,
+}
+
+/// A lost track.
+#[derive(Debug, Clone, PartialEq)]
+struct Resting {
+    identity: Identity,
+    /// Step at which it was last where its position says.
+    since: usize,
+}
+
+/// All tracks: those of the components, and the lost ones.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Identities {
+    pub live: Vec<Option<Identity>>,
+    resting: Vec<Resting>,
+    next: u64,
+}
+
+/// Whether two motions differ by a jump; both in cells.
+fn jumps(a: [f64; 3], b: [f64; 3], cell: [f64; 3], limits: &Recognition) -> bool {
+    let plane = ((a[0] - b[0]) * cell[0]).hypot((a[1] - b[1]) * cell[1]);
+    plane > limits.jump || (a[2] - b[2]).abs() > limits.jump_disparity
+}
+
+impl Identities {
+    /// A new track's name.
+    fn name(&mut self) -> u64 {
+        self.next += 1;
+        self.next - 1
+    }
+
+    /// The motion that carries component `k` on: what was measured, or the last good motion of a steady track for a few steps after that jumped or was not measured.
+    pub fn carry(
+        &mut self,
+        k: usize,
+        measured: Option<[f64; 3]>,
+        cell: [f64; 3],
+        limits: Option<&Recognition>,
+    ) -> Option<Carried> {
+        let Some(identity) = self.live.get_mut(k).and_then(Option::as_mut) else {
+            return measured.map(|motion| Carried { motion, coasting: false });
+        };
+        let Some(limits) = limits else {
+            identity.velocity = measured.or(identity.velocity);
+            return measured.map(|motion| Carried { motion, coasting: false });
+        };
+        let like = match (identity.velocity, measured) {
+            (Some(last), Some(now)) => !jumps(last, now, cell, limits),
+            _ => false,
+        };
+        if let Some(last) = identity.velocity.filter(|_| !like) {
+            let steady = identity.steady >= limits.steady || measured.is_none();
+            if steady && identity.coasted < limits.coast {
+                identity.coasted += 1;
+                return Some(Carried { motion: last, coasting: true });
+            }
+        }
+        identity.coasted = 0;
+        identity.steady = if like { identity.steady + 1 } else { usize::from(measured.is_some()) };
+        identity.velocity = measured.or(identity.velocity);
+        measured.map(|motion| Carried { motion, coasting: false })
+    }
+
+    /// Takes the tracks of the components for which `lost` holds, to be waited for.
+    pub fn rest(&mut self, time: usize, lost: impl Fn(usize) -> bool) {
+        for k in 0..self.live.len() {
+            if lost(k) && let Some(identity) = self.live[k].take() {
+                self.resting.push(Resting { identity, since: time });
+            }
+        }
+    }
+
+    /// Gives every component of `seen`, `(component, mean in cells)`, that has no track one: a lost track that is expected there, the nearest first, or a new one.
+    /// Then all are where they were seen. Tracks lost since the step before are not given back.
+    pub fn name_all(&mut self, time: usize, seen: &[(usize, [f64; 3])], limits: Option<&Recognition>) {
+        self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
+        if let Some(limits) = limits {
+            let mut pairs = Vec::new();
+            for (r, resting) in self.resting.iter().enumerate() {
+                for &(k, position) in seen.iter().filter(|(k, _)| self.live[*k].is_none()) {
+                    if let Some(distance) = resting.distance(time, position, limits) {
+                        pairs.push((distance, r, k));
+                    }
+                }
+            }
+            pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+            let mut taken = vec![false; self.resting.len()];
+            for (_, r, k) in pairs {
+                if !taken[r] && self.live[k].is_none() {
+                    taken[r] = true;
+                    self.live[k] = Some(Identity { coasted: 0, ..self.resting[r].identity.clone() });
+                }
+            }
+            let mut left = taken.into_iter();
+            self.resting.retain(|_| !left.next().unwrap_or(false));
+        }
+        for &(k, position) in seen {
+            if self.live[k].is_none() {
+                let id = self.name();
+                self.live[k] = Some(Identity { id, velocity: None, steady: 0, coasted: 0, position });
+            }
+            if let Some(identity) = &mut self.live[k] {
+                identity.position = position;
+            }
+        }
+    }
+}
+
+impl Resting {
+    /// How far a component is from where the track is expected, in tolerances; `None` beyond them, and for a track just lost.
+    fn distance(&self, time: usize, position: [f64; 3], limits: &Recognition) -> Option<f64> {
+        let gap = time - self.since;
+        if gap < 2 {
+            return None;
+        }
+        let velocity = self.identity.velocity?;
+        let mut sum = 0.0;
+        for i in 0..3 {
+            let expected = self.identity.position[i] + gap as f64 * velocity[i];
+            let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i];
+            let off = (position[i] - expected).abs() / tolerance;
+            if off > 1.0 {
+                return None;
+            }
+            sum += off * off;
+        }
+        Some(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CELL: [f64; 3] = [8.0, 8.0, 1.0];
+
+    fn identities() -> Identities {
+        let mut all = Identities { live: vec![None; 3], ..Identities::default() };
+        all.name_all(0, &[(0, [10.0, 10.0, 30.0]), (1, [40.0, 10.0, 20.0])], Some(&Recognition::default()));
+        all
+    }
+
+    #[test]
+    fn a_hidden_track_is_recognised_where_it_is_expected() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
+        all.name_all(1, &[(0, [12.0, 10.0, 30.5])], Some(&limits));
+        // Gone at steps 2 to 4.
+        all.rest(1, |k| k == 0);
+        for time in 2..5 {
+            all.name_all(time, &[(1, [40.0, 10.0, 20.0])], Some(&limits));
+            assert_eq!(all.live[0], None);
+        }
+        let mut elsewhere = all.clone();
+        all.name_all(5, &[(2, [20.5, 11.0, 32.6])], Some(&limits));
+        assert_eq!(all.live[2].as_ref().unwrap().id, 0);
+        elsewhere.name_all(5, &[(2, [29.0, 11.0, 32.6])], Some(&limits));
+        assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
+    }
+
+    #[test]
+    fn nobody_waits_for_ever_nor_without_a_history() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        all.rest(0, |k| k == 1);
+        all.name_all(3, &[(2, [40.0, 10.0, 20.0])], Some(&limits));
+        assert_eq!(all.live[2].as_ref().unwrap().id, 2);
+        all.carry(0, Some([0.0; 3]), CELL, Some(&limits)).unwrap();
+        all.rest(3, |k| k == 0);
+        all.name_all(14, &[(1, [10.0, 10.0, 30.0])], Some(&limits));
+        assert_eq!(all.live[1].as_ref().unwrap().id, 3);
+    }
+
+    #[test]
+    fn steady_tracks_coast_through_jumps_for_three_steps() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
+        let mut carry = |motion| all.carry(0, motion, CELL, Some(&limits));
+        for _ in 0..3 {
+            assert_eq!(carry(Some(good)), Some(Carried { motion: good, coasting: false }));
+        }
+        for measured in [Some(jump), None, Some(jump)] {
+            assert_eq!(carry(measured), Some(Carried { motion: good, coasting: true }));
+        }
+        assert_eq!(carry(Some(jump)), Some(Carried { motion: jump, coasting: false }));
+    }
+
+    #[test]
+    fn without_recognition_what_is_measured_counts() {
+        let mut all = identities();
+        all.carry(0, Some([1.0; 3]), CELL, None);
+        assert_eq!(all.carry(0, None, CELL, None), None);
+        all.rest(1, |k| k == 0);
+        all.name_all(4, &[(0, [13.0, 13.0, 33.0])], None);
+        assert_eq!(all.live[0].as_ref().unwrap().id, 2);
+    }
+}

@@ -1,0 +1,158 @@
+//! Motion of every cluster from one step to the other: in the picture, in depth, and whom it meets.
+
+use super::cell_luminance::{CellLuminance, Window};
+use super::clusters::Clusters;
+use super::disparity_change::{nearest, robust_mean};
+use super::lucas_kanade::{PlaneMotion, SmoothedLevels, affine_motion};
+use super::options::StereoTrackerOptions;
+use super::overlap::{Row, depth_motion};
+use crate::types::{AffineFlow, Frame};
+use rayon::prelude::*;
+
+/// Reach of predicted windows, cells and disparities.
+const PREDICTED_REACH: i32 = 2;
+/// First guesses nearer than this to one another are one, px.
+const SAME_START: f64 = 3.0;
+/// Least share of a cluster's pixels at whose new places there must be a disparity.
+const LEAST_SHARE: f64 = 0.15;
+
+/// A step as motion needs it.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    pub clusters: Clusters,
+    pub luminance: CellLuminance,
+    /// For Lucas-Kanade (`improved`).
+    pub levels: Option<SmoothedLevels>,
+}
+
+/// How a cluster moved by whole cells, and whom it meets.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellMotion {
+    /// `(dx, dy, dz)`, cells.
+    pub shift: [i32; 3],
+    /// Mean absolute difference of the template, levels.
+    pub difference: f64,
+    pub overlaps: Row,
+}
+
+/// Motion in cells of all clusters towards another step: (29), then (30) to (32). `None` for empty ones and those whose template leaves the picture.
+pub(super) fn cell_motions(from: &Seen, to: &Seen, options: &StereoTrackerOptions) -> Vec<Option<CellMotion>> {
+    let reach = options.search as i32;
+    let one = |k: usize| {
+        let template = from.clusters.template(k);
+        let found = from.luminance.find(&template, &to.luminance, Window { centre: [0, 0], reach })?;
+        let depth = depth_motion(&from.clusters, k, &to.clusters, found.shift, 0, reach);
+        let [dx, dy] = found.shift;
+        Some(CellMotion { shift: [dx, dy, depth.shift], difference: found.difference, overlaps: depth.overlaps })
+    };
+    (0..from.clusters.components()).into_par_iter().map(one).collect()
+}
+
+/// Motion of a cluster to fractions of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FineMotion {
+    pub plane: PlaneMotion,
+    /// Disparity per step.
+    pub depth: f64,
+}
+
+impl FineMotion {
+    /// `(u, v, w)` at the centre, px and disparity.
+    pub fn velocity(&self) -> [f64; 3] {
+        [self.plane.flow.u, self.plane.flow.v, self.depth]
+    }
+
+    /// A translation of a cluster whose pixels have the middle `centre`.
+    pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
+        let flow = AffineFlow { u, v, ..AffineFlow::default() };
+        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN }, depth: w }
+    }
+
+    /// Where a point `(x, y, d)` goes.
+    pub fn moved(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
+        let [x, y] = self.plane.moved(x, y);
+        [x, y, d + self.depth]
+    }
+
+    /// Where a point `(x, y, d)` of the next step came from, to first order in the derivatives of the flow.
+    pub fn moved_back(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
+        let flow = self.plane.flow;
+        let (du, dv) = flow.at_offset(x - flow.u - self.plane.centre[0], y - flow.v - self.plane.centre[1]);
+        [x - du, y - dv, d - self.depth]
+    }
+}
+
+/// What the next step shows before anything is clustered in it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NextView<'a> {
+    pub luminance: &'a CellLuminance,
+    pub levels: &'a SmoothedLevels,
+    /// Disparities of its edge pixels, px; NaN elsewhere.
+    pub disparity: &'a Frame<f32>,
+}
+
+/// Places `(x, y)` of a cluster's pixels, px.
+pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
+    let place = |&i: &u32| {
+        let [x, y, _] = clusters.points.at(i as usize);
+        [x, y]
+    };
+    clusters.pixels[k].iter().map(place).collect()
+}
+
+/// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from the motion before (`last`, px and disparity).
+///
+/// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell.
+pub(super) fn fine_motions(
+    from: &Seen,
+    next: NextView<'_>,
+    last: &[Option<[f64; 3]>],
+    options: &StereoTrackerOptions,
+) -> Vec<Option<FineMotion>> {
+    let levels = from.levels.as_ref();
+    let one = |k: usize| {
+        let clusters = &from.clusters;
+        let pixels = places(clusters, k);
+        let starts = starts(from, next.luminance, k, last[k], options);
+        let plane = affine_motion(levels?, next.levels, &pixels, &starts)?;
+        let mut changes: Vec<f64> = clusters.pixels[k]
+            .iter()
+            .filter_map(|&i| {
+                let [x, y, d] = clusters.points.at(i as usize);
+                let [x, y] = plane.moved(x, y);
+                nearest(next.disparity, x, y).map(|there| there - d)
+            })
+            .collect();
+        if (changes.len() as f64) < LEAST_SHARE * pixels.len() as f64 {
+            return None;
+        }
+        robust_mean(&mut changes).map(|depth| FineMotion { plane, depth })
+    };
+    (0..from.clusters.components()).into_par_iter().map(one).collect()
+}
+
+/// First guesses of a cluster's translation, px.
+fn starts(
+    from: &Seen,
+    next: &CellLuminance,
+    k: usize,
+    last: Option<[f64; 3]>,
+    options: &StereoTrackerOptions,
+) -> Vec<[f64; 2]> {
+    let [cx, cy, _] = from.clusters.lattice().cell();
+    let window = match last.filter(|_| options.predicted_windows) {
+        Some([u, v, _]) => {
+            Window { centre: [(u / cx).round() as i32, (v / cy).round() as i32], reach: PREDICTED_REACH }
+        }
+        None => Window { centre: [0, 0], reach: options.search as i32 },
+    };
+    let matched = from.luminance.find(&from.clusters.template(k), next, window);
+    let mut starts: Vec<[f64; 2]> =
+        matched.iter().map(|found| [f64::from(found.shift[0]) * cx, f64::from(found.shift[1]) * cy]).collect();
+    if let Some([u, v, _]) = last
+        && starts.iter().all(|start| (start[0] - u).hypot(start[1] - v) > SAME_START)
+    {
+        starts.push([u, v]);
+    }
+    starts
+}

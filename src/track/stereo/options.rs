@@ -1,0 +1,289 @@
+//! How the stereo tracker works.
+
+use crate::error::{Error, Result};
+use crate::parallel::Threads;
+use crate::stereo::Method;
+
+/// Which system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StereoMode {
+    /// Motion is measured first, by affine Lucas-Kanade, and carries the mixture to the next step; what is hidden is recognised. The default.
+    #[default]
+    Improved,
+    /// The stereo paper's text: a new mixture each step, template matching in cells, overlaps in both directions.
+    Paper,
+}
+
+impl StereoMode {
+    /// Every mode.
+    pub const ALL: [Self; 2] = [Self::Improved, Self::Paper];
+
+    /// The word used in Python and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Improved => "improved",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+/// The grid in which edge pixels are counted: cells over the picture, layers of disparity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VoxelGrid {
+    /// Cells along x; default 80.
+    pub columns: usize,
+    /// Cells along y; default 60.
+    pub rows: usize,
+    /// Layers of one disparity each; default 64. Farther disparities are counted in the last one.
+    pub layers: usize,
+    /// Disparity of the first layer, px; default -40.
+    pub first_disparity: i32,
+}
+
+impl Default for VoxelGrid {
+    fn default() -> Self {
+        Self { columns: 80, rows: 60, layers: 64, first_disparity: -40 }
+    }
+}
+
+/// The cameras, for depths in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StereoCamera {
+    /// Focal length, px.
+    pub focal: f64,
+    /// Distance of the cameras, in the unit that depths shall have.
+    pub baseline: f64,
+    /// Disparity of a point at infinity, px: below 0 where the cameras converge.
+    pub d_infinity: f64,
+}
+
+impl StereoCamera {
+    /// Depth `Z = f B / (d - d_infinity)`, in units of the baseline; NaN for a disparity at or beyond infinity.
+    pub fn depth(&self, disparity: f64) -> f64 {
+        let from_infinity = disparity - self.d_infinity;
+        if from_infinity > 0.0 { self.focal * self.baseline / from_infinity } else { f64::NAN }
+    }
+
+    /// Place `(X, Y, Z)` of `(x, y, d)`, px, in units of the baseline, for a principal point `centre`, px.
+    pub fn place(&self, [x, y, d]: [f64; 3], centre: [f64; 2]) -> [f64; 3] {
+        let depth = self.depth(d);
+        [(x - centre[0]) * depth / self.focal, (y - centre[1]) * depth / self.focal, depth]
+    }
+}
+
+/// When and how far lost tracks are waited for (`improved`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recognition {
+    /// A component that covers less of its moved self loses its track; default 0.2.
+    pub least_overlap: f64,
+    /// Steps that a lost track is waited for; default 10.
+    pub patience: usize,
+    /// How far from where it is expected a new component may be to be the lost one, cells along x, y and disparity; default (3, 4, 1).
+    pub tolerance: [f64; 3],
+    /// How much farther for each step since it was lost; default (0.5, 0.5, 0.2).
+    pub tolerance_per_step: [f64; 3],
+    /// Steps of like motion after which a track is steady; default 2.
+    pub steady: usize,
+    /// Most steps that a steady track coasts through a jump; default 3.
+    pub coast: usize,
+    /// A jump in the picture, px; default 24.
+    pub jump: f64,
+    /// A jump in disparity; default 1.5.
+    pub jump_disparity: f64,
+}
+
+impl Default for Recognition {
+    fn default() -> Self {
+        Self {
+            least_overlap: 0.2,
+            patience: 10,
+            tolerance: [3.0, 4.0, 1.0],
+            tolerance_per_step: [0.5, 0.5, 0.2],
+            steady: 2,
+            coast: 3,
+            jump: 24.0,
+            jump_disparity: 1.5,
+        }
+    }
+}
+
+/// When clusters belong together (`improved`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grouping {
+    /// Farthest that clusters which touch are apart in the picture, cells; default 3.5.
+    pub reach: f64,
+    /// Most that their affine motions differ, median over the pixels of both, px; default 1.
+    pub motion: f64,
+    /// Most that their motions in depth differ, disparity per step; default 0.15.
+    pub depth_motion: f64,
+}
+
+impl Default for Grouping {
+    fn default() -> Self {
+        Self { reach: 3.5, motion: 1.0, depth_motion: 0.15 }
+    }
+}
+
+/// Options of the stereo tracker. Begin with [`StereoTrackerOptions::new`]: some defaults differ between the modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StereoTrackerOptions {
+    /// Which system.
+    pub mode: StereoMode,
+    /// Grid of the voxels.
+    pub grid: VoxelGrid,
+    /// Least and greatest disparity looked for, px; default (-40, 24).
+    pub disparity_range: [i32; 2],
+    /// Least and greatest offset of rows looked for, px; default (-4, 4).
+    pub row_range: [i32; 2],
+    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated at the first step that shows anything and kept (`SemiGlobal`).
+    pub row_offset: Option<f64>,
+    /// How views are matched; default classes (`paper`), semi-global (`improved`).
+    pub matching: Method,
+    /// Components of the mixture; default 12 (`paper`), 16 (`improved`).
+    pub components: usize,
+    /// `alpha_0` of (8); default 0.1.
+    pub weight_concentration_prior: f64,
+    /// `beta_0` of (9); default 0.001.
+    pub mean_precision_prior: f64,
+    /// `nu_0` of (9); default 12.1.
+    pub degrees_of_freedom_prior: f64,
+    /// Diagonal of `W_0^-1` of (9), cells^2; default 0.1.
+    pub covariance_prior: f64,
+    /// Most rounds of the mixture from a cold start; default 100.
+    pub max_iter: usize,
+    /// Most rounds from where the last step's components moved to (`improved`); default 30.
+    pub warm_max_iter: usize,
+    /// The mixture stops when its lower bound grows by less than this for each pixel; none: never. Default none (`paper`), 1e-4 (`improved`).
+    pub tol: Option<f64>,
+    /// Cold starts of which the best is kept; default 1.
+    pub n_init: usize,
+    /// Components with fewer pixels are dropped while fitting; default 0, which drops none.
+    pub prune_weight: f64,
+    /// Seed of the cold starts; default 0.
+    pub seed: u64,
+    /// How far templates and depths are searched, cells and disparities; default 8.
+    pub search: usize,
+    /// Levels of the reduced luminance; default 64.
+    pub luminance_levels: usize,
+    /// Least score of an arc that tracks follow, 0 to 2; default 0.4.
+    pub arc_threshold: f64,
+    /// Components with fewer pixels after moving are seeded anew (`improved`); default 20.
+    pub reseed_below: f64,
+    /// Templates are searched within 2 cells of the last motion instead of everywhere (`improved`); default no.
+    pub predicted_windows: bool,
+    /// Whether lost tracks are waited for (`improved`).
+    pub recognition: Option<Recognition>,
+    /// Whether clusters that move alike are put together (`improved`).
+    pub grouping: Option<Grouping>,
+    /// The cameras, if depths are wanted.
+    pub camera: Option<StereoCamera>,
+    /// Number of threads; results do not depend on it.
+    pub threads: Threads,
+}
+
+impl Default for StereoTrackerOptions {
+    fn default() -> Self {
+        Self::new(StereoMode::default())
+    }
+}
+
+impl StereoTrackerOptions {
+    /// The defaults of a mode.
+    pub fn new(mode: StereoMode) -> Self {
+        let improved = mode == StereoMode::Improved;
+        Self {
+            mode,
+            grid: VoxelGrid::default(),
+            disparity_range: [-40, 24],
+            row_range: [-4, 4],
+            row_offset: None,
+            matching: if improved { Method::SemiGlobal } else { Method::Classes },
+            components: if improved { 16 } else { 12 },
+            weight_concentration_prior: 0.1,
+            mean_precision_prior: 1e-3,
+            degrees_of_freedom_prior: 12.1,
+            covariance_prior: 0.1,
+            max_iter: 100,
+            warm_max_iter: 30,
+            tol: improved.then_some(1e-4),
+            n_init: 1,
+            prune_weight: 0.0,
+            seed: 0,
+            search: 8,
+            luminance_levels: 64,
+            arc_threshold: 0.4,
+            reseed_below: 20.0,
+            predicted_windows: false,
+            recognition: improved.then(Recognition::default),
+            grouping: improved.then(Grouping::default),
+            camera: None,
+            threads: Threads::default(),
+        }
+    }
+
+    /// Checks what the tracker itself uses; the mixture and the matching check their own.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        let VoxelGrid { columns, rows, layers, .. } = self.grid;
+        if [columns, rows, layers].iter().any(|side| !(1..=4096).contains(side)) || columns * rows * layers > 1 << 26 {
+            let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
+            return Err(Error::argument("grid", expected, format!("({rows}, {columns}, {layers})")));
+        }
+        if !(1..=4096).contains(&self.components) {
+            return Err(Error::argument("n_components", "1 to 4096", self.components));
+        }
+        if !(1..=64).contains(&self.search) {
+            return Err(Error::argument("search", "1 to 64 cells", self.search));
+        }
+        if !(2..=256).contains(&self.luminance_levels) {
+            return Err(Error::argument("luminance_levels", "2 to 256", self.luminance_levels));
+        }
+        if !(self.arc_threshold >= 0.0 && self.arc_threshold <= 2.0) {
+            return Err(Error::argument("arc_threshold", "a score, 0 to 2", self.arc_threshold));
+        }
+        if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
+            for (name, value) in [("focal", focal), ("baseline", baseline)] {
+                if !(value > 0.0 && value.is_finite()) {
+                    return Err(Error::argument(name, "a length above 0", value));
+                }
+            }
+            if !d_infinity.is_finite() {
+                return Err(Error::argument("d_infinity", "a disparity, px", d_infinity));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_option_out_of_range_is_named() {
+        let with = |change: fn(&mut StereoTrackerOptions)| {
+            let mut options = StereoTrackerOptions::default();
+            change(&mut options);
+            options.check().unwrap_err().to_string()
+        };
+        assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
+        assert!(with(|o| o.components = 0).starts_with("n_components: "));
+        assert!(with(|o| o.search = 0).starts_with("search: "));
+        assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
+        assert!(with(|o| o.arc_threshold = f64::NAN).starts_with("arc_threshold: "));
+        let camera = StereoCamera { focal: 0.0, baseline: 0.075, d_infinity: 0.0 };
+        let options = StereoTrackerOptions { camera: Some(camera), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("focal: "));
+        assert!(StereoTrackerOptions::new(StereoMode::Paper).check().is_ok());
+    }
+
+    #[test]
+    fn depth_is_that_of_two_cameras() {
+        let camera = StereoCamera { focal: 800.0, baseline: 0.075, d_infinity: -44.0 };
+        assert_eq!(camera.depth(-4.0), 1.5);
+        assert_eq!(camera.place([400.0, 200.0, -4.0], [320.0, 240.0]), [0.15, -0.075, 1.5]);
+        assert!(camera.depth(-44.0).is_nan());
+    }
+}

@@ -1,0 +1,119 @@
+//! Motion in depth and overlaps of clusters: equations (30) to (32) of the stereo paper.
+
+use super::clusters::Clusters;
+
+/// Shares of a cluster's voxels that the clusters of another step occupy, once it is moved.
+pub(super) type Row = Vec<f64>;
+
+/// How far a cluster went in depth, and whom it meets there.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Depth {
+    /// Layers, disparity.
+    pub shift: i32,
+    /// `e(k -> k')` of every cluster `k'` of the other step, 0 to 1.
+    pub overlaps: Row,
+}
+
+/// How many voxels of a cluster, moved by whole cells, each cluster of `other` occupies (30).
+fn occupied(clusters: &Clusters, cluster: usize, other: &Clusters, by: [i32; 3]) -> Vec<u32> {
+    let mut counts = vec![0; other.components()];
+    for cell in clusters.cells(cluster) {
+        if let Some(met) = clusters.lattice().shifted(cell, by).and_then(|cell| other.at(cell)) {
+            counts[met] += 1;
+        }
+    }
+    counts
+}
+
+/// Looks for the shift in depth, up to `reach` layers about `centre`, at which one cluster of `other` occupies most voxels (31), the smaller shift of equals;
+/// the overlaps are those with all clusters there (32). Both counts are of voxels, so that they stay between 0 and 1.
+pub(super) fn depth_motion(
+    clusters: &Clusters,
+    cluster: usize,
+    other: &Clusters,
+    plane: [i32; 2],
+    centre: i32,
+    reach: i32,
+) -> Depth {
+    let mut best: Option<(u32, i32, Vec<u32>)> = None;
+    for shift in centre - reach..=centre + reach {
+        let counts = occupied(clusters, cluster, other, [plane[0], plane[1], shift]);
+        let most = counts.iter().copied().max().unwrap_or(0);
+        let better = best
+            .as_ref()
+            .is_none_or(|(best, at, _)| most > *best || most == *best && (shift.abs(), shift) < (at.abs(), *at));
+        if better {
+            best = Some((most, shift, counts));
+        }
+    }
+    let (_, shift, counts) = best.unwrap_or((0, centre, vec![0; other.components()]));
+    let all = clusters.members[cluster].len().max(1) as f64;
+    Depth { shift, overlaps: counts.into_iter().map(|n| f64::from(n) / all).collect() }
+}
+
+/// Shares of a cluster's voxels that each cluster of `other` meets once every edge pixel is moved by itself: `moved` tells where pixel `i` is then,
+/// `(x, y, d)`, px. As (32), for motions that are not whole cells.
+pub(super) fn moved_overlaps(
+    clusters: &Clusters,
+    cluster: usize,
+    other: &Clusters,
+    moved: impl Fn(usize) -> [f64; 3],
+) -> Row {
+    let lattice = clusters.lattice();
+    let mut cells: Vec<[u16; 3]> =
+        clusters.pixels[cluster].iter().filter_map(|&i| lattice.voxel_at(moved(i as usize))).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut row = vec![0.0; other.components()];
+    for &cell in &cells {
+        if let Some(met) = other.at(cell) {
+            row[met] += 1.0;
+        }
+    }
+    // What left the picture counts as not met: the cluster's own number of voxels is the least that there are.
+    let all = cells.len().max(clusters.members[cluster].len()).max(1) as f64;
+    row.iter_mut().for_each(|share| *share /= all);
+    row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clusters::tests::made_up;
+    use super::*;
+
+    /// A block of voxels of one cluster.
+    fn block(at: [u16; 3], label: u32) -> Vec<([u16; 3], u32)> {
+        (0..16).map(|i| ([at[0] + i % 4, at[1] + i / 4, at[2]], label)).collect()
+    }
+
+    #[test]
+    fn the_shift_in_depth_is_where_most_voxels_meet() {
+        let before = made_up(&[block([10, 10, 30], 0), block([40, 10, 30], 1)].concat(), 2);
+        let after = made_up(&[block([12, 9, 33], 1), block([40, 10, 30], 0)].concat(), 2);
+        let depth = depth_motion(&before, 0, &after, [2, -1], 0, 8);
+        assert_eq!(depth, Depth { shift: 3, overlaps: vec![0.0, 1.0] });
+        // Half of it is beyond: still 3, with half of the overlap.
+        let half = made_up(&block([14, 9, 33], 1), 2);
+        assert_eq!(depth_motion(&before, 0, &half, [2, -1], 0, 8).overlaps, [0.0, 0.5]);
+    }
+
+    #[test]
+    fn whom_nobody_meets_stays_and_overlaps_nothing() {
+        let before = made_up(&block([10, 10, 30], 0), 1);
+        let after = made_up(&block([60, 40, 5], 0), 1);
+        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 0, 8), Depth { shift: 0, overlaps: vec![0.0] });
+    }
+
+    #[test]
+    fn pixels_moved_by_themselves_meet_the_same() {
+        let before = made_up(&block([10, 10, 30], 0), 1);
+        let after = made_up(&block([12, 9, 33], 2), 3);
+        let moved = |i: usize| {
+            let [x, y, d] = before.points.at(i);
+            [x + 16.0, y - 8.0, d + 3.2]
+        };
+        assert_eq!(moved_overlaps(&before, 0, &after, moved), [0.0, 0.0, 1.0]);
+        // All of it outside.
+        assert_eq!(moved_overlaps(&before, 0, &after, |_| [-9.0, 0.0, 0.0]), [0.0, 0.0, 0.0]);
+    }
+}

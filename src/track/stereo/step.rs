@@ -1,0 +1,33 @@
+//! What the tracker says of a step, and of a track.
+
+use super::graph::Node;
+
+/// All clusters of a step and the edge pixels they are made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Step, from 0.
+    pub time: usize,
+    /// Clusters with edge pixels, by component.
+    pub clusters: Vec<Node>,
+    /// Rows of the N edge pixels with a disparity, px.
+    pub rows: Vec<u32>,
+    /// Their columns, px.
+    pub columns: Vec<u32>,
+    /// Their disparities, px.
+    pub disparities: Vec<f32>,
+    /// The component that each belongs to.
+    pub labels: Vec<u32>,
+    /// Rounds of the mixture; 0 where there was nothing to cluster.
+    pub rounds: usize,
+}
+
+/// One track.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Track {
+    /// Steps at which it was seen, ascending.
+    pub times: Vec<usize>,
+    /// Mean `(x, y, d)` there, px.
+    pub positions: Vec<[f64; 3]>,
+    /// Motion `(u, v, w)` since the step before, px/step; NaN where not measured.
+    pub velocities: Vec<[f64; 3]>,
+}

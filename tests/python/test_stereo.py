@@ -1,0 +1,256 @@
+"""Disparity of edge pixels: arguments, edge cases and the figures of its specification on the small scene."""
+
+import pickle
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from jacoflow import stereo
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import stereo_scenes
+import stereo_scores
+
+METHODS = ("classes", "sgm")
+RANGE = (-20, 12)
+
+
+@cache
+def small():
+    """Some steps of the small scene."""
+    return [stereo_scenes.small().film()[t] for t in (0, 2, 4)]
+
+
+def disparity(left, right, **options):
+    return stereo.edge_disparity(left, right, **{"disparity_range": RANGE, "row_range": (-2, 2), **options})
+
+
+def same(a, b):
+    assert_array_equal(a.disparity, b.disparity)
+    for name in ("rows", "cols", "values", "score", "row_offset"):
+        assert_array_equal(getattr(a, name), getattr(b, name))
+
+
+ASKED = {"classes": (0.969, 0.089, 0.025, 0.050), "sgm": (0.951, 0.083, 0.003, 0.015)}
+"""Density, mean error (px), outliers and false points in occlusions."""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_specifications_figures_on_the_small_scene(method):
+    counts = []
+    for step in small():
+        edges = np.zeros(step.left.shape, bool)
+        edges[stereo.edge_pixels(step.left)] = True
+        found = disparity(step.left, step.right, row_range=(-4, 4), method=method)
+        counts.append(stereo_scores.count(found.disparity, edges, step.disparity, step.visible))
+    reached = stereo_scores.figures(counts)
+    density, mean, outliers, occluded = ASKED[method]
+    assert reached["density"] >= density - 0.02
+    assert reached["outliers"] <= 1.3 * outliers
+    assert reached["MAE"] <= 1.3 * mean
+    assert reached["occluded"] <= 1.3 * occluded
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_lists_and_image_say_the_same(method):
+    step = small()[0]
+    found = disparity(step.left, step.right, method=method)
+    assert found.disparity.shape == step.left.shape and found.disparity.dtype == np.float32
+    rows, cols = np.nonzero(np.isfinite(found.disparity))
+    assert_array_equal(rows, found.rows)
+    assert_array_equal(cols, found.cols)
+    assert_array_equal(found.disparity[rows, cols], found.values)
+    assert len(found.score) == len(rows) > 5000 and found.score.min() > 0 and found.score.max() <= 1
+    least, greatest = found.values.min(), found.values.max()
+    # Lucas-Kanade may leave the range by a pixel, and the fit by half of one.
+    assert least >= RANGE[0] - 1.5 and greatest <= RANGE[1] + 1.5
+    if method == "classes":
+        assert_array_equal(found.values, np.rint(found.values))
+    edge_rows, edge_cols = stereo.edge_pixels(step.left)
+    edges = set(zip(edge_rows.tolist(), edge_cols.tolist(), strict=True))
+    assert edges.issuperset(zip(rows.tolist(), cols.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_number_of_threads_changes_nothing(method):
+    step = small()[1]
+    one = disparity(step.left, step.right, method=method, threads=1)
+    for threads in (2, 3):
+        same(one, disparity(step.left, step.right, method=method, threads=threads))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_sample_type_means_the_same(method):
+    step = small()[0]
+    plain = disparity(step.left, step.right, method=method)
+    for convert in (
+        lambda view: view.astype(np.uint16) * 257,
+        lambda view: view.astype(np.float32),
+        lambda view: view.astype(np.float64),
+        lambda view: np.repeat(view[..., None], 3, axis=2),
+        lambda view: np.asfortranarray(view),
+        lambda view: np.repeat(view, 2, axis=1)[:, ::2],
+    ):
+        left, right = convert(step.left), convert(step.right)
+        kept = left.copy()
+        left.flags.writeable = right.flags.writeable = False
+        got = disparity(left, right, method=method)
+        assert_array_equal(left, kept)
+        both = np.isfinite(plain.disparity) & np.isfinite(got.disparity)
+        assert both.sum() >= 0.999 * len(plain.rows) and len(got.rows) <= 1.001 * len(plain.rows)
+        assert np.mean(np.abs(got.disparity - plain.disparity)[both] < 1e-3) > 0.999
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_bad_samples_damage_their_neighbourhood_and_no_more(method):
+    step = small()[0]
+    whole = disparity(step.left, step.right, method=method, row_offset=1.0)
+    left = step.left.astype(np.float32)
+    left[100:103, 150] = np.nan
+    left[60, 200] = np.inf
+    got = disparity(left, step.right, method=method, row_offset=1.0)
+    for y, x in ((100, 150), (102, 150), (60, 200)):
+        assert np.isnan(got.disparity[y - 8 : y + 9, x - 8 : x + 9]).all()
+    assert np.isfinite(got.values).all() and np.isfinite(got.score).all()
+    near = np.zeros(left.shape, bool)
+    for y, x in ((101, 150), (60, 200)):
+        near[max(y - 45, 0) : y + 46, max(x - 45, 0) : x + 46] = True
+    far = ~near
+    assert np.mean((got.disparity == whole.disparity)[far] | np.isnan(got.disparity + whole.disparity)[far]) > 0.999
+    everywhere = np.full_like(left, np.nan)
+    assert len(disparity(everywhere, step.right, method=method).rows) == 0
+    assert len(disparity(step.left, everywhere, method=method).rows) == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("size", [(17, 17), (17, 400), (400, 17), (64, 48)])
+def test_uniform_views_are_empty_and_small_ones_work(method, size):
+    grey = np.full(size, 90, np.uint8)
+    found = disparity(grey, grey, method=method)
+    assert found.disparity.shape == size and np.isnan(found.disparity).all()
+    assert len(found.rows) == len(found.cols) == len(found.values) == len(found.score) == 0
+    assert found.row_offset == 0.0
+    assert stereo.estimate_row_offset(grey, grey) == 0.0
+    cells = np.random.default_rng(1).integers(0, 255, size, dtype=np.uint8)
+    assert np.isfinite(disparity(cells, cells, method=method).values).all()
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [((40, 50), (40, 51)), ((16, 50), (16, 50)), ((50, 16), (50, 16)), ((0, 0), (0, 0))],
+)
+def test_views_that_do_not_fit_are_told_with_both_shapes(left, right):
+    with pytest.raises(ValueError, match="right: ") as refused:
+        stereo.edge_disparity(np.zeros(left, np.uint8), np.zeros(right, np.uint8))
+    assert str(left) in str(refused.value) and str(right) in str(refused.value)
+    with pytest.raises(ValueError, match="right: "):
+        stereo.estimate_row_offset(np.zeros(left, np.uint8), np.zeros(right, np.uint8))
+
+
+def test_arrays_that_are_no_views_are_refused():
+    good = np.zeros((40, 40), np.uint8)
+    for bad in (np.zeros(40, np.uint8), np.zeros((2, 40, 40, 3), np.uint8), np.zeros((40, 40, 2), np.uint8)):
+        with pytest.raises(ValueError, match="left: "):
+            stereo.edge_disparity(bad, good)
+        with pytest.raises(ValueError, match="right: "):
+            stereo.edge_disparity(good, bad)
+    for bad in (np.zeros((40, 40), np.int32), np.zeros((40, 40), complex)):
+        with pytest.raises(TypeError, match="left: "):
+            stereo.edge_disparity(bad, good)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("disparity_range", (3, 2)),
+        ("disparity_range", (-4000, 4000)),
+        ("row_range", (1, 0)),
+        ("row_offset", float("nan")),
+        ("method", "magic"),
+        ("prior", np.zeros((3, 3), np.float32)),
+        ("sigma", 0.0),
+        ("threshold", -1.0),
+        ("classes", 1),
+        ("window", 16),
+        ("window", 33),
+        ("min_support", 1.5),
+        ("threads", 0),
+    ],
+)
+def test_bad_options_are_named(name, value):
+    view = np.zeros((40, 40), np.uint8)
+    with pytest.raises(ValueError, match=f"{name}: "):
+        stereo.edge_disparity(view, view, **{name: value})
+
+
+def test_the_row_offset_is_found_to_a_twentieth_of_a_row():
+    from scipy.ndimage import shift
+
+    for step in small():
+        assert stereo.estimate_row_offset(step.left, step.right, disparity_range=RANGE) == pytest.approx(1.0, abs=0.05)
+    step = small()[0]
+    moved = np.rint(np.clip(shift(step.right.astype(float), (0.4, 0), order=3, mode="nearest"), 0, 255)).astype(np.uint8)
+    assert stereo.estimate_row_offset(step.left, moved, disparity_range=RANGE) == pytest.approx(1.4, abs=0.05)
+    found = disparity(step.left, step.right, method="classes")
+    assert found.row_offset == 1.0
+    told = disparity(step.left, step.right, method="sgm", row_offset=1.0)
+    assert told.row_offset == 1.0
+
+
+def test_fractions_of_a_pixel_are_measured():
+    """Both views out of one fine texture, a fraction of a pixel apart, with another gain and bias."""
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(4)
+    fine = gaussian_filter(rng.uniform(0, 255, (14, 30)).repeat(80, 0).repeat(80, 1), 8.0)
+    for tenths in (0, 3, 5, 8):
+        left, right = fine[::10, 40:2040:10], 0.9 * fine[::10, 20 + tenths : 2020 + tenths : 10] + 12
+        found = stereo.edge_disparity(left, right, disparity_range=(-8, 8), row_offset=0.0)
+        truth = -2.0 + tenths / 10
+        coarse = stereo.edge_disparity(left, right, disparity_range=(-8, 8), row_offset=0.0, subpixel=False)
+        assert len(found.values) > 500
+        assert abs(np.median(found.values) - truth) < 0.03
+        assert np.median(np.abs(found.values - truth)) <= np.median(np.abs(coarse.values - truth)) + 0.01
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_prior_narrows_the_search(method):
+    step = small()[0]
+    right_one = disparity(step.left, step.right, method=method, row_offset=1.0, prior=step.disparity)
+    assert np.abs(right_one.values - step.disparity[right_one.rows, right_one.cols]).max() <= 3.0 + 1.5
+    free = disparity(step.left, step.right, method=method, row_offset=1.0)
+    nothing = disparity(step.left, step.right, method=method, row_offset=1.0, prior=np.full(step.left.shape, np.nan, np.float32))
+    same(free, nothing)
+    wrong = disparity(step.left, step.right, method=method, row_offset=1.0, prior=np.full(step.left.shape, 10.0, np.float32))
+    assert len(wrong.rows) < 0.5 * len(free.rows)
+    outside = disparity(step.left, step.right, method=method, row_offset=1.0, prior=np.full(step.left.shape, 99.0, np.float32))
+    assert len(outside.rows) == 0
+
+
+def test_matching_from_the_right_drops_what_is_hidden():
+    step = small()[0]
+    hidden = {}
+    for check in (True, False):
+        found = disparity(step.left, step.right, row_offset=1.0, check=check)
+        hidden[check] = int((~step.visible[found.rows, found.cols]).sum())
+    assert 0 < 2 * hidden[True] < hidden[False]
+
+
+def test_results_pickle():
+    step = small()[0]
+    found = disparity(step.left, step.right, row_offset=1.0)
+    same(found, pickle.loads(pickle.dumps(found)))
+
+
+def test_a_grey_levels_gain_of_the_right_camera_does_no_harm():
+    step = small()[0]
+    found = disparity(step.left, step.right, row_offset=1.0)
+    brighter = np.clip(step.right.astype(float) * 0.9 + 10, 0, 255)
+    again = disparity(step.left.astype(float), brighter, row_offset=1.0)
+    both = np.isfinite(found.disparity) & np.isfinite(again.disparity)
+    assert both.sum() > 0.95 * len(found.rows)
+    assert_allclose(np.median(np.abs(found.disparity - again.disparity)[both]), 0, atol=0.05)
