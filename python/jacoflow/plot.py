@@ -3,7 +3,7 @@
 Every function takes a `FlowField`, or anything with the arrays `flow` (H, W, 2) and `jacobian` (H, W, 2, 2), draws into `axes` (new ones where
 None is given) and returns them. Image coordinates: x right, y down, pixel centres at whole numbers. Unknown (NaN) values are shown in grey or black.
 
-`flow_image` and `wheel_image` need numpy only.
+`flow_image` and `wheel_image` need numpy only. `disparity`, `clusters` and `track_graph` draw what `jacoflow.stereo` and `jacoflow.track.StereoTracker` find.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jacoflow import MissingDependencyError
+from ._figures import axes_or_new, colour_map, frame_extent, pyplot_or_error
+from ._stereo_plot import clusters, disparity, track_graph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,21 +22,21 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FieldLike",
+    "clusters",
     "curl",
+    "disparity",
     "divergence",
     "flow_colour",
     "flow_image",
     "overview",
     "quiver",
     "scalar_map",
+    "track_graph",
     "wheel_image",
 ]
 
 _CORNERS = ((15, (255, 0, 0)), (6, (255, 255, 0)), (4, (0, 255, 0)), (11, (0, 255, 255)), (13, (0, 0, 255)), (6, (255, 0, 255)))
 """How many hues lie between neighbouring corners of the wheel (S. Baker et al., "A database and evaluation methodology for optical flow", 2011)."""
-_SIGNED_COLOURS = ("#163884", "#669ed6", "#f7f7f7", "#e48660", "#8c1422")
-"""Blue below zero, white at zero, red above."""
-_UNKNOWN = "#6e6e6e"
 
 
 class FieldLike(Protocol):
@@ -70,7 +71,7 @@ def wheel_image(size: int = 96) -> NDArray[np.uint8]:
 
 def flow_colour(field: FieldLike, *, axes: Axes | None = None, max_speed: float | None = None, legend: bool = True) -> Axes:
     """Draws `flow_image` of a flow (H, W, 2) in px/frame; `legend` adds the colour wheel with its full speed in the lower right corner."""
-    axes = _axes(axes)
+    axes = axes_or_new(axes)
     image = flow_image(field, max_speed=max_speed)
     axes.imshow(image, extent=_extent(field, image.shape[:2]), interpolation="nearest")
     speed = _full_speed(_flow(field), max_speed)
@@ -97,7 +98,7 @@ def quiver(
     One arrow every `step` sites (default: about 24 along the longer side); an arrow is `scale` times the flow long (default: the longest arrows just
     fit their distance). Px throughout.
     """
-    axes = _axes(axes)
+    axes = axes_or_new(axes)
     flow = np.asarray(field.flow, dtype=float)
     if flow.ndim not in (2, 3) or flow.shape[-1] != 2:
         raise ValueError(f"field: expected flow of shape (H, W, 2) or (N, 2), got {flow.shape}; index a stack first")
@@ -143,13 +144,13 @@ def scalar_map(
     values = np.asarray(values, dtype=float)
     if values.ndim != 2:
         raise ValueError(f"values: expected an array (H, W), got shape {values.shape}")
-    axes = _axes(axes)
+    axes = axes_or_new(axes)
     finite = np.abs(values[np.isfinite(values)])
     if limit is None:
         limit = float(np.percentile(finite, 98)) if finite.size else 1.0
     limit = limit if limit > 0 else 1.0
-    extent = _extent(field, values.shape) if field is not None else _frame_extent(values.shape)
-    shown = axes.imshow(values, cmap=_colour_map(signed), vmin=-limit if signed else 0.0, vmax=limit, extent=extent, interpolation="nearest")
+    extent = _extent(field, values.shape) if field is not None else frame_extent(values.shape)
+    shown = axes.imshow(values, cmap=colour_map(signed), vmin=-limit if signed else 0.0, vmax=limit, extent=extent, interpolation="nearest")
     bar = axes.get_figure(root=True).colorbar(shown, ax=axes, shrink=0.8)  # type: ignore[union-attr]
     bar.set_label(unit)
     axes.set_title(label)
@@ -173,7 +174,7 @@ def curl(field: FieldLike, *, axes: Axes | None = None, limit: float | None = No
 def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Figure | None = None) -> Figure:
     """Four panels of a field (H, W): colours, arrows over `frame` (grey array (H, W), optional), divergence and curl (1/frame). Returns the figure."""
     if figure is None:
-        pyplot = _pyplot()
+        pyplot = pyplot_or_error()
         figure = pyplot.figure(figsize=(11, 8), layout="constrained")
     panels = figure.subplots(2, 2)
     flow_colour(field, axes=panels[0, 0])
@@ -181,23 +182,6 @@ def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Fig
     divergence(field, axes=panels[1, 0])
     curl(field, axes=panels[1, 1])
     return figure
-
-
-def _pyplot() -> Any:
-    """matplotlib.pyplot, or an error that says how to get it."""
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise MissingDependencyError('plotting needs matplotlib: pip install "jacoflow[plot]"') from error
-    return pyplot
-
-
-def _axes(axes: Axes | None) -> Axes:
-    """The axes given, or those of a new figure."""
-    if axes is not None:
-        return axes
-    new: Axes = _pyplot().subplots(layout="constrained")[1]
-    return new
 
 
 def _flow(field: FieldLike) -> NDArray[np.float64]:
@@ -271,24 +255,11 @@ def _spacing(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     return float(np.sqrt(area / len(x)))
 
 
-def _frame_extent(shape: tuple[int, ...]) -> tuple[float, float, float, float]:
-    return (-0.5, shape[1] - 0.5, shape[0] - 0.5, -0.5)
-
-
 def _extent(field: FieldLike, shape: tuple[int, ...]) -> tuple[float, float, float, float]:
     """Left, right, bottom, top of an image of the sites, px."""
     x, y = _positions(field, shape)
     if x.size == 0:
-        return _frame_extent(shape)
+        return frame_extent(shape)
     dx = (x[0, -1] - x[0, 0]) / max(shape[1] - 1, 1) or 1.0
     dy = (y[-1, 0] - y[0, 0]) / max(shape[0] - 1, 1) or 1.0
     return (x[0, 0] - dx / 2, x[0, -1] + dx / 2, y[-1, 0] + dy / 2, y[0, 0] - dy / 2)
-
-
-def _colour_map(signed: bool) -> Any:
-    """Blue, white, red for signed values, dark to bright for others; unknown values in grey."""
-    pyplot = _pyplot()
-    from matplotlib.colors import LinearSegmentedColormap
-
-    base = LinearSegmentedColormap.from_list("signed", list(_SIGNED_COLOURS)) if signed else pyplot.get_cmap("viridis")
-    return base.with_extremes(bad=_UNKNOWN)
