@@ -25,7 +25,14 @@ fn points(dimensions: usize) -> Vec<f64> {
 fn options(max_iter: usize) -> MixtureOptions {
     let threads = Threads::new(Some(1)).expect("one thread");
     let covariance_prior = CovariancePrior::Isotropic(0.1);
-    MixtureOptions { components: COMPONENTS, covariance_prior, tol: None, max_iter, threads, ..MixtureOptions::default() }
+    MixtureOptions {
+        components: COMPONENTS,
+        covariance_prior,
+        tol: None,
+        max_iter,
+        threads,
+        ..MixtureOptions::default()
+    }
 }
 
 fn rounds(c: &mut Criterion) {
