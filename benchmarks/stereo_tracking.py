@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stereo_scenes
-from jacoflow.track import StereoTracker
+from jacoflow.track import StereoCluster, StereoTracker
 from stereo_tracking_scores import Clustering, Graph, Node, Scores, Truth, gross
 
 Row = dict[str, object]
@@ -45,10 +45,16 @@ def follow(scene: stereo_scenes.Scene, film: Sequence[stereo_scenes.Step], track
         step = tracker.update(shown.left, shown.right) if disparity is None else tracker.update_disparity(shown.left, disparity)
         times.append(time.perf_counter() - begun)
         clusterings.append(Clustering(step.rows, step.cols, step.cluster_of_pixel))
-    nodes = {key: Node(c.track_id, None if np.isnan(c.next_velocity).any() else tuple(c.next_velocity)) for key, c in tracker.graph.nodes.items()}
+    nodes = {key: node_of(cluster) for key, cluster in tracker.graph.nodes.items()}
     arcs = {(t, start, end): sum(shares) for ((t, start), (_, end)), shares in tracker.graph.arcs.items()}
     truths = [Truth(shown.label, shown.motion) for shown in film]
     return Scores(truths, clusterings, Graph(nodes, arcs)), float(np.median(times))
+
+
+def node_of(cluster: StereoCluster) -> Node:
+    """What the scores need of a cluster."""
+    known = [None if np.isnan(value).any() else value for value in (cluster.next_velocity, cluster.next_affine)]
+    return Node(cluster.track_id, *known, cluster.middle)
 
 
 def edges_of_truth(shown: stereo_scenes.Step, rng: np.random.Generator) -> NDArray[np.float32]:

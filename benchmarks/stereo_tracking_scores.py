@@ -48,8 +48,22 @@ class Node:
     """A cluster of the graph."""
 
     track_id: int
-    velocity: tuple[float, float, float] | None
-    """To the next step."""
+    velocity: Array | None
+    """(u, v, w) to the next step, px and disparity; None: not measured."""
+    affine: Array | None = None
+    """(u, v, u_x, v_x, u_y, v_y) to the next step at `middle`."""
+    middle: Array | None = None
+    """(x, y), px."""
+
+    def motion(self, x: Integers, y: Integers) -> Array:
+        """What it says of pixels (x, y): (N, 3), px and disparity."""
+        assert self.velocity is not None
+        motions = np.tile(np.asarray(self.velocity, float), (len(x), 1))
+        if self.affine is not None and self.middle is not None:
+            u, v, u_x, v_x, u_y, v_y = self.affine
+            dx, dy = x - self.middle[0], y - self.middle[1]
+            motions[:, 0], motions[:, 1] = u + u_x * dx + u_y * dy, v + v_x * dx + v_y * dy
+        return motions
 
 
 @dataclass(frozen=True)
@@ -62,11 +76,13 @@ class Graph:
 
 @dataclass(frozen=True)
 class Cluster:
-    """A cluster seen with the truth: its majority label, that label's share, how many pixels, the true motion of those of the label."""
+    """A cluster seen with the truth: its majority label, that label's share, how many pixels, the label's pixels among them and their true motion."""
 
     label: int
     purity: float
     pixels: int
+    rows: Integers
+    columns: Integers
     motion: Array
 
 
@@ -79,8 +95,10 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
         mine = clustering.component == component
         values, counts = np.unique(labels[mine], return_counts=True)
         major = values[np.argmax(counts)]
-        motion = np.median(motions[mine & (labels == major)], axis=0)
-        out[int(component)] = Cluster(int(major), float(counts.max() / counts.sum()), int(mine.sum()), motion)
+        right = mine & (labels == major)
+        motion = np.median(motions[right], axis=0)
+        share = float(counts.max() / counts.sum())
+        out[int(component)] = Cluster(int(major), share, int(mine.sum()), clustering.rows[right], clustering.columns[right], motion)
     return out
 
 
@@ -174,13 +192,14 @@ class Scores:
         return bool(before & after)
 
     def motion_errors(self) -> dict[int, Array]:
-        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority."""
+        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority: both are medians over the label's pixels."""
         errors = defaultdict(list)
         for time, clusters in enumerate(self.told[:-1]):
             for component, cluster in clusters.items():
-                velocity = self.graph.nodes[time, component].velocity
-                if cluster.purity >= PURE and velocity is not None:
-                    errors[cluster.label].append(np.abs(np.array(velocity) - cluster.motion))
+                node = self.graph.nodes[time, component]
+                if cluster.purity >= PURE and node.velocity is not None:
+                    said = np.median(node.motion(cluster.columns, cluster.rows), axis=0)
+                    errors[cluster.label].append(np.abs(said - cluster.motion))
         return {label: np.array(values) for label, values in errors.items()}
 
 

@@ -42,8 +42,12 @@ class StereoCluster:
     """Motion (u, v, w) since the last step, (3,), px/step and disparity/step."""
     next_velocity: Array
     """Motion (u, v, w) to the next step, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    middle: Array
+    """Medians of its pixels along x and y, (2,), px."""
     affine: Array
-    """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at the middle of the pixels, (6,), px/step and 1/step ("improved")."""
+    """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at `middle`, (6,), px/step and 1/step ("improved")."""
+    next_affine: Array
+    """Motion in the picture to the next step, in the same way, (6,), px/step and 1/step; known in the graph one step later."""
     residual: float
     """Truncated mean absolute difference of brightness that the motion leaves, in grey levels of 8 bits; one such level is the unit."""
     coasting: bool

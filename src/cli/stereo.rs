@@ -169,7 +169,9 @@ impl StereoCommand {
         }
         match DisparityFormat::of(output) {
             Some(format) if listed.iter().all(|other| *other == format) => Ok(vec![format]),
-            Some(_) => Err(Error::argument("output", "a folder for other formats than the file's name says", output.display())),
+            Some(_) => {
+                Err(Error::argument("output", "a folder for other formats than the file's name says", output.display()))
+            }
             None => Err(Error::argument("output", "a folder, or a .npz, .pfm or .png file", output.display())),
         }
     }
@@ -326,7 +328,11 @@ fn cut<T: Copy>(frame: &Frame<T>, layout: Layout) -> Result<[Frame<T>; 2]> {
     let beside = layout == Layout::SideBySide;
     let divided = if beside { width } else { height };
     if !divided.is_multiple_of(2) {
-        return Err(Error::argument("layout", "frames of an even width (side-by-side) or height (top-bottom)", divided));
+        return Err(Error::argument(
+            "layout",
+            "frames of an even width (side-by-side) or height (top-bottom)",
+            divided,
+        ));
     }
     let (w, h) = if beside { (width / 2, height) } else { (width, height / 2) };
     let (dx, dy) = if beside { (w, 0) } else { (0, h) };
@@ -335,7 +341,8 @@ fn cut<T: Copy>(frame: &Frame<T>, layout: Layout) -> Result<[Frame<T>; 2]> {
 
 fn parse_range(text: &str) -> std::result::Result<(i32, i32), String> {
     let ends = text.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
-    ends.filter(|(least, greatest)| least <= greatest).ok_or_else(|| "expected LEAST,GREATEST, two whole numbers".into())
+    ends.filter(|(least, greatest)| least <= greatest)
+        .ok_or_else(|| "expected LEAST,GREATEST, two whole numbers".into())
 }
 
 #[cfg(test)]

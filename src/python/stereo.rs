@@ -103,8 +103,7 @@ pub fn estimate_row_offset(
     min_support: f64,
     threads: Option<usize>,
 ) -> PyResult<f64> {
-    let options =
-        options("sgm", disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
+    let options = options("sgm", disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
     let py = left.py();
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
     Ok(py.detach(|| stereo::estimate_row_offset(&left, &right, &options))?)

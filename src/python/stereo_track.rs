@@ -87,9 +87,10 @@ impl Given {
         options.row_range = self.row_range;
         options.row_offset = self.row_offset;
         if let Some(matching) = self.matching {
-            options.matching = Method::ALL.into_iter().find(|method| method.name() == matching).ok_or_else(|| {
-                Error::argument("matching", "\"classes\" or \"sgm\"", format!("{matching:?}"))
-            })?;
+            options.matching = Method::ALL
+                .into_iter()
+                .find(|method| method.name() == matching)
+                .ok_or_else(|| Error::argument("matching", "\"classes\" or \"sgm\"", format!("{matching:?}")))?;
         }
         options.components = self.n_components.unwrap_or(options.components);
         options.weight_concentration_prior = self.weight_concentration_prior;
@@ -117,15 +118,17 @@ impl Given {
             ..Recognition::default()
         });
         let (reach, motion, depth_motion) = self.group_limits;
-        options.grouping = self
-            .grouping
-            .unwrap_or(options.grouping.is_some())
-            .then_some(Grouping { reach, motion, depth_motion });
+        options.grouping =
+            self.grouping.unwrap_or(options.grouping.is_some()).then_some(Grouping { reach, motion, depth_motion });
         options.camera = match (self.focal, self.baseline) {
             (Some(focal), Some(baseline)) => Some(StereoCamera { focal, baseline, d_infinity: self.d_infinity }),
             (None, None) => None,
-            (None, Some(_)) => return Err(Error::argument("focal", "a length in px beside the baseline", "None").into()),
-            (Some(_), None) => return Err(Error::argument("baseline", "a length beside the focal length", "None").into()),
+            (None, Some(_)) => {
+                return Err(Error::argument("focal", "a length in px beside the baseline", "None").into());
+            }
+            (Some(_), None) => {
+                return Err(Error::argument("baseline", "a length beside the focal length", "None").into());
+            }
         };
         options.threads = Threads::new(self.threads)?;
         Ok(options)
@@ -249,7 +252,9 @@ fn cluster<'py>(py: Python<'py>, node: &Node) -> PyResult<Bound<'py, PyDict>> {
     out.set_item("covariance", arrays::owned::<f64>(py, &[3, 3], covariance)?)?;
     out.set_item("velocity", numbers(py, node.velocity)?)?;
     out.set_item("next_velocity", numbers(py, node.next_velocity)?)?;
+    out.set_item("middle", numbers(py, Some(node.middle))?)?;
     out.set_item("affine", numbers(py, node.affine)?)?;
+    out.set_item("next_affine", numbers(py, node.next_affine)?)?;
     out.set_item("residual", node.residual.unwrap_or(f64::NAN))?;
     out.set_item("coasting", node.coasting)?;
     out.set_item("depth", node.depth.unwrap_or(f64::NAN))?;

@@ -148,11 +148,19 @@ fn begin_path(cost: &[u16], path: &mut [u16], sum: &mut [u16]) -> u16 {
 
 /// `L_r` from that of the pixel behind, whose least value is `least`; returns the least.
 #[inline(always)]
-fn continue_path(before: &[u16], least: u16, [near, far]: [u16; 2], cost: &[u16], path: &mut [u16], sum: &mut [u16]) -> u16 {
+fn continue_path(
+    before: &[u16],
+    least: u16,
+    [near, far]: [u16; 2],
+    cost: &[u16],
+    path: &mut [u16],
+    sum: &mut [u16],
+) -> u16 {
     let jump = least + far;
     let mut lowest = [WALL; CHUNK];
     for k in (0..cost.len()).step_by(CHUNK) {
-        let (same, below, above) = (chunk(before, k + CHUNK), chunk(before, k + CHUNK - 1), chunk(before, k + CHUNK + 1));
+        let (same, below, above) =
+            (chunk(before, k + CHUNK), chunk(before, k + CHUNK - 1), chunk(before, k + CHUNK + 1));
         let (cost, path, sum) = (chunk(cost, k), chunk_mut(path, k + CHUNK), chunk_mut(sum, k));
         for i in 0..CHUNK {
             let beside = below[i].min(above[i]).saturating_add(near);

@@ -76,7 +76,13 @@ impl Sample {
 }
 
 /// The offset after Lucas-Kanade steps along y; none without enough matches, or when they leave the neighbourhood of the start.
-fn vertical_steps(left: &Frame<f32>, view: &View, right: &Frame<f32>, matches: &[Option<Match>], start: f64) -> Option<f64> {
+fn vertical_steps(
+    left: &Frame<f32>,
+    view: &View,
+    right: &Frame<f32>,
+    matches: &[Option<Match>],
+    start: f64,
+) -> Option<f64> {
     let mut samples = Vec::new();
     for ((&row, &column), found) in view.edges.rows.iter().zip(&view.edges.columns).zip(matches) {
         let Some(found) = found else { continue };

@@ -86,7 +86,8 @@ impl Task<'_> {
                 for i in 0..8 {
                     parts[i] = slopes[j][i] * row[i] + slopes[j][i + 8] * row[i + 8];
                 }
-                *place += (parts[0] + parts[4]) + (parts[1] + parts[5]) + ((parts[2] + parts[6]) + (parts[3] + parts[7]));
+                *place +=
+                    (parts[0] + parts[4]) + (parts[1] + parts[5]) + ((parts[2] + parts[6]) + (parts[3] + parts[7]));
             }
         }
         let from = start - base;

@@ -68,7 +68,9 @@ impl CellLuminance {
     pub fn find(&self, template: &[[u16; 2]], next: &Self, window: Window) -> Option<Match> {
         let cells: Vec<(i32, i32, i32)> = template
             .iter()
-            .filter_map(|&[x, y]| self.level(i32::from(x), i32::from(y)).map(|level| (i32::from(x), i32::from(y), level)))
+            .filter_map(|&[x, y]| {
+                self.level(i32::from(x), i32::from(y)).map(|level| (i32::from(x), i32::from(y), level))
+            })
             .collect();
         let mut best: Option<Match> = None;
         let length = |[x, y]: [i32; 2]| x * x + y * y;

@@ -27,8 +27,12 @@ pub struct Node {
     pub velocity: Option<[f64; 3]>,
     /// Motion `(u, v, w)` to the next step, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
-    /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle of the pixels (medians along x and y).
+    /// Medians of its pixels along x and y, px.
+    pub middle: [f64; 2],
+    /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle.
     pub affine: Option<[f64; 6]>,
+    /// Motion in the picture to the next step, in the same way, as soon as that is known.
+    pub next_affine: Option<[f64; 6]>,
     /// Truncated mean absolute difference of brightness that this motion leaves, grey levels.
     pub residual: Option<f64>,
     /// Whether the motion is an extrapolation.
@@ -212,7 +216,9 @@ mod tests {
             covariance: [[1.0, 0.0, 0.1], [0.0, 1.0, 0.0], [0.1, 0.0, 1.0]],
             velocity: None,
             next_velocity: Some([0.1, -0.2, 0.3]),
+            middle: [5.5, 7.0],
             affine: None,
+            next_affine: Some([0.0, 0.5, 1.0 / 7.0, 0.0, 0.0, 0.0]),
             residual: Some(1e-300),
             coasting: false,
             depth: None,

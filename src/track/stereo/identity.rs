@@ -12,9 +12,26 @@ pub(super) struct Identity {
     pub steady: usize,
     /// Steps coasted in a row.
     pub coasted: usize,
-    /// Mean at the last step, cells.
+    /// Where it is, cells: its mean, or where it went since while it is mostly covered, which shifts the mean.
     pub position: [f64; 3],
+    /// Most edge pixels of late.
+    pub peak: f64,
 }
+
+/// A component that is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sighting {
+    pub component: usize,
+    /// Mean, cells.
+    pub position: [f64; 3],
+    /// Edge pixels.
+    pub pixels: usize,
+}
+
+/// Share of the most pixels of late below which a track counts as mostly covered.
+const COVERED: f64 = 0.5;
+/// What the memory of that loses each step.
+const FORGET: f64 = 0.9;
 
 /// What a component does from one step to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,22 +106,27 @@ impl Identities {
     /// Takes the tracks of the components for which `lost` holds, to be waited for.
     pub fn rest(&mut self, time: usize, lost: impl Fn(usize) -> bool) {
         for k in 0..self.live.len() {
-            if lost(k) && let Some(identity) = self.live[k].take() {
-                self.resting.push(Resting { identity, since: time });
+            if lost(k)
+                && let Some(identity) = self.live[k].take()
+            {
+                // Who never moved steadily is not known well enough to be recognised.
+                if identity.steady > 0 {
+                    self.resting.push(Resting { identity, since: time });
+                }
             }
         }
     }
 
-    /// Gives every component of `seen`, `(component, mean in cells)`, that has no track one: a lost track that is expected there, the nearest first, or a new one.
+    /// Gives every component that is seen and has no track one: a lost track that is expected there, the nearest first, if there are at least `least` pixels, or a new one.
     /// Then all are where they were seen. Tracks lost since the step before are not given back.
-    pub fn name_all(&mut self, time: usize, seen: &[(usize, [f64; 3])], limits: Option<&Recognition>) {
+    pub fn name_all(&mut self, time: usize, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
         if let Some(limits) = limits {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
-                for &(k, position) in seen.iter().filter(|(k, _)| self.live[*k].is_none()) {
-                    if let Some(distance) = resting.distance(time, position, limits) {
-                        pairs.push((distance, r, k));
+                for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
+                    if let Some(distance) = resting.distance(time, new.position, limits) {
+                        pairs.push((distance, r, new.component));
                     }
                 }
             }
@@ -113,21 +135,32 @@ impl Identities {
             for (_, r, k) in pairs {
                 if !taken[r] && self.live[k].is_none() {
                     taken[r] = true;
-                    self.live[k] = Some(Identity { coasted: 0, ..self.resting[r].identity.clone() });
+                    self.live[k] = Some(Identity { coasted: 0, peak: 0.0, ..self.resting[r].identity.clone() });
                 }
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
         }
-        for &(k, position) in seen {
-            if self.live[k].is_none() {
+        for &Sighting { component, position, pixels } in seen {
+            if self.live[component].is_none() {
                 let id = self.name();
-                self.live[k] = Some(Identity { id, velocity: None, steady: 0, coasted: 0, position });
+                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0 };
+                self.live[component] = Some(unknown);
             }
-            if let Some(identity) = &mut self.live[k] {
-                identity.position = position;
+            if let Some(identity) = &mut self.live[component] {
+                identity.see(position, pixels as f64);
             }
         }
+    }
+}
+
+impl Identity {
+    fn see(&mut self, position: [f64; 3], pixels: f64) {
+        self.peak = pixels.max(FORGET * self.peak);
+        self.position = match self.velocity {
+            Some(velocity) if pixels < COVERED * self.peak => std::array::from_fn(|i| self.position[i] + velocity[i]),
+            _ => position,
+        };
     }
 }
 
@@ -159,9 +192,15 @@ mod tests {
 
     const CELL: [f64; 3] = [8.0, 8.0, 1.0];
 
+    const LEAST: f64 = 20.0;
+
+    fn at(component: usize, position: [f64; 3]) -> Sighting {
+        Sighting { component, position, pixels: 100 }
+    }
+
     fn identities() -> Identities {
         let mut all = Identities { live: vec![None; 3], ..Identities::default() };
-        all.name_all(0, &[(0, [10.0, 10.0, 30.0]), (1, [40.0, 10.0, 20.0])], Some(&Recognition::default()));
+        all.name_all(0, &[at(0, [10.0, 10.0, 30.0]), at(1, [40.0, 10.0, 20.0])], LEAST, Some(&Recognition::default()));
         all
     }
 
@@ -170,17 +209,20 @@ mod tests {
         let limits = Recognition::default();
         let mut all = identities();
         all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
-        all.name_all(1, &[(0, [12.0, 10.0, 30.5])], Some(&limits));
+        all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
+        all.name_all(1, &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
         // Gone at steps 2 to 4.
         all.rest(1, |k| k == 0);
         for time in 2..5 {
-            all.name_all(time, &[(1, [40.0, 10.0, 20.0])], Some(&limits));
-            assert_eq!(all.live[0], None);
+            all.name_all(time, &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
+            assert_eq!(all.live[0], LEAST, None);
         }
-        let mut elsewhere = all.clone();
-        all.name_all(5, &[(2, [20.5, 11.0, 32.6])], Some(&limits));
+        let (mut elsewhere, mut small) = (all.clone(), all.clone());
+        small.name_all(5, &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
+        assert_eq!(small.live[2].as_ref().unwrap().id, 2);
+        all.name_all(5, &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, 0);
-        elsewhere.name_all(5, &[(2, [29.0, 11.0, 32.6])], Some(&limits));
+        elsewhere.name_all(5, &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
         assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
     }
 
@@ -189,11 +231,11 @@ mod tests {
         let limits = Recognition::default();
         let mut all = identities();
         all.rest(0, |k| k == 1);
-        all.name_all(3, &[(2, [40.0, 10.0, 20.0])], Some(&limits));
+        all.name_all(3, &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, 2);
         all.carry(0, Some([0.0; 3]), CELL, Some(&limits)).unwrap();
         all.rest(3, |k| k == 0);
-        all.name_all(14, &[(1, [10.0, 10.0, 30.0])], Some(&limits));
+        all.name_all(14, &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
         assert_eq!(all.live[1].as_ref().unwrap().id, 3);
     }
 
@@ -213,12 +255,23 @@ mod tests {
     }
 
     #[test]
+    fn what_is_mostly_covered_goes_on_where_it_went() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits)).unwrap();
+        all.name_all(1, &[Sighting { pixels: 60, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
+        assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
+        all.name_all(2, &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
+        assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);
+    }
+
+    #[test]
     fn without_recognition_what_is_measured_counts() {
         let mut all = identities();
         all.carry(0, Some([1.0; 3]), CELL, None);
         assert_eq!(all.carry(0, None, CELL, None), None);
         all.rest(1, |k| k == 0);
-        all.name_all(4, &[(0, [13.0, 13.0, 33.0])], None);
+        all.name_all(4, &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
         assert_eq!(all.live[0].as_ref().unwrap().id, 2);
     }
 }

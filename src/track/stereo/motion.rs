@@ -74,6 +74,13 @@ impl FineMotion {
         [x, y, d + self.depth]
     }
 
+    /// The motion as `(u, v, u_x, v_x, u_y, v_y)` at a place of the next step.
+    pub fn affine_after(&self, [x, y]: [f64; 2]) -> [f64; 6] {
+        let PlaneMotion { flow, centre, .. } = self.plane;
+        let (u, v) = flow.at_offset(x - flow.u - centre[0], y - flow.v - centre[1]);
+        AffineFlow { u, v, ..flow }.to_array()
+    }
+
     /// Where a point `(x, y, d)` of the next step came from, to first order in the derivatives of the flow.
     pub fn moved_back(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
         let flow = self.plane.flow;
@@ -113,6 +120,10 @@ pub(super) fn fine_motions(
     let one = |k: usize| {
         let clusters = &from.clusters;
         let pixels = places(clusters, k);
+        // So few say nothing sure, and are seeded anew.
+        if (pixels.len() as f64) < options.reseed_below {
+            return None;
+        }
         let starts = starts(from, next.luminance, k, last[k], options);
         let plane = affine_motion(levels?, next.levels, &pixels, &starts)?;
         let mut changes: Vec<f64> = clusters.pixels[k]

@@ -4,7 +4,7 @@ use super::cell_luminance::CellLuminance;
 use super::clusters::Clusters;
 use super::graph::{Arc, Node, TrackGraph};
 use super::grouping::{GroupMotion, groups};
-use super::identity::{Carried, Identities};
+use super::identity::{Carried, Identities, Sighting};
 use super::lucas_kanade::{SmoothedLevels, middle};
 use super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places};
 use super::options::{StereoMode, StereoTrackerOptions};
@@ -49,6 +49,14 @@ struct Arrival {
     affine: Option<[f64; 6]>,
     residual: Option<f64>,
     coasting: bool,
+}
+
+/// How a cluster of the last step goes on.
+#[derive(Clone, Copy)]
+struct Departure {
+    /// Motion to this step, px and disparity.
+    velocity: [f64; 3],
+    affine: Option<[f64; 6]>,
 }
 
 impl Arrival {
@@ -181,11 +189,10 @@ impl StereoTracker {
         let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels, None)?;
         let seen = Seen { clusters, luminance, levels: None };
         let cell = seen.clusters.lattice().cell();
-        let velocity = |motion: &CellMotion, sign: f64| std::array::from_fn(|i| sign * f64::from(motion.shift[i]) * cell[i]);
+        let velocity =
+            |motion: &CellMotion, sign: f64| std::array::from_fn(|i| sign * f64::from(motion.shift[i]) * cell[i]);
         let (forward, backward) = match &self.last {
-            Some(last) => {
-                (cell_motions(last, &seen, &self.options), cell_motions(&seen, last, &self.options))
-            }
+            Some(last) => (cell_motions(last, &seen, &self.options), cell_motions(&seen, last, &self.options)),
             None => (vec![], vec![]),
         };
         let level = 256.0 / self.options.luminance_levels as f64;
@@ -201,7 +208,10 @@ impl StereoTracker {
         let rows = |motions: Vec<Option<CellMotion>>| -> Vec<Row> {
             motions.into_iter().map(|motion| motion.map_or_else(Vec::new, |motion| motion.overlaps)).collect()
         };
-        let departures: Vec<_> = forward.iter().map(|m| m.as_ref().map(|m| velocity(m, 1.0))).collect();
+        let departures: Vec<_> = forward
+            .iter()
+            .map(|motion| motion.as_ref().map(|motion| Departure { velocity: velocity(motion, 1.0), affine: None }))
+            .collect();
         let arcs = arcs(self.time, &rows(forward), &rows(backward));
         self.name_by_arcs(&seen.clusters, &arcs);
         let grouped: Vec<usize> = (0..seen.clusters.components()).collect();
@@ -243,7 +253,7 @@ impl StereoTracker {
             .map(|k| match own(k) {
                 Some((motion, Carried { coasting, .. })) => Arrival {
                     velocity: Some(motion.velocity()),
-                    affine: Some(motion.plane.flow.to_array()),
+                    affine: Some(motion.affine_after(middle(&places(&clusters, k)))),
                     residual: Some(motion.plane.residual).filter(|residual| residual.is_finite()),
                     coasting,
                 },
@@ -270,7 +280,15 @@ impl StereoTracker {
             None => (0..components).collect(),
         };
         let step = self.record(&clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
-        let departures: Vec<_> = motions.iter().map(|motion| motion.map(|(motion, _)| motion.velocity())).collect();
+        let departures: Vec<_> = motions
+            .iter()
+            .map(|motion| {
+                motion.map(|(motion, _)| Departure {
+                    velocity: motion.velocity(),
+                    affine: Some(motion.plane.flow.to_array()),
+                })
+            })
+            .collect();
         let arcs = arcs(self.time, &forward, &backward);
         self.connect(&departures, arcs)?;
         Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
@@ -373,8 +391,8 @@ impl StereoTracker {
             }
         }
         self.identities.live = live;
-        let seen: Vec<_> = (0..components).filter(|&k| !clusters.pixels[k].is_empty()).map(|k| (k, [0.0; 3])).collect();
-        self.identities.name_all(self.time, &seen, None);
+        let seen = sightings(clusters, |_| [0.0; 3]);
+        self.identities.name_all(self.time, &seen, 0.0, None);
     }
 
     /// Tracks of the improved mode: a component is its track, as long as it covers its moved self.
@@ -394,11 +412,8 @@ impl StereoTracker {
         self.identities.rest(self.time.saturating_sub(1), lost);
         self.identities.live.resize(clusters.components(), None);
         let Some(posterior) = posterior else { return };
-        let seen: Vec<(usize, [f64; 3])> = (0..clusters.components())
-            .filter(|&k| !clusters.pixels[k].is_empty())
-            .map(|k| (k, std::array::from_fn(|i| posterior.means[3 * k + i])))
-            .collect();
-        self.identities.name_all(self.time, &seen, limits);
+        let seen = sightings(clusters, |k| std::array::from_fn(|i| posterior.means[3 * k + i]));
+        self.identities.name_all(self.time, &seen, self.options.reseed_below, limits);
     }
 
     /// Puts the clusters into the graph and the tracks, and tells of them.
@@ -433,7 +448,9 @@ impl StereoTracker {
                 covariance: covariance(posterior, k, lattice.cell()),
                 velocity: arrival.velocity,
                 next_velocity: None,
+                middle: middle(&places(clusters, k)),
                 affine: arrival.affine,
+                next_affine: None,
                 residual: arrival.residual,
                 coasting: arrival.coasting,
                 depth,
@@ -477,16 +494,23 @@ impl StereoTracker {
     }
 
     /// Puts arcs between the last step and this one into the graph, and tells the last one's clusters where they went.
-    fn connect(&mut self, departures: &[Option<[f64; 3]>], arcs: Vec<Arc>) -> Result<()> {
+    fn connect(&mut self, departures: &[Option<Departure>], arcs: Vec<Arc>) -> Result<()> {
         if let Some(before) = self.time.checked_sub(1) {
             for (k, &departure) in departures.iter().enumerate() {
                 if let Some(node) = self.graph.node_mut(before, k) {
-                    node.next_velocity = departure;
+                    node.next_velocity = departure.map(|departure| departure.velocity);
+                    node.next_affine = departure.and_then(|departure| departure.affine);
                 }
             }
         }
         arcs.into_iter().try_for_each(|arc| self.graph.connect(arc))
     }
+}
+
+/// All components that have edge pixels.
+fn sightings(clusters: &Clusters, position: impl Fn(usize) -> [f64; 3]) -> Vec<Sighting> {
+    let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
+    pixels.map(|(component, pixels)| Sighting { component, position: position(component), pixels }).collect()
 }
 
 /// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where it has none, that of the cluster which covers it most.

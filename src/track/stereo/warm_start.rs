@@ -128,7 +128,8 @@ mod tests {
     fn who_has_no_pixels_goes_where_the_others_explain_least() {
         let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
         // A block that the first explains, one that nobody does, and a single outlier farther off.
-        let cells: Vec<_> = block([10, 10, 30], 90).chain(block([40, 20, 20], 45)).chain(block([5, 50, 60], 1)).collect();
+        let cells: Vec<_> =
+            block([10, 10, 30], 90).chain(block([40, 20, 20], 45)).chain(block([5, 50, 60], 1)).collect();
         let voxels = made_up(&cells, 1).voxels;
         let (values, weights) = (voxels.centres(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };

@@ -1,0 +1,212 @@
+"""The stereo tracker: scenes whose answer is known, edge cases, the graph there and back."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from jacoflow.track import StereoTracker, TrackGraph
+
+SMALL = {"disparity_range": (-8, 8), "grid": (30, 40, None), "row_offset": 0.0}
+
+
+def cells(seed=1, rows=15, columns=26):
+    """Blocks of 8 px, each of one grey level, a little blurred."""
+    blocks = np.random.default_rng(seed).integers(10, 240, (rows, columns)).repeat(8, 0).repeat(8, 1).astype(float)
+    return (blocks + np.roll(blocks, 1, 0) + np.roll(blocks, 1, 1) + np.roll(blocks, (1, 1), (0, 1))) / 4
+
+
+def film(steps=5):
+    """A wall that moves 2 px/step to the right at disparity -4, before it a board that moves 3 px/step to the left at disparity 5: left and right views."""
+    wall, board = cells(), cells(2)[:48, :56]
+    for t in range(steps):
+        left, right = (wall[:, 24 - 2 * t + shift : 184 - 2 * t + shift].copy() for shift in (0, -4))
+        x = 80 - 3 * t
+        left[36:84, x : x + 56] = board
+        right[36:84, x - 5 : x + 51] = board
+        yield np.rint(left).astype(np.uint8), np.rint(right).astype(np.uint8)
+
+
+def followed(mode="improved", **options):
+    """A tracker after the film, and its last step."""
+    tracker = StereoTracker(mode, n_components=6, **{**SMALL, **options})
+    for left, right in film():
+        step = tracker.update(left, right)
+    return tracker, step
+
+
+def biggest(step, disparity):
+    """The largest cluster near a disparity."""
+    return max((c for c in step.clusters if abs(c.mean[2] - disparity) < 1.5), key=lambda c: c.n_pixels)
+
+
+def test_two_things_that_move_are_two_tracks_with_their_motions():
+    tracker, step = followed()
+    wall, board = biggest(step, -4), biggest(step, 5)
+    assert np.allclose(wall.velocity, [2, 0, 0], atol=0.1)
+    assert np.allclose(board.velocity, [-3, 0, 0], atol=0.1)
+    assert np.allclose(board.affine[:2], [-3, 0], atol=0.1)
+    assert np.isnan(board.next_velocity).all()
+    assert wall.group != board.group and wall.track_id != board.track_id
+    assert tracker.tracks[board.track_id].times.tolist() == [0, 1, 2, 3, 4]
+    assert np.isnan(tracker.tracks[board.track_id].velocities[0]).all()
+
+
+def test_every_edge_pixel_has_its_cluster():
+    _, step = followed()
+    assert len(step.rows) == len(step.cols) == len(step.values) == len(step.cluster_of_pixel) > 500
+    counts = np.bincount(step.cluster_of_pixel, minlength=6)
+    assert {c.index: c.n_pixels for c in step.clusters} == {k: n for k, n in enumerate(counts) if n}
+    near = step.cluster_of_pixel == biggest(step, 5).index
+    assert np.abs(step.values[near] - 5).max() < 3
+
+
+def test_the_papers_mode_moves_by_whole_cells():
+    tracker, step = followed("paper")
+    board = biggest(step, 5)
+    assert (np.mod(board.velocity[:2], 4) == 0).all() and np.isnan(board.affine).all()
+    assert not any(cluster.coasting for cluster in step.clusters)
+    assert len(tracker.graph.nodes) > 5
+
+
+def test_tracks_of_the_graph_reach_from_end_to_end():
+    tracker, step = followed()
+    graph, last = tracker.graph, biggest(step, 5).index
+    back = graph.follow(4, last, backward=True)
+    assert (4, last) in back and min(t for t, _ in back) == 0
+    first = min(back)
+    assert (4, last) in graph.follow(*first)
+    assert graph.follow(4, last, threshold=2.5, backward=True) == [(4, last)]
+    assert all(0 <= forward <= 1 and 0 <= backward <= 1 for forward, backward in graph.arcs.values())
+    assert np.allclose(graph.nodes[first].next_velocity, [-3, 0, 0], atol=0.1)
+
+
+def test_a_graph_comes_back_from_json_and_pickle():
+    graph = followed()[0].graph
+    assert TrackGraph.from_json(graph.to_json()) == graph == pickle.loads(pickle.dumps(graph))
+    assert TrackGraph() != graph and TrackGraph().nodes == {}
+    with pytest.raises(ValueError, match="json"):
+        TrackGraph.from_json("[]")
+    for node in [(9, 0), (-1, 0)]:
+        with pytest.raises(ValueError, match="node"):
+            graph.follow(*node)
+
+
+def test_networkx_has_nodes_arcs_and_attributes():
+    networkx = pytest.importorskip("networkx")
+    graph = followed()[0].graph
+    drawn = graph.to_networkx()
+    assert isinstance(drawn, networkx.DiGraph)
+    assert set(drawn.nodes) == set(graph.nodes) and set(drawn.edges) == set(graph.arcs)
+    for edge in drawn.edges.values():
+        assert edge["score"] == pytest.approx(edge["forward"] + edge["backward"])
+    assert next(iter(drawn.nodes.values()))["mean"].shape == (3,)
+
+
+def test_known_cameras_give_depth_and_speed():
+    _, step = followed(focal=200.0, baseline=0.1, d_infinity=-10.0)
+    board = biggest(step, 5)
+    assert board.depth == pytest.approx(20 / (board.mean[2] + 10))
+    assert board.metric_velocity[0] == pytest.approx(-3 * board.depth / 200, rel=0.1)
+    assert np.isnan(biggest(followed()[1], 5).depth)
+    with pytest.raises(ValueError, match="baseline"):
+        StereoTracker(focal=100.0)
+    with pytest.raises(ValueError, match="focal"):
+        StereoTracker(focal=-1.0, baseline=1.0)
+
+
+@pytest.mark.parametrize("mode", ["improved", "paper"])
+def test_nothing_to_see_is_a_step_without_clusters(mode):
+    tracker = StereoTracker(mode, n_components=6, **SMALL)
+    views = list(film())
+    grey = np.full((120, 160), 90, np.uint8)
+    for left, right in [(grey, grey), *views[:3], (grey, grey), *views[4:]]:
+        step = tracker.update(left, right)
+        assert bool(step.clusters) == bool((left != grey).any())
+        assert len(step.rows) == len(step.cluster_of_pixel)
+    assert step.time == 5
+
+
+def test_a_track_rests_while_nothing_is_seen():
+    tracker = StereoTracker(n_components=6, **SMALL)
+    views = list(film())
+    grey = np.full((120, 160), 90, np.uint8)
+    before = [tracker.update(*views[t]) for t in range(3)][-1]
+    tracker.update(grey, grey)
+    after = tracker.update(*views[4])
+    assert biggest(after, 5).track_id in {c.track_id for c in before.clusters if abs(c.mean[2] - 5) < 1.5}
+
+
+@pytest.mark.parametrize("mode", ["improved", "paper"])
+def test_results_do_not_depend_on_threads(mode):
+    one, two = followed(mode, threads=1)[0].graph, followed(mode, threads=2)[0].graph
+    assert one == two
+
+
+def test_pixels_that_are_not_finite_do_no_harm():
+    tracker = StereoTracker(n_components=6, **SMALL)
+    for left, right in film():
+        left, right = left.astype(np.float32), right.astype(np.float32)
+        left[50:54, 20:24] = np.nan
+        right[10, 10] = np.inf
+        step = tracker.update(left, right)
+    assert np.allclose(biggest(step, -4).velocity, [2, 0, 0], atol=0.1)
+
+
+def test_disparities_from_elsewhere():
+    tracker = StereoTracker(n_components=6, **SMALL)
+    for t, (left, _) in enumerate(film()):
+        disparity = np.full(left.shape, np.nan, np.float32)
+        edges = np.hypot(*np.gradient(left.astype(float))) > 15
+        disparity[edges] = -4
+        disparity[36:84, 80 - 3 * t : 136 - 3 * t][edges[36:84, 80 - 3 * t : 136 - 3 * t]] = 5
+        step = tracker.update_disparity(left, disparity)
+    assert np.allclose(biggest(step, 5).velocity, [-3, 0, 0], atol=0.1)
+    with pytest.raises(ValueError, match="disparity"):
+        tracker.update_disparity(left, disparity[:-1])
+    with pytest.raises(TypeError, match="disparity"):
+        tracker.update_disparity(left, left)
+
+
+def test_views_that_do_not_fit_are_refused_with_both_shapes():
+    tracker = StereoTracker(**SMALL)
+    left, right = next(film())
+    with pytest.raises(ValueError, match=r"\(120, 160\).*\(120, 159\)"):
+        tracker.update(left, right[:, 1:])
+    tracker.update(left, right)
+    with pytest.raises(ValueError, match=r"\(120, 160\).*\(100, 160\)"):
+        tracker.update(left[:100], right[:100])
+    with pytest.raises(ValueError, match="left"):
+        tracker.update(left[None], right)
+    with pytest.raises(ValueError):
+        StereoTracker().update(left[:16], right[:16])
+    colour = np.repeat(left[:, :, None], 3, 2)
+    assert tracker.update(colour, np.repeat(right[:, :, None], 3, 2)).clusters
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("mode", "fast"),
+        ("n_components", 0),
+        ("n_components", -1),
+        ("search", 0),
+        ("luminance_levels", 1),
+        ("arc_threshold", float("nan")),
+        ("grid", (0, 80, None)),
+        ("grid", (60, 80)),
+        ("matching", "nothing"),
+        ("tol", "quickly"),
+        ("threads", 0),
+    ],
+)
+def test_options_out_of_range_are_named(option, value):
+    with pytest.raises(ValueError, match=option):
+        StereoTracker(**{option: value})
+
+
+@pytest.mark.parametrize(("option", "value"), [("weight_concentration_prior", 0.0), ("degrees_of_freedom_prior", 1.0), ("covariance_prior", -1.0), ("disparity_range", (5, -5))])
+def test_what_mixture_and_matching_cannot_use_is_named(option, value):
+    tracker = StereoTracker(**{**SMALL, option: value})
+    with pytest.raises(ValueError, match=option):
+        tracker.update(*next(film()))
