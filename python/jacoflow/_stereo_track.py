@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
 
 if TYPE_CHECKING:
-    import networkx
+    import networkx  # type: ignore[import-untyped, unused-ignore]
 
 Array = NDArray[np.float64]
 
