@@ -62,13 +62,13 @@ class VariationalGaussianMixture(_Base):
     """A mixture of Gaussians in D dimensions, fitted to weighted points by variational Bayes.
 
     Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern Recognition and
-    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, whatever the number of threads and the
-    order of the points.
+    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, whatever the number of threads and, from
+    k-means++ seeds, the order of the points.
 
     Parameters
     ----------
     n_components : int
-        K, the most components there may be (no unit).
+        K, the most components there may be, up to 65536 (no unit).
     weight_concentration_prior : float
         `alpha0` of the Dirichlet prior, above 0, no unit.
     mean_precision_prior : float
@@ -88,9 +88,9 @@ class VariationalGaussianMixture(_Base):
     init : "kmeans++" or "random"
         First responsibilities: clusters of weighted k-means, or random numbers.
     prune_weight : float
-        Components with less weight of points than this are left out while fitting; 0: none.
+        Components with less weight of points than this are left out by `fit` and by the first `partial_fit`; 0: none.
     warm_start : bool
-        Whether `fit` begins with the components of the last fit.
+        Whether `fit` begins with the components of the last fit, however many were left of them, unless there are more than `n_components`.
     random_state : int, numpy.random.RandomState, numpy.random.Generator or None
         Seed; None: numpy's global one.
     threads : int or None
@@ -193,6 +193,7 @@ class VariationalGaussianMixture(_Base):
         """Adds a batch of points to the mixture; the first batch is a fit.
 
         Responsibilities of earlier points stay as they were; of them only weights, means and scatters of the components are kept, times `forgetting`. Rounds maximise the lower bound of earlier and new points together.
+        The prior is that of the first batch, and so is the number of components.
 
         Parameters
         ----------
@@ -207,7 +208,10 @@ class VariationalGaussianMixture(_Base):
         """
         first = not hasattr(self, "_state")
         points, weights = self._points(X, fitting=first), _weights(sample_weight)
-        self._take(_mixture_partial_fit(points, weights, self._parameters(), None if first else self._state, forgetting))
+        _demand("forgetting", forgetting, numbers.Real, "a number")
+        if not first and self.n_components != self._state["n_components"]:
+            raise ValueError(f"n_components: expected {self._state['n_components']} as for the earlier points, got {self.n_components}")
+        self._take(_mixture_partial_fit(points, weights, self._parameters(), None if first else self._state, float(forgetting)))
         return self
 
     def fit_predict(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> NDArray[np.int64]:
@@ -224,12 +228,18 @@ class VariationalGaussianMixture(_Base):
         return self._densities(X)[1]
 
     def score_samples(self, X: ArrayLike) -> Array:
-        """Log density (N,) of points (N, D): `ln sum_k rho_nk` of equation (14), natural logarithm."""
+        """How well points (N, D) are explained, (N,): `ln sum_k rho_nk` of equation (14), natural logarithm, as scikit-learn tells it.
+
+        Expected logarithms make it less than the log of a density, by the more the fewer points the components have.
+        """
         return self._densities(X)[0]
 
     def score(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> float:
         """Mean of `score_samples` over points (N, D) with weights (N,)."""
-        return float(np.average(self.score_samples(X), weights=_weights(sample_weight)))
+        scores, weights = self.score_samples(X), _weights(sample_weight)
+        if weights is not None and (weights.shape != scores.shape or not np.isfinite(weights).all() or (weights < 0).any() or weights.sum() <= 0):
+            raise ValueError(f"sample_weight: expected {len(scores)} finite weights that are not negative nor all zero, got shape {weights.shape}")
+        return float(np.average(scores, weights=weights))
 
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "_state")
@@ -249,6 +259,11 @@ class VariationalGaussianMixture(_Base):
         for name in ("degrees_of_freedom_prior", "tol"):
             if parameters[name] is not None:
                 _demand(name, parameters[name], numbers.Real, "a number or None")
+        if self.threads is not None:
+            _demand("threads", self.threads, numbers.Integral, "an integer or None")
+            if self.threads < 1:
+                raise ValueError(f"threads: expected a positive integer, got {self.threads}")
+        _demand("init", self.init, str, '"kmeans++" or "random"')
         return {**parameters, "seed": _seed(self.random_state)}
 
     def _points(self, X: ArrayLike, *, fitting: bool) -> Array:
@@ -286,7 +301,7 @@ class VariationalGaussianMixture(_Base):
 
     def _take(self, state: dict[str, Any]) -> None:
         """The attributes that a fit leaves."""
-        self._state = state
+        self._state = {**state, "n_components": self.n_components}
         alpha, nu = state["weight_concentration"], state["degrees_of_freedom"]
         self.weight_concentration_, self.degrees_of_freedom_ = alpha, nu
         self.mean_precision_, self.means_ = state["mean_precision"], state["means"]
@@ -309,7 +324,11 @@ def _reals(name: str, values: ArrayLike) -> Array:
     """An array of doubles; TypeError or ValueError naming the argument for what is none."""
     if hasattr(values, "toarray") and not isinstance(values, np.ndarray):
         raise TypeError(f"{name}: sparse data was passed, but dense data is required. Use '.toarray()' to convert to a dense numpy array.")
+    if isinstance(values, np.ma.MaskedArray):
+        raise TypeError(f"{name}: expected a plain array, got a masked one; leave masked points out, or give them no weight")
     array = np.asarray(values)
+    if array.dtype.kind in "mM":
+        raise TypeError(f"{name}: expected real numbers, got {array.dtype}")
     if array.dtype.kind == "c":
         raise ValueError(f"{name}: Complex data not supported, got {array.dtype}.")
     try:

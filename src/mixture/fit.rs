@@ -77,16 +77,25 @@ pub(super) fn best_of_seeds(points: &Points, problem: &Problem) -> Result<Fit> {
     let mut best: Option<Fit> = None;
     for init in 0..options.n_init {
         let stream = rng.stream(init as u64);
-        let shares = match options.seeding {
-            Seeding::KMeans => seeding::k_means(points, options.components, stream),
-            Seeding::Random => seeding::random(points, options.components, stream),
+        let expected = match options.seeding {
+            Seeding::KMeans => from_labels(points, problem, &seeding::k_means(points, options.components, stream)),
+            Seeding::Random => {
+                from_shares(points, problem, &seeding::random(points, options.components, stream), options.components)?
+            }
         };
-        let fit = problem.rounds(from_shares(points, problem, &shares, options.components)?)?;
+        let fit = problem.rounds(expected)?;
         if best.as_ref().is_none_or(|best| fit.lower_bound() > best.lower_bound()) {
             best = Some(fit);
         }
     }
     Ok(best.expect("n_init is positive"))
+}
+
+/// What an E step would have left that gave every point to one component.
+fn from_labels(points: &Points, problem: &Problem, labels: &[usize]) -> Expected {
+    let centre = &problem.planes.centre;
+    let moments = Moments::of(points, centre, problem.options.components, |n, take| take(labels[n], 1.0));
+    Expected { moments, negentropy: 0.0 }
 }
 
 /// What an E step with these responsibilities would have left.
@@ -105,7 +114,11 @@ fn from_shares(points: &Points, problem: &Problem, shares: &[f64], components: u
     let entropy = |row: &[f64]| row.iter().filter(|r| **r > 0.0).map(|r| r * r.ln()).sum::<f64>();
     let rows = shares.chunks_exact(components).enumerate();
     let negentropy = rows.map(|(n, row)| points.weight(n) * entropy(row)).sum();
-    Ok(Expected { moments: Moments::of(points, &problem.planes.centre, shares), negentropy })
+    let moments = Moments::of(points, &problem.planes.centre, components, |n, take| {
+        let row = &shares[n * components..(n + 1) * components];
+        row.iter().enumerate().filter(|(_, share)| **share > 0.0).for_each(|(k, share)| take(k, *share));
+    });
+    Ok(Expected { moments, negentropy })
 }
 
 /// What earlier points left: their sums about the planes' centre, negative entropy and total weight.

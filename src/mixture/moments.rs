@@ -31,34 +31,35 @@ impl Moments {
         self.counts.len()
     }
 
-    /// Those of points about `centre` with given responsibilities (N, K): means first, then scatters about them.
-    pub(super) fn of(points: &Points, centre: &[f64], responsibilities: &[f64]) -> Self {
-        let (d, components) = (points.dimensions, responsibilities.len() / points.count());
+    /// Those of points about `centre`: means first, then scatters about them. `shares(n, take)` hands each responsibility of point n that is not 0, `(k, r_nk)`, to `take`.
+    pub(super) fn of(
+        points: &Points,
+        centre: &[f64],
+        components: usize,
+        shares: impl Fn(usize, &mut dyn FnMut(usize, f64)),
+    ) -> Self {
+        let d = points.dimensions;
         let mut this = Self::none(components, d);
         for n in 0..points.count() {
-            for k in 0..components {
-                let weight = points.weight(n) * responsibilities[n * components + k];
+            shares(n, &mut |k, share| {
+                let weight = points.weight(n) * share;
                 this.counts[k] += weight;
                 for (i, (x, c)) in points.at(n).iter().zip(centre).enumerate() {
                     this.means[k * d + i] += weight * (x - c);
                 }
-            }
+            });
         }
         for (k, count) in this.counts.iter().enumerate().filter(|(_, count)| **count > 0.0) {
             this.means[k * d..(k + 1) * d].iter_mut().for_each(|mean| *mean /= count);
         }
         let mut off = vec![0.0; d];
         for n in 0..points.count() {
-            for k in 0..components {
-                let weight = points.weight(n) * responsibilities[n * components + k];
-                if weight == 0.0 {
-                    continue;
-                }
+            shares(n, &mut |k, share| {
                 for (i, off) in off.iter_mut().enumerate() {
                     *off = points.at(n)[i] - centre[i] - this.means[k * d + i];
                 }
-                add_outer(&mut this.scatters[k * d * d..(k + 1) * d * d], &off, weight);
-            }
+                add_outer(&mut this.scatters[k * d * d..(k + 1) * d * d], &off, points.weight(n) * share);
+            });
         }
         this
     }

@@ -3,6 +3,9 @@
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 
+/// Most components: what nobody needs must not take all memory.
+const MOST_COMPONENTS: usize = 1 << 16;
+
 /// Where the inverse scale matrix of the Wishart prior, `W0^-1` (D, D), comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CovariancePrior {
@@ -87,6 +90,10 @@ impl MixtureOptions {
             if count == 0 {
                 return Err(Error::argument(name, "a positive integer", count));
             }
+        }
+        if self.components > MOST_COMPONENTS {
+            let expected = format!("a positive integer up to {MOST_COMPONENTS}");
+            return Err(Error::argument("n_components", expected, self.components));
         }
         positive("weight_concentration_prior", self.weight_concentration_prior)?;
         positive("mean_precision_prior", self.mean_precision_prior)?;

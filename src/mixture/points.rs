@@ -7,7 +7,7 @@ pub(super) const BLOCK: usize = 64;
 /// Points of one task. Fixed, so that sums never depend on the number of threads.
 pub(super) const BAND: usize = 1024;
 /// Largest coordinate whose square, summed over points, is far from overflow.
-const LARGEST: f64 = 1e140;
+pub(super) const LARGEST: f64 = 1e140;
 
 /// N points of D coordinates.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! What is believed before any point is seen.
 
 use super::options::{CovariancePrior, MixtureOptions};
-use super::points::Points;
+use super::points::{LARGEST, Points};
 use crate::error::{Error, Result};
 use crate::math::dense;
 
@@ -52,9 +52,9 @@ impl Prior {
     /// # Errors
     /// As [`Prior::resolve`].
     fn check(&self, dimensions: usize) -> Result<()> {
-        if self.mean.len() != dimensions || self.mean.iter().any(|m| !m.is_finite()) {
+        if self.mean.len() != dimensions || self.mean.iter().any(|m| !m.is_finite() || m.abs() > LARGEST) {
             let got = format!("{:?}", self.mean);
-            return Err(Error::argument("mean_prior", format!("{dimensions} finite numbers"), got));
+            return Err(Error::argument("mean_prior", format!("{dimensions} finite numbers up to {LARGEST:e}"), got));
         }
         let least = dimensions as f64 - 1.0;
         if !(self.degrees_of_freedom.is_finite() && self.degrees_of_freedom > least) {

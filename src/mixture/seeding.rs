@@ -1,4 +1,4 @@
-//! First responsibilities: weighted k-means++ seeds and Lloyd's algorithm, or random numbers.
+//! Where fits begin: weighted k-means++ seeds and Lloyd's algorithm, or random numbers.
 
 use super::points::Points;
 use crate::math::random::CounterRng;
@@ -18,10 +18,10 @@ pub(super) fn random(points: &Points, components: usize, rng: CounterRng) -> Vec
     shares
 }
 
-/// Responsibilities (N, K) of 0 and 1: the clusters that weighted k-means finds from k-means++ seeds (D. Arthur and S. Vassilvitskii, 2007).
+/// The cluster of each point (N) that weighted k-means finds from k-means++ seeds (D. Arthur and S. Vassilvitskii, 2007).
 ///
 /// Seeds are drawn from the points in the order of their coordinates, so that the order in which they come makes no difference, nor whether a point comes twice or has twice the weight.
-pub(super) fn k_means(points: &Points, components: usize, rng: CounterRng) -> Vec<f64> {
+pub(super) fn k_means(points: &Points, components: usize, rng: CounterRng) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.count()).filter(|n| points.weight(*n) > 0.0).collect();
     order.sort_unstable_by(|a, b| {
         let pairs = points.at(*a).iter().zip(points.at(*b));
@@ -33,11 +33,7 @@ pub(super) fn k_means(points: &Points, components: usize, rng: CounterRng) -> Ve
             break;
         }
     }
-    let mut shares = vec![0.0; points.count() * components];
-    for n in 0..points.count() {
-        shares[n * components + nearest(&centres, points.at(n)).0] = 1.0;
-    }
-    shares
+    (0..points.count()).map(|n| nearest(&centres, points.at(n)).0).collect()
 }
 
 /// K centres, row-major: the first by weight, the others by weight times the squared distance from those before. Where no point is left apart, the last is repeated.

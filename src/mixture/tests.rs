@@ -259,6 +259,8 @@ fn what_cannot_be_used_is_named() {
     let prior = |prior| MixtureOptions { covariance_prior: prior, ..usual.clone() };
     for (name, options) in [
         ("n_components", MixtureOptions { components: 0, ..usual.clone() }),
+        ("n_components", MixtureOptions { components: usize::MAX, ..usual.clone() }),
+        ("mean_prior", MixtureOptions { mean_prior: Some(vec![1e300, 0.0]), ..usual.clone() }),
         ("weight_concentration_prior", MixtureOptions { weight_concentration_prior: 0.0, ..usual.clone() }),
         ("mean_precision_prior", MixtureOptions { mean_precision_prior: -1.0, ..usual.clone() }),
         ("mean_prior", MixtureOptions { mean_prior: Some(vec![0.0]), ..usual.clone() }),

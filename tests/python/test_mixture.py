@@ -176,7 +176,7 @@ def test_twice_the_weights_is_another_fit():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("n_components", 0), ("weight_concentration_prior", 0.0), ("mean_precision_prior", -1.0), ("mean_prior", [0.0]), ("degrees_of_freedom_prior", 1.0),
+        ("n_components", 0), ("n_components", 10**9), ("n_components", 2**63), ("mean_prior", [1e300, 0.0]), ("threads", -1), ("weight_concentration_prior", 0.0), ("mean_precision_prior", -1.0), ("mean_prior", [0.0]), ("degrees_of_freedom_prior", 1.0),
         ("covariance_prior", [[1.0, 2.0], [2.0, 1.0]]), ("covariance_prior", [[1.0, 0.5], [0.0, 1.0]]), ("covariance_prior", np.eye(3)), ("covariance_prior", -1.0),
         ("max_iter", 0), ("tol", -1.0), ("n_init", -2), ("init", "magic"), ("prune_weight", np.nan), ("threads", 0), ("random_state", -1),
     ],
@@ -199,6 +199,38 @@ def test_points_and_weights_that_cannot_be_used_are_named(weights, x):
 def test_responsibilities_that_cannot_be_used_are_named(resp):
     with pytest.raises(ValueError, match="resp"):
         VariationalGaussianMixture(2).fit(np.eye(2), resp=resp)
+
+
+@pytest.mark.parametrize(("name", "value"), [("threads", 1.5), ("init", None), ("tol", "a"), ("n_components", 2.0)])
+def test_parameters_of_another_kind_are_named(name, value):
+    with pytest.raises(TypeError, match=name):
+        VariationalGaussianMixture(**{"n_components": 2, name: value}).fit(np.arange(20.0).reshape(-1, 2))
+
+
+def test_arrays_that_are_no_plain_numbers_are_refused():
+    x, _, _ = clusters(50, 2)
+    for wrong in (np.ma.masked_array(x, mask=x > 0), x.astype("datetime64[s]")):
+        with pytest.raises(TypeError, match="X: "):
+            VariationalGaussianMixture(2).fit(wrong)
+    with pytest.raises(TypeError, match="sample_weight: "):
+        VariationalGaussianMixture(2).fit(x, sample_weight=np.ma.masked_array(np.ones(50)))
+
+
+def test_batches_keep_their_number_of_components():
+    x, _, _ = clusters(200, 2)
+    mixture = VariationalGaussianMixture(6, random_state=0, prune_weight=5).partial_fit(x)
+    mixture.partial_fit(x)
+    with pytest.raises(ValueError, match="n_components"):
+        mixture.set_params(n_components=3).partial_fit(x)
+    with pytest.raises(TypeError, match="forgetting"):
+        mixture.set_params(n_components=6).partial_fit(x, forgetting="a")
+
+
+@pytest.mark.parametrize("weights", [np.full(50, -1.0), np.zeros(50), np.ones(49), np.full(50, np.nan)])
+def test_scores_check_their_weights(weights):
+    x, _, _ = clusters(50, 2)
+    with pytest.raises(ValueError, match="sample_weight"):
+        VariationalGaussianMixture(2, random_state=0).fit(x).score(x, sample_weight=weights)
 
 
 def test_scikit_learns_conventions():

@@ -180,7 +180,12 @@ mod tests {
         let shares: Vec<f64> = (0..count * components).map(|i| rng.uniform(1000 + i as u64)).collect();
         let shares: Vec<f64> =
             shares.chunks(components).flat_map(|row| row.iter().map(|r| r / row.iter().sum::<f64>())).collect();
-        let posterior = Posterior::maximised(&prior, &Moments::of(&points, &planes.centre, &shares));
+        let posterior = Posterior::maximised(
+            &prior,
+            &Moments::of(&points, &planes.centre, components, |n, take| {
+                (0..components).for_each(|k| take(k, shares[n * components + k]));
+            }),
+        );
         let densities = Densities::of(&posterior, &Factors::of(&posterior).unwrap());
         let plain = plain_sums(&planes, &densities, 0..planes.padded);
         let scale = plain.values.iter().fold(1.0f64, |m, v| m.max(v.abs()));
