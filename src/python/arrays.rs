@@ -17,7 +17,7 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bou
     let py = object.py();
     if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
         return Err(PyTypeError::new_err(format!(
-            "{argument}: expected a plain array, got a masked one; pass `frame.data` and the option mask=~frame.mask"
+            "{argument}: expected a plain array, got a masked one; pass its `data`, and the option mask=~frame.mask where there is one"
         )));
     }
     let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
@@ -100,7 +100,7 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> P
         }
         [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
             "{argument}: expected a grey frame (H, W), got a colour frame {shape:?}; \
-             pass colour=\"luminance\" or convert it with jacoflow.luminance(frame)"
+             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option"
         ))),
         _ => Err(PyValueError::new_err(format!("{argument}: expected a frame (H, W), got shape {shape:?}"))),
     }
