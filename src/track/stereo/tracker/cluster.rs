@@ -28,11 +28,11 @@ impl StereoTracker {
         let (values, weights) = (voxels.centres(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let seeded = reseed(&mut start, &voxels, &weighted, &self.options)?;
-        Ok((self.cluster(points, voxels, Some(start))?, seeded))
+        Ok((self.cluster(points, voxels, Some(&start))?, seeded))
     }
 
     /// Fits the mixture to the voxels, from seeds or from components, and gives each voxel to one.
-    pub(super) fn cluster(&self, points: EdgePoints, voxels: Voxels, start: Option<Posterior>) -> Result<Clustered> {
+    pub(super) fn cluster(&self, points: EdgePoints, voxels: Voxels, start: Option<&Posterior>) -> Result<Clustered> {
         if voxels.is_empty() {
             return Ok(Clustered { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 });
         }
@@ -54,7 +54,7 @@ impl StereoTracker {
         };
         let (values, weights) = (voxels.centres(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let fitted = fit(&weighted, &options, start.as_ref().map_or(Start::Seeds, Start::Components))?;
+        let fitted = fit(&weighted, &options, start.map_or(Start::Seeds, Start::Components))?;
         let labels = fitted.posterior.labels(&weighted)?;
         let clusters = Clusters::new(points, voxels, &labels, fitted.posterior.components());
         Ok(Clustered { clusters, rounds: fitted.lower_bounds.len(), posterior: Some(fitted.posterior) })
