@@ -94,7 +94,7 @@ impl StereoTracker {
         let mut nodes = Vec::new();
         for (k, arrival) in arrivals.iter().enumerate() {
             let (Some(posterior), false) = (posterior, clusters.pixels[k].is_empty()) else { continue };
-            let mean = lattice.to_pixels(std::array::from_fn(|i| posterior.means[3 * k + i]));
+            let mean = lattice.pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
             let (depth, metric_velocity) = self.metric(mean, arrival.velocity, lattice.size);
             nodes.push(Node {
                 time: self.time,
