@@ -234,7 +234,7 @@ impl PyStereoTracker {
 }
 
 /// Numbers that may be missing, as an array with NaN for them.
-fn numbers<'py, const N: usize>(py: Python<'py>, values: Option<[f64; N]>) -> PyResult<Bound<'py, PyAny>> {
+fn numbers<const N: usize>(py: Python<'_>, values: Option<[f64; N]>) -> PyResult<Bound<'_, PyAny>> {
     Ok(arrays::owned::<f64>(py, &[N], values.unwrap_or([f64::NAN; N]).to_vec())?.into_any())
 }
 

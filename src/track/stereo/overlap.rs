@@ -72,7 +72,9 @@ pub(super) fn moved_overlaps(
     }
     // What left the picture counts as not met: the cluster's own number of voxels is the least that there are.
     let all = cells.len().max(clusters.members[cluster].len()).max(1) as f64;
-    row.iter_mut().for_each(|share| *share /= all);
+    for share in &mut row {
+        *share /= all;
+    }
     row
 }
 

@@ -112,7 +112,7 @@ impl Lattice {
     }
 
     /// From coordinates in cells (voxel centres at whole numbers) to px and disparity.
-    pub fn from_cells(&self, at: [f64; 3]) -> [f64; 3] {
+    pub fn pixels_of(&self, at: [f64; 3]) -> [f64; 3] {
         let [cx, cy, _] = self.cell();
         [(at[0] + 0.5) * cx - 0.5, (at[1] + 0.5) * cy - 0.5, at[2] + f64::from(self.grid.first_disparity)]
     }
@@ -207,7 +207,7 @@ pub(super) mod tests {
 
     #[test]
     fn coordinates_in_cells_go_back_to_pixels() {
-        let [x, y, d] = lattice().from_cells([0.0, 59.0, 40.0]);
+        let [x, y, d] = lattice().pixels_of([0.0, 59.0, 40.0]);
         assert_eq!([x, y, d], [3.5, 475.5, 0.0]);
     }
 

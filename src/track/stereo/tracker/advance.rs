@@ -1,0 +1,211 @@
+//! From one step to the next, in either mode.
+
+use super::super::cell_luminance::CellLuminance;
+use super::super::clusters::Clusters;
+use super::super::graph::Arc;
+use super::super::grouping::{GroupMotion, groups};
+use super::super::identity::Carried;
+use super::super::lucas_kanade::{SmoothedLevels, middle};
+use super::super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places};
+use super::super::overlap::{Row, moved_overlaps};
+use super::super::step::Step;
+use super::super::voxels::{EdgePoints, Voxels};
+use super::super::warm_start::moved;
+use super::StereoTracker;
+use super::cluster::Clustered;
+use super::record::{Arrival, Departure};
+use crate::error::Result;
+use crate::mixture::Posterior;
+use crate::types::Frame;
+
+impl StereoTracker {
+    /// The paper's step: a new mixture, matching and overlaps forwards and backwards (sections 2.5 to 2.8).
+    pub(super) fn advance_as_printed(
+        &mut self,
+        points: EdgePoints,
+        voxels: Voxels,
+        luminance: CellLuminance,
+    ) -> Result<(Step, Seen, Option<Posterior>)> {
+        let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels, None)?;
+        let seen = Seen { clusters, luminance, levels: None };
+        let cell = seen.clusters.lattice().cell();
+        let velocity =
+            |motion: &CellMotion, sign: f64| std::array::from_fn(|i| sign * f64::from(motion.shift[i]) * cell[i]);
+        let (forward, backward) = match &self.last {
+            Some(last) => (cell_motions(last, &seen, &self.options), cell_motions(&seen, last, &self.options)),
+            None => (vec![], vec![]),
+        };
+        let level = 256.0 / self.options.luminance_levels as f64;
+        let arrivals = (0..seen.clusters.components()).map(|k| {
+            let motion = backward.get(k).and_then(Option::as_ref);
+            Arrival {
+                velocity: motion.map(|motion| velocity(motion, -1.0)),
+                residual: motion.map(|motion| motion.difference * level),
+                ..Arrival::UNKNOWN
+            }
+        });
+        let arrivals: Vec<Arrival> = arrivals.collect();
+        let rows = |motions: Vec<Option<CellMotion>>| -> Vec<Row> {
+            motions.into_iter().map(|motion| motion.map_or_else(Vec::new, |motion| motion.overlaps)).collect()
+        };
+        let departures: Vec<_> = forward
+            .iter()
+            .map(|motion| motion.as_ref().map(|motion| Departure { velocity: velocity(motion, 1.0), affine: None }))
+            .collect();
+        let arcs = arcs(self.time, &rows(forward), &rows(backward));
+        self.name_by_arcs(&seen.clusters, &arcs);
+        let grouped: Vec<usize> = (0..seen.clusters.components()).collect();
+        let step = self.record(&seen.clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
+        self.connect(&departures, arcs)?;
+        Ok((step, seen, posterior))
+    }
+
+    /// The improved step: motion first, the components carried along, then the rounds (sections 6.4 to 6.7).
+    pub(super) fn advance_carried(
+        &mut self,
+        left: &Frame<f32>,
+        points: EdgePoints,
+        voxels: Voxels,
+        luminance: CellLuminance,
+    ) -> Result<(Step, Seen, Option<Posterior>)> {
+        let levels = SmoothedLevels::new(left);
+        let mut map = Frame::filled(left.width(), left.height(), f32::NAN);
+        for i in 0..points.len() {
+            map.row_mut(points.rows[i] as usize)[points.columns[i] as usize] = points.disparities[i];
+        }
+        let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
+        let motions = self.carry(view);
+        let last = self.last.take();
+        let carried: Vec<Option<[f64; 3]>> =
+            motions.iter().map(|motion| motion.map(|(_, Carried { motion, .. })| motion)).collect();
+        let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
+        let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
+        let Clustered { clusters, posterior, rounds } = clustered;
+        let components = clusters.components();
+        let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !seeded.get(k).is_some_and(|seeded| *seeded));
+        let (forward, backward) = match &last {
+            Some(last) => both_ways(&last.clusters, &clusters, &motions, own),
+            None => (vec![], vec![]),
+        };
+        let overlap = |k: usize| forward.get(k).and_then(|row: &Row| row.get(k)).copied().unwrap_or(0.0);
+        self.name_by_components(&clusters, posterior.as_ref(), &seeded, overlap);
+        let arrivals: Vec<Arrival> = (0..components)
+            .map(|k| match own(k) {
+                Some((motion, Carried { coasting, .. })) => Arrival {
+                    velocity: Some(motion.velocity()),
+                    affine: Some(motion.affine_after(middle(&places(&clusters, k)))),
+                    residual: Some(motion.plane.residual).filter(|residual| residual.is_finite()),
+                    coasting,
+                },
+                None => Arrival::UNKNOWN,
+            })
+            .collect();
+        let grouped = match &self.options.grouping {
+            Some(limits) => {
+                let motions: Vec<_> = (0..components)
+                    .map(|k| {
+                        own(k).map(|(motion, _)| {
+                            let (flow, [x, y]) = (motion.plane.flow, motion.plane.centre);
+                            // The motion belongs to where the pixels were; the cluster is where they went.
+                            GroupMotion {
+                                affine: flow.to_array(),
+                                centre: [x + flow.u, y + flow.v],
+                                depth: motion.depth,
+                            }
+                        })
+                    })
+                    .collect();
+                groups(&clusters, &motions, limits)
+            }
+            None => (0..components).collect(),
+        };
+        let step = self.record(&clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
+        let departures: Vec<_> = motions
+            .iter()
+            .map(|motion| {
+                motion.map(|(motion, _)| Departure {
+                    velocity: motion.velocity(),
+                    affine: Some(motion.plane.flow.to_array()),
+                })
+            })
+            .collect();
+        let arcs = arcs(self.time, &forward, &backward);
+        self.connect(&departures, arcs)?;
+        Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
+    }
+
+    /// How each cluster of the last step gets to the next view.
+    fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(FineMotion, Carried)>> {
+        let Some(last) = &self.last else { return vec![] };
+        let cell = last.clusters.lattice().cell();
+        let before: Vec<Option<[f64; 3]>> = (0..last.clusters.components())
+            .map(|k| {
+                let identity = self.identities.live.get(k)?.as_ref()?;
+                identity.velocity.map(|velocity| std::array::from_fn(|i| velocity[i] * cell[i]))
+            })
+            .collect();
+        let measured = fine_motions(last, view, &before, &self.options);
+        let limits = self.options.recognition.as_ref();
+        let mut out = Vec::with_capacity(measured.len());
+        for (k, measured) in measured.into_iter().enumerate() {
+            if last.clusters.pixels[k].is_empty() {
+                out.push(None);
+                continue;
+            }
+            let in_cells = measured.map(|m| std::array::from_fn(|i| m.velocity()[i] / cell[i]));
+            let carried = self.identities.carry(k, in_cells, cell, limits);
+            out.push(carried.and_then(|carried| {
+                let motion = if carried.coasting {
+                    let velocity = std::array::from_fn(|i| carried.motion[i] * cell[i]);
+                    FineMotion::translation(velocity, middle(&places(&last.clusters, k)))
+                } else {
+                    measured?
+                };
+                Some((motion, carried))
+            }));
+        }
+        out
+    }
+}
+
+/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where it has none, that of the cluster which covers it most.
+fn both_ways(
+    before: &Clusters,
+    after: &Clusters,
+    motions: &[Option<(FineMotion, Carried)>],
+    own: impl Fn(usize) -> Option<(FineMotion, Carried)>,
+) -> (Vec<Row>, Vec<Row>) {
+    let forward: Vec<Row> = (0..before.components())
+        .map(|k| match motions[k] {
+            Some((motion, _)) => moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i))),
+            None => vec![0.0; after.components()],
+        })
+        .collect();
+    let backward = (0..after.components())
+        .map(|k| {
+            let covering = (0..before.components())
+                .filter(|&j| forward[j][k] > 0.0)
+                .max_by(|&i, &j| forward[i][k].total_cmp(&forward[j][k]).then(j.cmp(&i)));
+            let motion = own(k).or_else(|| covering.and_then(|j| motions[j]));
+            match motion {
+                Some((motion, _)) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
+                None => vec![0.0; before.components()],
+            }
+        })
+        .collect();
+    (forward, backward)
+}
+/// Arcs (33) from the rows of overlaps in both directions, those that touch at all.
+fn arcs(time: usize, forward: &[Row], backward: &[Row]) -> Vec<Arc> {
+    let share = |rows: &[Row], i: usize, j: usize| rows[i].get(j).copied().unwrap_or(0.0);
+    let mut out = Vec::new();
+    for from in 0..forward.len() {
+        for to in 0..backward.len() {
+            let (forward, backward) = (share(forward, from, to), share(backward, to, from));
+            if forward + backward > 0.0 {
+                out.push(Arc { time: time - 1, from, to, forward, backward });
+            }
+        }
+    }
+    out
+}

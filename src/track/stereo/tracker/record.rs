@@ -1,0 +1,179 @@
+//! Names, graph and tracks: what is kept of a step.
+
+use super::super::clusters::Clusters;
+use super::super::graph::{Arc, Node};
+use super::super::identity::Sighting;
+use super::super::lucas_kanade::middle;
+use super::super::motion::places;
+use super::super::step::Step;
+use super::StereoTracker;
+use crate::error::Result;
+use crate::mixture::Posterior;
+
+/// What is known of how each cluster came to a step.
+pub(super) struct Arrival {
+    /// Motion since the last step, px and disparity.
+    pub velocity: Option<[f64; 3]>,
+    pub affine: Option<[f64; 6]>,
+    pub residual: Option<f64>,
+    pub coasting: bool,
+}
+
+/// How a cluster of the last step goes on.
+#[derive(Clone, Copy)]
+pub(super) struct Departure {
+    /// Motion to this step, px and disparity.
+    pub velocity: [f64; 3],
+    pub affine: Option<[f64; 6]>,
+}
+
+impl Arrival {
+    pub const UNKNOWN: Self = Self { velocity: None, affine: None, residual: None, coasting: false };
+}
+impl StereoTracker {
+    /// Tracks of the paper's mode: a cluster goes on the track of another if each is the other's strongest arc, and that is strong enough.
+    pub(super) fn name_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
+        let components = clusters.components();
+        let before = std::mem::take(&mut self.identities.live);
+        let mut live = vec![None; components];
+        let strongest = |of: &dyn Fn(&&Arc) -> bool| {
+            arcs.iter().filter(of).fold(None, |best: Option<&Arc>, arc| match best {
+                Some(best) if best.score() >= arc.score() => Some(best),
+                _ => Some(arc),
+            })
+        };
+        for (k, slot) in live.iter_mut().enumerate() {
+            let Some(arc) = strongest(&|arc| arc.to == k) else { continue };
+            let mutual = strongest(&|other| other.from == arc.from).is_some_and(|other| other.to == k);
+            if mutual && arc.score() >= self.options.arc_threshold {
+                *slot = before.get(arc.from).cloned().flatten();
+            }
+        }
+        self.identities.live = live;
+        let seen = sightings(clusters, |_| [0.0; 3]);
+        self.identities.name_all(self.time, &seen, 0.0, None);
+    }
+
+    /// Tracks of the improved mode: a component is its track, as long as it covers its moved self.
+    pub(super) fn name_by_components(
+        &mut self,
+        clusters: &Clusters,
+        posterior: Option<&Posterior>,
+        seeded: &[bool],
+        overlap: impl Fn(usize) -> f64,
+    ) {
+        let limits = self.options.recognition.as_ref();
+        let least = limits.map_or(0.0, |limits| limits.least_overlap);
+        let lost = |k: usize| {
+            let empty = clusters.pixels.get(k).is_none_or(Vec::is_empty);
+            empty || seeded.is_empty() || seeded[k] || overlap(k) < least
+        };
+        self.identities.rest(self.time.saturating_sub(1), lost);
+        self.identities.live.resize(clusters.components(), None);
+        let Some(posterior) = posterior else { return };
+        let seen = sightings(clusters, |k| std::array::from_fn(|i| posterior.means[3 * k + i]));
+        self.identities.name_all(self.time, &seen, self.options.reseed_below, limits);
+    }
+
+    /// Puts the clusters into the graph and the tracks, and tells of them.
+    pub(super) fn record(
+        &mut self,
+        clusters: &Clusters,
+        posterior: Option<&Posterior>,
+        rounds: usize,
+        arrivals: &[Arrival],
+        grouped: &[usize],
+    ) -> Step {
+        let lattice = *clusters.lattice();
+        let track = |k: usize| self.identities.live.get(k).and_then(Option::as_ref).map_or(0, |identity| identity.id);
+        // A group is called after its oldest track.
+        let mut names = vec![u64::MAX; clusters.components()];
+        for (k, &group) in grouped.iter().enumerate().filter(|(k, _)| !clusters.pixels[*k].is_empty()) {
+            names[group] = names[group].min(track(k));
+        }
+        let mut nodes = Vec::new();
+        for (k, arrival) in arrivals.iter().enumerate() {
+            let (Some(posterior), false) = (posterior, clusters.pixels[k].is_empty()) else { continue };
+            let mean = lattice.pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
+            let (depth, metric_velocity) = self.metric(mean, arrival.velocity, lattice.size);
+            nodes.push(Node {
+                time: self.time,
+                index: k,
+                track_id: track(k),
+                group: names[grouped[k]],
+                n_pixels: clusters.pixels[k].len(),
+                weight: posterior.weight_concentration[k] / posterior.weight_concentration.iter().sum::<f64>(),
+                mean,
+                covariance: covariance(posterior, k, lattice.cell()),
+                velocity: arrival.velocity,
+                next_velocity: None,
+                middle: middle(&places(clusters, k)),
+                affine: arrival.affine,
+                next_affine: None,
+                residual: arrival.residual,
+                coasting: arrival.coasting,
+                depth,
+                metric_velocity,
+            });
+        }
+        for node in &nodes {
+            self.graph.insert(node.clone());
+            let track = self.tracks.entry(node.track_id).or_default();
+            track.times.push(self.time);
+            track.positions.push(node.mean);
+            track.velocities.push(node.velocity.unwrap_or([f64::NAN; 3]));
+        }
+        Step {
+            time: self.time,
+            clusters: nodes,
+            rows: clusters.points.rows.clone(),
+            columns: clusters.points.columns.clone(),
+            disparities: clusters.points.disparities.clone(),
+            labels: clusters.of_point.clone(),
+            rounds,
+        }
+    }
+
+    /// Depth and velocity in units of the baseline, where the cameras are known.
+    fn metric(
+        &self,
+        mean: [f64; 3],
+        velocity: Option<[f64; 3]>,
+        (width, height): (usize, usize),
+    ) -> (Option<f64>, Option<[f64; 3]>) {
+        let Some(camera) = self.options.camera else { return (None, None) };
+        let middle = [0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)];
+        let speed = velocity.map(|velocity| {
+            let before = camera.place(std::array::from_fn(|i| mean[i] - velocity[i]), middle);
+            let now = camera.place(mean, middle);
+            std::array::from_fn(|i| now[i] - before[i])
+        });
+        let finite = |speed: &[f64; 3]| speed.iter().all(|value| value.is_finite());
+        (Some(camera.depth(mean[2])).filter(|depth| depth.is_finite()), speed.filter(finite))
+    }
+
+    /// Puts arcs between the last step and this one into the graph, and tells the last one's clusters where they went.
+    pub(super) fn connect(&mut self, departures: &[Option<Departure>], arcs: Vec<Arc>) -> Result<()> {
+        if let Some(before) = self.time.checked_sub(1) {
+            for (k, &departure) in departures.iter().enumerate() {
+                if let Some(node) = self.graph.node_mut(before, k) {
+                    node.next_velocity = departure.map(|departure| departure.velocity);
+                    node.next_affine = departure.and_then(|departure| departure.affine);
+                }
+            }
+        }
+        arcs.into_iter().try_for_each(|arc| self.graph.connect(arc))
+    }
+}
+
+/// All components that have edge pixels.
+fn sightings(clusters: &Clusters, position: impl Fn(usize) -> [f64; 3]) -> Vec<Sighting> {
+    let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
+    pixels.map(|(component, pixels)| Sighting { component, position: position(component), pixels }).collect()
+}
+/// Covariance `W_k^-1 / nu_k` of a component in px and disparity.
+fn covariance(posterior: &Posterior, k: usize, cell: [f64; 3]) -> [[f64; 3]; 3] {
+    let matrix = &posterior.scale_inverses[9 * k..9 * k + 9];
+    let nu = posterior.degrees_of_freedom[k];
+    std::array::from_fn(|i| std::array::from_fn(|j| matrix[3 * i + j] / nu * cell[i] * cell[j]))
+}
