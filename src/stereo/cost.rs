@@ -58,7 +58,7 @@ impl Coded {
                     let Some(y) = row.checked_sub(RADIUS).filter(|y| *y < slopes.height()) else { continue };
                     for (out, &slope) in out[border..].iter_mut().zip(slopes.row(y)) {
                         if slope.is_finite() {
-                            *out = (slope * STEPS).clamp(-LARGEST, LARGEST).round_ties_even() as i16;
+                            *out = rounded((slope * STEPS).clamp(-LARGEST, LARGEST));
                         }
                     }
                 }
@@ -67,6 +67,13 @@ impl Coded {
         };
         Self { stride, border, x: code(along_x), y: code(along_y) }
     }
+}
+
+/// The nearest whole number to a value within [`LARGEST`] of 0. Cut off rather than rounded, which not every processor can do to many at a time.
+#[inline(always)]
+fn rounded(value: f32) -> i16 {
+    const SHIFT: f32 = 2.0 * LARGEST;
+    ((value + (SHIFT + 0.5)) as i32 - SHIFT as i32) as i16
 }
 
 /// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x + first + k` of the other view.
