@@ -18,8 +18,7 @@ struct Weights<T> {
 
 impl<T: SimdReal> Weights<T> {
     fn new(sigma: f64, radius: usize) -> Self {
-        let gaussian =
-            |k: f64| (-0.5 * (k / sigma).powi(2)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+        let gaussian = |k: f64| (-0.5 * (k / sigma).powi(2)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt());
         let of = |weight: &dyn Fn(f64) -> f64| (0..=radius).map(|k| T::from_f64(weight(k as f64))).collect();
         Self { gaussian: of(&gaussian), derivative: of(&|k| k / (sigma * sigma) * gaussian(k)) }
     }
@@ -44,9 +43,11 @@ pub(crate) fn gaussian_gradient<T: SimdReal>(
     }
     let weights = Weights::new(sigma, radius);
     let bands = along_x.data_mut().par_chunks_mut(BAND_ROWS * width);
-    bands.zip(along_y.data_mut().par_chunks_mut(BAND_ROWS * width)).enumerate().for_each(|(band, (along_x, along_y))| {
-        dispatch(level, Band { frame, weights: &weights, first_row: band * BAND_ROWS, along_x, along_y });
-    });
+    bands.zip(along_y.data_mut().par_chunks_mut(BAND_ROWS * width)).enumerate().for_each(
+        |(band, (along_x, along_y))| {
+            dispatch(level, Band { frame, weights: &weights, first_row: band * BAND_ROWS, along_x, along_y });
+        },
+    );
     (along_x, along_y)
 }
 
@@ -78,8 +79,9 @@ impl<T: SimdReal> Band<'_, T> {
         // Both sums down the columns, with room for the border at either end.
         let mut smooth = vec![T::from_f64(0.0); width + 2 * radius];
         let mut slope = smooth.clone();
-        let mut pairs: Vec<(&[T], &[T])> = Vec::with_capacity(radius);
-        for (offset, (out_x, out_y)) in along_x.chunks_exact_mut(width).zip(along_y.chunks_exact_mut(width)).enumerate() {
+        let mut pairs: Vec<RowPair<'_, T>> = Vec::with_capacity(radius);
+        for (offset, (out_x, out_y)) in along_x.chunks_exact_mut(width).zip(along_y.chunks_exact_mut(width)).enumerate()
+        {
             let y = (first_row + offset) as isize;
             let row = |at: isize| frame.row(Border::Replicate.index(at, height));
             pairs.clear();
@@ -101,11 +103,14 @@ impl<T: SimdReal> Band<'_, T> {
     }
 }
 
+/// The rows at equal distance above and below.
+type RowPair<'a, T> = (&'a [T], &'a [T]);
+
 /// Sums of a column weighted with `G` and with `-G'`. The middle has weight 0 in the latter and is there so that a bad sample in it is not overlooked.
 #[inline(always)]
 fn sum_down<V: Lanes, const N: usize>(
     centre: &[V::Scalar],
-    pairs: &[(&[V::Scalar], &[V::Scalar])],
+    pairs: &[RowPair<'_, V::Scalar>],
     weights: &Weights<V::Scalar>,
     x: usize,
     smooth: &mut [V::Scalar],

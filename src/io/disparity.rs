@@ -69,7 +69,11 @@ impl DisparityFormat {
     pub fn write(self, path: &Path, map: &DisparityMap) -> Result<usize> {
         let (width, height) = map.disparity.size();
         if width == 0 || height == 0 || map.score.as_ref().is_some_and(|score| score.size() != (width, height)) {
-            return Err(Error::argument("disparity", "an array (H, W) and a score alike", format!("({height}, {width})")));
+            return Err(Error::argument(
+                "disparity",
+                "an array (H, W) and a score alike",
+                format!("({height}, {width})"),
+            ));
         }
         match self {
             Self::Npz => write_npz(path, map).map(|()| 0),
@@ -176,7 +180,8 @@ fn read_kitti_disparity(path: &Path) -> Result<Frame<f32>> {
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
     if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
-        let message = format!("not a disparity PNG: expected 16-bit grey, got {:?} {:?}", info.bit_depth, info.color_type);
+        let message =
+            format!("not a disparity PNG: expected 16-bit grey, got {:?} {:?}", info.bit_depth, info.color_type);
         return Err(Error::format(path, message));
     }
     if info.interlaced {

@@ -130,7 +130,8 @@ impl Task<'_> {
                 if middle[column] != own || !half_inside((x, y), (column, row as usize), radius, (width, height)) {
                     continue;
                 }
-                let support = agreement(&block, &right.data[row as usize * right.stride + column..], right.stride, window);
+                let support =
+                    agreement(&block, &right.data[row as usize * right.stride + column..], right.stride, window);
                 if best.is_none_or(|(most, _, _)| support > most) {
                     best = Some((support, d, e));
                 }

@@ -54,11 +54,7 @@ impl EdgeDisparity {
 ///
 /// # Errors
 /// [`Error::Argument`](crate::Error::Argument) for an option out of range, views (or a prior) of different size, or views smaller than 17 px.
-pub fn edge_disparity(
-    left: &Frame<f32>,
-    right: &Frame<f32>,
-    options: &EdgeDisparityOptions,
-) -> Result<EdgeDisparity> {
+pub fn edge_disparity(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<EdgeDisparity> {
     options.check_views(left, right)?;
     Ok(options.threads.install(|| match options.method {
         Method::Classes => by_classes(left, right, options),

@@ -20,5 +20,5 @@ mod subpixel;
 
 pub use disparity::{EdgeDisparity, edge_disparity};
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
-pub use row_offset::estimate_row_offset;
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
+pub use row_offset::estimate_row_offset;

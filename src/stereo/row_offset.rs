@@ -176,7 +176,7 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64) -> Opt
         }
         let step = moment / square;
         offset += step;
-        if !((offset - start).abs() <= FARTHEST) {
+        if offset.is_nan() || (offset - start).abs() > FARTHEST {
             return None;
         }
         for (window, misfit) in windows.iter_mut().zip(&misfits) {
@@ -200,9 +200,12 @@ mod tests {
     /// Soft cells seen by two cameras: the right one `offset` rows lower, disparity -3.3 px above and 2.4 px below the middle.
     fn views(offset: f64) -> [Frame<f32>; 2] {
         let rng = CounterRng::new(5);
-        let cells = Frame::from_fn(240, 200, |x, y| (rng.uniform((1000 * ((y + x / 3) / 11) + (x + y / 4) / 13) as u64) * 200.0) as f32);
+        let cells = Frame::from_fn(240, 200, |x, y| {
+            (rng.uniform((1000 * ((y + x / 3) / 11) + (x + y / 4) / 13) as u64) * 200.0) as f32
+        });
         let scene = GaussianSmoother::new(1.5).unwrap().apply(&cells);
-        let noisy = |x: usize, y: usize, value: f32, stream| value + rng.stream(stream).normal((1000 * y + x) as u64) as f32;
+        let noisy =
+            |x: usize, y: usize, value: f32, stream| value + rng.stream(stream).normal((1000 * y + x) as u64) as f32;
         let left = Frame::from_fn(180, 160, |x, y| noisy(x, y, scene.get(x + 30, y + 20), 1));
         let right = Frame::from_fn(180, 160, |x, y| {
             let row = y as f64 + 20.0 - offset;

@@ -112,8 +112,7 @@ fn lowest(sums: &[u16], costs: &[u16], allowed: std::ops::Range<usize>) -> Optio
         return None;
     }
     let inner = best > allowed.start && best + 1 < allowed.end;
-    let (before, own, after) =
-        if inner { (sums[best - 1], sums[best], sums[best + 1]) } else { (1, 0, 1) };
+    let (before, own, after) = if inner { (sums[best - 1], sums[best], sums[best + 1]) } else { (1, 0, 1) };
     let slope = 2.0 * f32::from(before.max(after) - own);
     let shift = if slope > 0.0 { (f32::from(before) - f32::from(after)) / slope } else { 0.0 };
     Some((best as f32 + shift, cost))
