@@ -35,10 +35,10 @@ pub struct MatchingArguments {
     #[arg(long, value_name = "NAME", default_value = "sgm")]
     pub method: String,
     /// Least and greatest disparity, px
-    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-40,24", value_parser = parse_range)]
+    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-40,24", allow_hyphen_values = true, value_parser = parse_range)]
     pub disparities: (i32, i32),
     /// Least and greatest row offset that are searched, rows
-    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-4,4", value_parser = parse_range)]
+    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-4,4", allow_hyphen_values = true, value_parser = parse_range)]
     pub rows: (i32, i32),
     /// How many rows lower the right view shows a point [default: estimated from the first pair (sgm), searched at every pixel (classes)]
     #[arg(long, value_name = "ROWS")]
@@ -225,6 +225,9 @@ impl StereoCommand {
         done: &mut Done,
     ) -> Result<()> {
         let total = views.len_hint();
+        if let Some(file) = self.output.as_deref().filter(|path| total > 1 && !is_folder(path)) {
+            return Err(Error::argument("output", format!("a folder for {total} pairs"), file.display()));
+        }
         let mut scale = None;
         loop {
             bar.step(done.pairs, total)?;
