@@ -12,6 +12,8 @@ mod commands;
 mod mistakes;
 #[path = "cli/recordings.rs"]
 mod recordings;
+#[path = "cli/stereo.rs"]
+mod stereo;
 #[path = "cli/streams.rs"]
 mod streams;
 #[path = "cli/tracks.rs"]

@@ -15,9 +15,11 @@ from ._jacoflow import (
     FlowField,
     FrameReader,
     _open_frames,
+    _read_disparity,
     _read_flow,
     _read_image,
     _read_pfm,
+    _write_disparity,
     _write_flow,
     _write_frames,
     _write_pfm,
@@ -26,11 +28,13 @@ from ._jacoflow import (
 __all__ = [
     "FrameReader",
     "frames",
+    "read_disparity",
     "read_flo",
     "read_image",
     "read_kitti",
     "read_npz",
     "read_pfm",
+    "write_disparity",
     "write_flo",
     "write_frames",
     "write_kitti",
@@ -103,6 +107,27 @@ def read_pfm(path: _Path) -> NDArray[np.float32]:
 def write_pfm(path: _Path, values: ArrayLike) -> None:
     """Writes an array (H, W) or (H, W, 3), in whatever unit, as float32 .pfm."""
     _write_pfm(path, values)
+
+
+def read_disparity(path: _Path) -> NDArray[np.float32]:
+    """Reads disparity: float32 array (H, W), px, NaN where there is none; .npz, .pfm (infinite where there is none) or .png (KITTI, 16 bit)."""
+    return _read_disparity(path)
+
+
+def write_disparity(path: _Path, disparity: ArrayLike) -> int:
+    """Writes disparity (H, W), px, NaN where there is none, by the name's ending; returns how many values the format could not hold.
+
+    .npz and .pfm hold all; .png is the KITTI benchmark's, 16 bit in steps of 1/256 px, for disparities above 0 and below 256 px.
+
+    >>> import tempfile, numpy as np
+    >>> from jacoflow import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     io.write_disparity(f"{folder}/d.png", np.array([[1.5, np.nan, -3.0]], np.float32))
+    ...     io.read_disparity(f"{folder}/d.png")
+    1
+    array([[1.5, nan, nan]], dtype=float32)
+    """
+    return _write_disparity(path, disparity)
 
 
 def read_npz(path: _Path) -> FlowField:

@@ -27,6 +27,33 @@ pub enum Layout {
     TopBottom,
 }
 
+/// How views are matched.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Method")]
+pub struct MatchingArguments {
+    /// How views are matched: sgm (gradients along chains of edge pixels, fractions of a px) or classes (directions in a window, whole px)
+    #[arg(long, value_name = "NAME", default_value = "sgm")]
+    pub method: String,
+    /// Least and greatest disparity, px
+    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-40,24", allow_hyphen_values = true, value_parser = parse_range)]
+    pub disparities: (i32, i32),
+    /// Least and greatest row offset that are searched, rows
+    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-4,4", allow_hyphen_values = true, value_parser = parse_range)]
+    pub rows: (i32, i32),
+    /// How many rows lower the right view shows a point [default: estimated from the first pair (sgm), searched at every pixel (classes)]
+    #[arg(long, value_name = "ROWS")]
+    pub row_offset: Option<f64>,
+    /// Whole disparities (sgm)
+    #[arg(long)]
+    pub whole: bool,
+    /// Keep what matching from the right view does not confirm too (sgm)
+    #[arg(long)]
+    pub unchecked: bool,
+    /// Least slope of an edge, grey levels/px
+    #[arg(long, value_name = "SLOPE", default_value_t = 2.0)]
+    pub threshold: f64,
+}
+
 /// Options of `stereo`.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -58,27 +85,8 @@ pub struct StereoCommand {
     /// Use every N-th pair
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Input", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
     pub step: usize,
-    /// How views are matched: sgm (gradients along chains of edge pixels, fractions of a px) or classes (directions in a window, whole px)
-    #[arg(long, value_name = "NAME", default_value = "sgm", help_heading = "Method")]
-    pub method: String,
-    /// Least and greatest disparity, px
-    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-40,24", help_heading = "Method", value_parser = parse_range)]
-    pub disparities: (i32, i32),
-    /// Least and greatest row offset that are searched, rows
-    #[arg(long, value_name = "LEAST,GREATEST", default_value = "-4,4", help_heading = "Method", value_parser = parse_range)]
-    pub rows: (i32, i32),
-    /// How many rows lower the right view shows a point [default: estimated from the first pair (sgm), searched at every pixel (classes)]
-    #[arg(long, value_name = "ROWS", help_heading = "Method")]
-    pub row_offset: Option<f64>,
-    /// Whole disparities (sgm)
-    #[arg(long, help_heading = "Method")]
-    pub whole: bool,
-    /// Keep what matching from the right view does not confirm too (sgm)
-    #[arg(long, help_heading = "Method")]
-    pub unchecked: bool,
-    /// Least slope of an edge, grey levels/px
-    #[arg(long, value_name = "SLOPE", default_value_t = 2.0, help_heading = "Method")]
-    pub threshold: f64,
+    #[command(flatten)]
+    pub matching: MatchingArguments,
     /// A folder (for disparity_000000.npz, ...), or for one pair a .npz, .pfm or .png (kitti) file
     #[arg(long, short, value_name = "OUT", help_heading = "Output")]
     pub output: Option<PathBuf>,
@@ -132,7 +140,7 @@ impl StereoCommand {
             tell(&done.in_words());
         }
         let summary = json!({
-            "command": "stereo", "method": self.method, "pairs": done.pairs, "files": done.files, "disparities": done.found,
+            "command": "stereo", "method": self.matching.method, "pairs": done.pairs, "files": done.files, "disparities": done.found,
             "not_held": done.lost, "row_offset": done.row_offset, "output": self.output, "picture": self.picture, "interrupted": interrupted,
         });
         Ok(Report { summary, failure })
@@ -141,13 +149,13 @@ impl StereoCommand {
     /// How views are matched, checked.
     fn options(&self) -> Result<EdgeDisparityOptions> {
         let options = EdgeDisparityOptions {
-            method: Method::parse(&self.method)?,
-            disparity_range: self.disparities,
-            row_range: self.rows,
-            row_offset: self.row_offset,
-            subpixel: !self.whole,
-            check: !self.unchecked,
-            threshold: self.threshold,
+            method: Method::parse(&self.matching.method)?,
+            disparity_range: self.matching.disparities,
+            row_range: self.matching.rows,
+            row_offset: self.matching.row_offset,
+            subpixel: !self.matching.whole,
+            check: !self.matching.unchecked,
+            threshold: self.matching.threshold,
             threads: Threads::new(self.threads)?,
             ..EdgeDisparityOptions::default()
         };
@@ -217,6 +225,9 @@ impl StereoCommand {
         done: &mut Done,
     ) -> Result<()> {
         let total = views.len_hint();
+        if let Some(file) = self.output.as_deref().filter(|path| total > 1 && !is_folder(path)) {
+            return Err(Error::argument("output", format!("a folder for {total} pairs"), file.display()));
+        }
         let mut scale = None;
         loop {
             bar.step(done.pairs, total)?;

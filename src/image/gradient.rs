@@ -79,7 +79,7 @@ impl<T: SimdReal> Band<'_, T> {
         // Both sums down the columns, with room for the border at either end.
         let mut smooth = vec![T::from_f64(0.0); width + 2 * radius];
         let mut slope = smooth.clone();
-        let mut pairs: Vec<(&[T], &[T])> = Vec::with_capacity(radius);
+        let mut pairs: Vec<RowPair<'_, T>> = Vec::with_capacity(radius);
         for (offset, (out_x, out_y)) in along_x.chunks_exact_mut(width).zip(along_y.chunks_exact_mut(width)).enumerate()
         {
             let y = (first_row + offset) as isize;
@@ -103,11 +103,14 @@ impl<T: SimdReal> Band<'_, T> {
     }
 }
 
+/// The rows at equal distance above and below.
+type RowPair<'a, T> = (&'a [T], &'a [T]);
+
 /// Sums of a column weighted with `G` and with `-G'`. The middle has weight 0 in the latter and is there so that a bad sample in it is not overlooked.
 #[inline(always)]
 fn sum_down<V: Lanes, const N: usize>(
     centre: &[V::Scalar],
-    pairs: &[(&[V::Scalar], &[V::Scalar])],
+    pairs: &[RowPair<'_, V::Scalar>],
     weights: &Weights<V::Scalar>,
     x: usize,
     smooth: &mut [V::Scalar],

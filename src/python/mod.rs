@@ -60,7 +60,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
     #[pymodule_export]
-    use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset};
+    use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity};
     #[pymodule_export]
     use super::stereo_track::{PyStereoTracker, PyTrackGraph};
     #[pymodule_export]

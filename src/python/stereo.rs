@@ -1,11 +1,14 @@
 //! Disparity for Python: two views in, arrays out; what a user meets is in `jacoflow.stereo`.
 
 use super::arrays::{self, ColourRule};
+use crate::error::{Error, Result};
+use crate::io::{DisparityFormat, DisparityMap};
 use crate::parallel::Threads;
 use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method};
 use crate::track::GreyLevels;
 use crate::types::{AnyFrame, Frame};
 use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
 
 /// Views in 8-bit grey levels; the first decides what the white of floats is.
 fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[Frame<f32>; N]> {
@@ -126,4 +129,25 @@ pub fn edge_pixels<'py>(
     let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
     let count = [map.len()];
     Ok((arrays::owned(py, &count, map.rows)?.into_any(), arrays::owned(py, &count, map.columns)?.into_any()))
+}
+
+/// The format that a file's name means.
+fn format_of(path: &Path) -> Result<DisparityFormat> {
+    let wanted = "a file name that ends in .npz, .pfm or .png";
+    DisparityFormat::of(path).ok_or_else(|| Error::argument("path", wanted, path.display()))
+}
+
+/// The compiled part of `jacoflow.io.read_disparity`: disparity (H, W), px.
+#[pyfunction(name = "_read_disparity")]
+pub fn read_disparity(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
+    let format = format_of(&path)?;
+    arrays::from_frame(py, py.detach(|| format.read(&path))?.disparity)
+}
+
+/// The compiled part of `jacoflow.io.write_disparity`: how many disparities the format could not hold.
+#[pyfunction(name = "_write_disparity")]
+pub fn write_disparity(path: PathBuf, disparity: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let format = format_of(&path)?;
+    let map = DisparityMap::plain(arrays::frame("disparity", disparity, ColourRule::Refuse)?.to_real());
+    Ok(disparity.py().detach(|| format.write(&path, &map))?)
 }

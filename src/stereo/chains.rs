@@ -191,3 +191,87 @@ fn chunk(values: &[u16], at: usize) -> &[u16; CHUNK] {
 fn chunk_mut(values: &mut [u16], at: usize) -> &mut [u16; CHUNK] {
     values[at..].first_chunk_mut().expect("whole chunks")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::cost::HIGHEST;
+    use super::super::edges::NO_CLASS;
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::types::Frame;
+
+    /// Edge pixels strewn over a view; nothing else of the map is looked at.
+    fn strewn(width: usize, height: usize, share: f64) -> EdgeMap {
+        let rng = CounterRng::new(2);
+        let plane = Frame::filled(width, height, 0.0f32);
+        let class = Frame::filled(width, height, NO_CLASS);
+        let (gradient_x, gradient_y, magnitude) = (plane.clone(), plane.clone(), plane);
+        let mut map = EdgeMap { gradient_x, gradient_y, magnitude, class, rows: vec![], columns: vec![] };
+        for at in 0..width * height {
+            if rng.uniform(at as u64) < share {
+                map.rows.push((at / width) as u32);
+                map.columns.push((at % width) as u32);
+            }
+        }
+        map
+    }
+
+    /// `L_r` by the definition: one direction, every edge pixel in an order in which those behind come first.
+    fn path(edges: &EdgeMap, costs: &[u16], padded: usize, (dx, dy): (i64, i64)) -> Vec<u16> {
+        let index = |x: i64, y: i64| {
+            (0..edges.len()).find(|&i| (i64::from(edges.columns[i]), i64::from(edges.rows[i])) == (x, y))
+        };
+        let mut order: Vec<usize> = (0..edges.len()).collect();
+        order.sort_by_key(|&i| dx * i64::from(edges.columns[i]) + dy * i64::from(edges.rows[i]));
+        let mut paths = vec![0u16; costs.len()];
+        for p in order {
+            let (x, y) = (i64::from(edges.columns[p]), i64::from(edges.rows[p]));
+            let behind = (1..=FARTHEST as i64).find_map(|g| Some((g as usize, index(x - g * dx, y - g * dy)?)));
+            for k in 0..padded {
+                let mut value = costs[p * padded + k];
+                if let Some((gap, q)) = behind {
+                    let before = &paths[q * padded..(q + 1) * padded];
+                    let least = *before.iter().min().unwrap();
+                    let [near, far] = penalties()[gap];
+                    let mut best = before[k].min(least + far);
+                    for beside in [k.checked_sub(1), (k + 1 < padded).then_some(k + 1)].into_iter().flatten() {
+                        best = best.min(before[beside] + near);
+                    }
+                    value += best - least;
+                }
+                paths[p * padded + k] = value;
+            }
+        }
+        paths
+    }
+
+    #[test]
+    fn both_sweeps_are_the_eight_directions_at_every_level() {
+        let edges = strewn(41, 37, 0.1);
+        let padded = 2 * CHUNK;
+        let rng = CounterRng::new(9);
+        let costs: Vec<u16> =
+            (0..edges.len() * padded).map(|i| (rng.uniform(i as u64) * f64::from(HIGHEST)) as u16).collect();
+        for (from, directions) in
+            [(From::Above, [(1, 0), (0, 1), (1, 1), (-1, 1)]), (From::Below, [(-1, 0), (0, -1), (1, -1), (-1, -1)])]
+        {
+            let mut want = vec![0u16; costs.len()];
+            for direction in directions {
+                for (sum, value) in want.iter_mut().zip(path(&edges, &costs, padded, direction)) {
+                    *sum += value;
+                }
+            }
+            assert_eq!(sweep(&edges, &costs, padded, from), want);
+            for level in Level::available() {
+                let mut total = vec![0u16; costs.len()];
+                dispatch(level, Sweep { edges: &edges, costs: &costs, padded, from, total: &mut total });
+                assert_eq!(total, want, "{level:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_edges_are_no_sums() {
+        assert!(sweep(&strewn(20, 20, 0.0), &[], CHUNK, From::Above).is_empty());
+    }
+}

@@ -58,7 +58,7 @@ impl Coded {
                     let Some(y) = row.checked_sub(RADIUS).filter(|y| *y < slopes.height()) else { continue };
                     for (out, &slope) in out[border..].iter_mut().zip(slopes.row(y)) {
                         if slope.is_finite() {
-                            *out = (slope * STEPS).clamp(-LARGEST, LARGEST).round_ties_even() as i16;
+                            *out = rounded((slope * STEPS).clamp(-LARGEST, LARGEST));
                         }
                     }
                 }
@@ -67,6 +67,13 @@ impl Coded {
         };
         Self { stride, border, x: code(along_x), y: code(along_y) }
     }
+}
+
+/// The nearest whole number to a value within [`LARGEST`] of 0. Cut off rather than rounded, which not every processor can do to many at a time.
+#[inline(always)]
+fn rounded(value: f32) -> i16 {
+    const SHIFT: f32 = 2.0 * LARGEST;
+    ((value + (SHIFT + 0.5)) as i32 - SHIFT as i32) as i16
 }
 
 /// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x + first + k` of the other view.
@@ -168,4 +175,59 @@ impl Kernel<f32> for OnePixel<'_> {
 #[inline(always)]
 fn chunk_of<const N: usize>(values: &[i16]) -> &[i16; N] {
     values.first_chunk().expect("the border is as wide as the candidates reach")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::edges::EdgeSettings;
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    fn slopes(seed: u64) -> Frame<f32> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(40, 30, |x, y| (rng.normal((40 * y + x) as u64) * 4.0) as f32)
+    }
+
+    #[test]
+    fn costs_are_those_of_the_definition() {
+        let view = Frame::from_fn(40, 30, |x, y| if (x / 9 + y / 7) % 2 == 0 { 50.0f32 } else { 150.0 });
+        let edges = EdgeMap::new(&view, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        let (own, mut other) = ([slopes(1), slopes(2)], [slopes(3), slopes(4)]);
+        other[0].data_mut()[15 * 40 + 20] = f32::NAN;
+        let candidates = Candidates { first: -6, count: 19 };
+        let coded = Coded::new(&own[0], &own[1], Side::Left, candidates.reach());
+        let others = Coded::new(&other[0], &other[1], Side::Right, candidates.reach());
+        let allowed = |edge: usize| candidates.inside(edges.columns[edge], 40);
+        let got = costs(&edges, &coded, &others, candidates, allowed);
+        assert!(edges.len() > 50);
+        for edge in 0..edges.len() {
+            let (x, y) = (i64::from(edges.columns[edge]), i64::from(edges.rows[edge]));
+            for k in 0..candidates.padded() {
+                let middle = x + i64::from(candidates.first) + k as i64;
+                let mut sum = 0.0f32;
+                for (j, i) in (-2..=2).flat_map(|j| (-2..=2).map(move |i| (j, i))) {
+                    let at = |plane: &Frame<f32>, x: i64, y: i64| {
+                        let inside = (0..40).contains(&x) && (0..30).contains(&y);
+                        if inside { plane.get(x as usize, y as usize) } else { f32::NAN }
+                    };
+                    let difference: f32 =
+                        (0..2).map(|c| (at(&own[c], x + i, y + j) - at(&other[c], middle + i, y + j)).abs()).sum();
+                    sum += if difference < 6.0 { difference } else { 6.0 };
+                }
+                let mut want = sum / 25.0;
+                if k >= candidates.count || !(0..40).contains(&middle) {
+                    want = 6.0;
+                }
+                let cost = f32::from(got[edge * candidates.padded() + k]) / f32::from(UNIT);
+                assert!((cost - want).abs() < 0.08, "{edge} {k}: {cost} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_are_rounded_to_the_nearest_step() {
+        for (value, step) in [(0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (LARGEST, 8000), (-LARGEST, -8000)] {
+            assert_eq!(rounded(value), step, "{value}");
+        }
+    }
 }

@@ -128,8 +128,10 @@ impl EdgeMap {
 /// (5): `floor((theta + 180 / n) / (360 / n)) mod n` degrees of the gradient's signed direction `theta`.
 #[inline]
 fn direction_class(x: f32, y: f32, classes: usize) -> u8 {
-    let turns = f64::from(y.atan2(x)) / std::f64::consts::TAU;
-    ((turns * classes as f64 + 0.5).floor() as i64).rem_euclid(classes as i64) as u8
+    let turns = y.atan2(x) / std::f32::consts::TAU;
+    // From -1/2 to 1/2 turn: a turn more, and cutting off is rounding down.
+    let class = ((turns + 1.0) * classes as f32 + 0.5) as u32;
+    (class % classes as u32) as u8
 }
 
 #[cfg(test)]

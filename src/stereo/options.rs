@@ -117,7 +117,7 @@ impl EdgeDisparityOptions {
     pub fn check(&self) -> Result<()> {
         check_range("disparity_range", self.disparity_range)?;
         check_range("row_range", self.row_range)?;
-        if let Some(rows) = self.row_offset.filter(|rows| !(rows.abs() <= 32768.0)) {
+        if let Some(rows) = self.row_offset.filter(|rows| rows.is_nan() || rows.abs() > 32768.0) {
             return Err(Error::argument("row_offset", "rows, finite and within 32768 of 0", rows));
         }
         if !(0.5..=16.0).contains(&self.sigma) {

@@ -1,5 +1,9 @@
 //! How many rows lower the right camera sees a point: section 6.1.
+//!
+//! Along a slanted edge a wrong row offset looks like a wrong disparity. Each window's own shift along x is therefore solved for together with the one offset that all share, and only
+//! what no shift along x explains speaks for an offset.
 
+use super::align::rows_moved;
 use super::classes::{match_classes, most_frequent_row};
 use super::disparity::match_aligned;
 use super::edges::{EdgeMap, EdgeSettings};
@@ -8,26 +12,34 @@ use super::semi_global::{Match, View};
 use crate::error::Result;
 use crate::image::{Border, GaussianSmoother, Interpolation};
 use crate::types::Frame;
-use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Passes of disparity and vertical steps.
 const PASSES: usize = 2;
 /// Vertical steps of a pass.
 const STEPS: usize = 6;
 /// A step as short as this is the last, rows.
-const SHORT: f64 = 1e-4;
-/// Every how many edge pixels one is asked for its row.
+const SHORT: f64 = 1e-3;
+/// Farthest from the start of a pass that an offset is believed, rows.
+const FARTHEST: f64 = 1.5;
+/// Every how many edge pixels one is asked for its row by classes.
 const SAMPLED: usize = 4;
-/// Least number of matched edge pixels that vertical steps are made with.
-const LEAST_MATCHES: usize = 30;
+/// Most windows that vertical steps are made with, and the least.
+const WINDOWS: (usize, usize) = (6000, 30);
+/// Pixels on each side of the middle of a window.
+const RADIUS: usize = 4;
+/// Pixels of a window.
+const AREA: usize = (2 * RADIUS + 1) * (2 * RADIUS + 1);
 /// Least scale of the residuals, grey levels: rounding.
 const LEAST_SCALE: f64 = 0.5;
+/// Least sum of squared slopes of a window, (grey levels/px)^2, before it is divided by.
+const LEAST_SLOPE: f64 = 4.0;
 
 /// How many rows lower the right view shows a point: `y_right - y_left`, rows with fractions; 0 where nothing can be matched.
 ///
 /// The most frequent row offset of the class matching (section 2.3) of some edge pixels within `row_range`, then twice: disparity by semi-global matching of the rows so aligned,
-/// and Lucas-Kanade steps along y over all matched edge pixels, `L = a R(x - d, y + e) + b` with weights `1 / (1 + (r / 2 s)^2)^2`. `row_offset`, `prior` and the method of the options are not looked at.
-/// Identical for any number of threads.
+/// and Lucas-Kanade steps along y in 9 x 9 windows round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the median of all.
+/// `row_offset`, `prior` and the method of the options are not looked at. Identical for any number of threads.
 ///
 /// # Errors
 /// As [`edge_disparity`](super::edge_disparity).
@@ -46,60 +58,131 @@ pub(super) fn row_offset_of(left: &Frame<f32>, view: &View, right: &Frame<f32>, 
     let matches = match_classes(&view.edges, &classes, &options, options.row_range, SAMPLED);
     let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
-    let (smooth_left, smooth_right) = rayon::join(|| smoother.apply(left), || smoother.apply(right));
+    let (left_smooth, right_smooth) = rayon::join(|| smoother.apply(left), || smoother.apply(right));
     for _ in 0..PASSES {
         let matches = match_aligned(left, view, right, offset, &options);
-        let Some(refined) = vertical_steps(&smooth_left, view, &smooth_right, &matches, offset) else { break };
+        let mut windows = windows(&left_smooth, view, &matches);
+        let Some(refined) = vertical_steps(&mut windows, &right_smooth, offset) else { break };
         offset = refined;
     }
     offset
 }
 
-/// One matched edge pixel: brightness and vertical slope on the left, and where it is on the right for a row offset of 0.
-struct Sample {
-    brightness: f64,
-    slope: f64,
-    x: f64,
-    y: f64,
+/// The window round a matched edge pixel.
+struct Window {
+    /// Slopes along x and along y, each less its mean.
+    slopes: [[f64; 2]; AREA],
+    /// Brightness on the left.
+    brightness: [f64; AREA],
+    /// `sum g_x^2`, `sum g_x g_y`, `sum g_y^2`.
+    squares: [f64; 3],
+    /// Column of the match and row of the pixel, px.
+    at: (f64, usize),
 }
 
-impl Sample {
-    /// What a row of offset, of gain and of bias change.
-    fn row(&self) -> Vector3<f64> {
-        Vector3::new(self.slope, self.brightness, 1.0)
+/// What one window says of a step: `sum g (L - R)` along x and y, and the root mean square of `L - R` less its mean.
+#[derive(Clone, Copy)]
+struct Misfit {
+    moments: [f64; 2],
+    residual: f64,
+}
+
+/// Windows that lie inside the left view, at most [`WINDOWS`] of them, spread over the picture.
+fn windows(left: &Frame<f32>, view: &View, matches: &[Option<Match>]) -> Vec<Window> {
+    let (width, height) = left.size();
+    let inside = |x: usize, y: usize| x >= RADIUS && y >= RADIUS && x + RADIUS < width && y + RADIUS < height;
+    let places: Vec<(usize, usize, f64)> = (view.edges.rows.iter().zip(&view.edges.columns).zip(matches))
+        .filter_map(|((&row, &column), found)| Some((column as usize, row as usize, f64::from((*found)?.disparity))))
+        .filter(|&(x, y, _)| inside(x, y))
+        .collect();
+    let every = places.len().div_ceil(WINDOWS.0).max(1);
+    places.iter().step_by(every).map(|&(x, y, disparity)| Window::new(left, view, (x, y), disparity)).collect()
+}
+
+impl Window {
+    fn new(left: &Frame<f32>, view: &View, (x, y): (usize, usize), disparity: f64) -> Self {
+        let (mut slopes, mut brightness) = ([[0.0; 2]; AREA], [0.0; AREA]);
+        let mut mean = [0.0; 2];
+        for (i, (slope, value)) in slopes.iter_mut().zip(&mut brightness).enumerate() {
+            let (column, row) = (x - RADIUS + i % (2 * RADIUS + 1), y - RADIUS + i / (2 * RADIUS + 1));
+            *slope = [view.along_x.get(column, row), view.along_y.get(column, row)].map(f64::from);
+            *value = f64::from(left.get(column, row));
+            mean = [mean[0] + slope[0] / AREA as f64, mean[1] + slope[1] / AREA as f64];
+        }
+        let mut squares = [0.0; 3];
+        for slope in &mut slopes {
+            *slope = [slope[0] - mean[0], slope[1] - mean[1]];
+            squares[0] += slope[0] * slope[0];
+            squares[1] += slope[0] * slope[1];
+            squares[2] += slope[1] * slope[1];
+        }
+        squares[0] = squares[0].max(LEAST_SLOPE);
+        Self { slopes, brightness, squares, at: (x as f64 - disparity, y) }
     }
 
-    /// What is left of the difference to the right view's brightness `value`.
-    fn misfit(&self, value: f64, solution: &Vector3<f64>) -> f64 {
-        self.brightness - value - self.row().dot(solution)
+    /// Compares the window with the aligned right view; none where that does not reach, or knows nothing.
+    fn misfit(&self, right: &Frame<f32>) -> Option<Misfit> {
+        let first = self.at.0.floor();
+        let leftmost = first - RADIUS as f64 - 1.0;
+        if !(leftmost >= 0.0 && leftmost + 2.0 * RADIUS as f64 + 4.0 <= right.width() as f64) {
+            return None;
+        }
+        let weights = Interpolation::Bicubic.weights(self.at.0 - first);
+        let (mut moments, mut sum, mut square) = ([0.0; 2], 0.0, 0.0);
+        for j in 0..=2 * RADIUS {
+            let row = &right.row(self.at.1 + j - RADIUS)[leftmost as usize..];
+            for i in 0..=2 * RADIUS {
+                let value: f64 = (0..4).map(|k| weights[k] * f64::from(row[i + k])).sum();
+                let pixel = j * (2 * RADIUS + 1) + i;
+                let difference = self.brightness[pixel] - value;
+                moments[0] += self.slopes[pixel][0] * difference;
+                moments[1] += self.slopes[pixel][1] * difference;
+                sum += difference;
+                square += difference * difference;
+            }
+        }
+        let area = AREA as f64;
+        let residual = (square / area - (sum / area).powi(2)).max(0.0).sqrt();
+        residual.is_finite().then_some(Misfit { moments, residual })
+    }
+
+    /// Moment and square of the offset once the window's own shift along x is solved for.
+    fn vertical(&self, moments: [f64; 2]) -> (f64, f64) {
+        let [xx, xy, yy] = self.squares;
+        (moments[1] - xy / xx * moments[0], yy - xy * xy / xx)
     }
 }
 
-/// The offset after Lucas-Kanade steps along y; none without enough matches, or when they leave the neighbourhood of the start.
-fn vertical_steps(
-    left: &Frame<f32>,
-    view: &View,
-    right: &Frame<f32>,
-    matches: &[Option<Match>],
-    start: f64,
-) -> Option<f64> {
-    let mut samples = Vec::new();
-    for ((&row, &column), found) in view.edges.rows.iter().zip(&view.edges.columns).zip(matches) {
-        let Some(found) = found else { continue };
-        let (x, y) = (column as usize, row as usize);
-        samples.push(Sample {
-            brightness: f64::from(left.get(x, y)),
-            slope: f64::from(view.along_y.get(x, y)),
-            x: f64::from(column) - f64::from(found.disparity),
-            y: f64::from(row),
-        });
-    }
+/// The offset after Lucas-Kanade steps along y; none without enough windows, or when they leave the neighbourhood of the start.
+fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64) -> Option<f64> {
     let mut offset = start;
     for _ in 0..STEPS {
-        let step = vertical_step(&samples, right, offset)?;
-        offset += step;
-        if !((offset - start).abs() <= 1.5) {
+        let aligned = rows_moved(right, offset);
+        let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(&aligned)).collect();
+        let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();
+        if residuals.len() < WINDOWS.1 {
             return None;
+        }
+        let middle = residuals.len() / 2;
+        let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(LEAST_SCALE);
+        // Summed in the order of the windows, whatever the threads.
+        let (mut moment, mut square) = (0.0, 0.0);
+        for (window, misfit) in windows.iter().zip(&misfits) {
+            let Some(misfit) = misfit else { continue };
+            let weight = (1.0 + (misfit.residual / (2.0 * scale)).powi(2)).powi(-2);
+            let (m, s) = window.vertical(misfit.moments);
+            moment += weight * m;
+            square += weight * s;
+        }
+        let step = moment / square;
+        offset += step;
+        if offset.is_nan() || (offset - start).abs() > FARTHEST {
+            return None;
+        }
+        for (window, misfit) in windows.iter_mut().zip(&misfits) {
+            let Some(misfit) = misfit else { continue };
+            let [xx, xy, _] = window.squares;
+            window.at.0 += ((misfit.moments[0] - xy * step) / xx).clamp(-1.0, 1.0);
         }
         if step.abs() < SHORT {
             break;
@@ -108,30 +191,43 @@ fn vertical_steps(
     Some(offset)
 }
 
-/// One step: `r = L - R(y + e)` explained by `slope de + (gain - 1) L + bias`, first all alike, then weighted by how well each is explained.
-fn vertical_step(samples: &[Sample], right: &Frame<f32>, offset: f64) -> Option<f64> {
-    let seen: Vec<(&Sample, f64)> = samples
-        .iter()
-        .map(|sample| (sample, f64::from(Interpolation::Bicubic.at(right, sample.x, sample.y + offset))))
-        .filter(|(_, value)| value.is_finite())
-        .collect();
-    if seen.len() < LEAST_MATCHES {
-        return None;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::cubic_at;
+    use crate::math::random::CounterRng;
+
+    /// Soft cells seen by two cameras: the right one `offset` rows lower, disparity -3.3 px above and 2.4 px below the middle.
+    fn views(offset: f64) -> [Frame<f32>; 2] {
+        let rng = CounterRng::new(5);
+        let cells = Frame::from_fn(240, 200, |x, y| {
+            (rng.uniform((1000 * ((y + x / 3) / 11) + (x + y / 4) / 13) as u64) * 200.0) as f32
+        });
+        let scene = GaussianSmoother::new(1.5).unwrap().apply(&cells);
+        let noisy =
+            |x: usize, y: usize, value: f32, stream| value + rng.stream(stream).normal((1000 * y + x) as u64) as f32;
+        let left = Frame::from_fn(180, 160, |x, y| noisy(x, y, scene.get(x + 30, y + 20), 1));
+        let right = Frame::from_fn(180, 160, |x, y| {
+            let row = y as f64 + 20.0 - offset;
+            let disparity = if row < 100.0 { -3.3 } else { 2.4 };
+            noisy(x, y, 1.02 * cubic_at(&scene, x as f64 + 30.0 + disparity, row) + 2.0, 2)
+        });
+        [left, right]
     }
-    let mut solution = Vector3::zeros();
-    let mut scale = f64::INFINITY;
-    for _ in 0..3 {
-        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
-        for (sample, value) in &seen {
-            let weight = (1.0 + (sample.misfit(*value, &solution) / (2.0 * scale)).powi(2)).powi(-2);
-            normal += sample.row() * sample.row().transpose() * weight;
-            moment += sample.row() * (weight * (sample.brightness - value));
+
+    #[test]
+    fn offsets_between_rows_are_found_along_slanted_edges() {
+        let options = EdgeDisparityOptions { disparity_range: (-8, 8), ..EdgeDisparityOptions::default() };
+        for offset in [-2.3, 0.0, 0.5, 1.4] {
+            let [left, right] = views(offset);
+            let found = estimate_row_offset(&left, &right, &options).unwrap();
+            assert!((found - offset).abs() < 0.05, "{found} for {offset}");
         }
-        solution = normal.cholesky()?.solve(&moment);
-        let mut misfits: Vec<f64> = seen.iter().map(|(s, value)| s.misfit(*value, &solution).abs()).collect();
-        let middle = misfits.len() / 2;
-        let (_, median, _) = misfits.select_nth_unstable_by(middle, f64::total_cmp);
-        scale = (1.4826 * *median).max(LEAST_SCALE);
     }
-    Some(solution[0])
+
+    #[test]
+    fn nothing_to_match_is_no_offset() {
+        let flat = Frame::filled(64, 64, 9.0f32);
+        assert_eq!(estimate_row_offset(&flat, &flat, &EdgeDisparityOptions::default()).unwrap(), 0.0);
+    }
 }

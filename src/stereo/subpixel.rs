@@ -95,8 +95,8 @@ impl Task<'_> {
         for _ in 0..STEPS {
             let step = (sum - between(&places, at)) / squares;
             at += step;
-            // NaN, from a bad sample, is not within reach either.
-            if !((at - from).abs() <= FARTHEST) {
+            // NaN comes from a bad sample.
+            if at.is_nan() || (at - from).abs() > FARTHEST {
                 return None;
             }
             if step.abs() < SHORT {
@@ -143,4 +143,49 @@ fn between(places: &[f32; PLACES], at: f32) -> f32 {
         sum += weights[i] as f32 * places[first + i];
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::edges::EdgeSettings;
+    use super::*;
+
+    #[test]
+    fn shifts_of_a_smooth_pattern_are_found_and_gain_and_bias_do_not_matter() {
+        let pattern = |x: f64, y: f64| 100.0 + 40.0 * (0.35 * x + 0.05 * y).sin() + 20.0 * (0.13 * x - 0.2 * y).cos();
+        let left = Frame::from_fn(80, 60, |x, y| pattern(x as f64, y as f64) as f32);
+        let view = View::new(&left, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        assert!(view.edges.len() > 200);
+        for truth in [2.0f32, 2.4, 2.75, -0.6] {
+            let right =
+                Frame::from_fn(80, 60, |x, y| (1.01 * pattern(x as f64 + f64::from(truth), y as f64) + 7.0) as f32);
+            for start in [-0.45f32, 0.0, 0.4] {
+                let mut matches = vec![Some(Match { disparity: truth + start, cost: 0.1 }); view.edges.len()];
+                refine(&left, &view, &right, &mut matches);
+                let mut errors = Vec::new();
+                for (found, &x) in matches.iter().flatten().zip(&view.edges.columns) {
+                    if (14..66).contains(&x) {
+                        errors.push((found.disparity - truth).abs());
+                    }
+                }
+                errors.sort_by(f32::total_cmp);
+                assert!(
+                    errors[errors.len() / 2] < 0.01 && errors[errors.len() * 9 / 10] < 0.05,
+                    "{truth} {start} {errors:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_refined_stays() {
+        let left = Frame::from_fn(60, 40, |_, y| if y < 20 { 50.0f32 } else { 150.0 });
+        let view = View::new(&left, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        let before = vec![Some(Match { disparity: 1.25, cost: 0.1 }); view.edges.len()];
+        let mut after = before.clone();
+        refine(&left, &view, &left, &mut after);
+        assert_eq!(after, before);
+        refine(&left, &view, &left.map(|_| f32::NAN), &mut after);
+        assert_eq!(after, before);
+    }
 }

@@ -215,7 +215,7 @@ mod tests {
         all.rest(1, |k| k == 0);
         for time in 2..5 {
             all.name_all(time, &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
-            assert_eq!(all.live[0], LEAST, None);
+            assert_eq!(all.live[0], None);
         }
         let (mut elsewhere, mut small) = (all.clone(), all.clone());
         small.name_all(5, &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));

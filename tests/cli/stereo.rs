@@ -1,0 +1,152 @@
+//! `jacoflow stereo`: pairs in every layout, formats, pictures, mistakes.
+
+use super::support::Place;
+use jacoflow::io::{Colour, DisparityFormat, read_image};
+use std::fs;
+
+const WIDTH: usize = 96;
+const HEIGHT: usize = 64;
+/// Disparity of the pair `index`, px.
+fn disparity(index: usize) -> usize {
+    3 + index
+}
+
+/// Level of a cell of 8 px.
+fn cell(x: usize, y: usize) -> u8 {
+    let mut bits = ((x / 8) * 7919 + (y / 8) * 104_729 + 12_345) as u32;
+    for _ in 0..3 {
+        bits = (bits ^ (bits >> 7)).wrapping_mul(2_654_435_761);
+    }
+    20 + (bits >> 16) as u8 % 200
+}
+
+/// The views of a pair: what the left one shows at `x`, the right one shows at `x - disparity`.
+fn views(index: usize) -> [Vec<u8>; 2] {
+    [200, 200 + disparity(index)].map(|from| (0..WIDTH * HEIGHT).map(|i| cell(i % WIDTH + from, i / WIDTH)).collect())
+}
+
+/// A place with `left/`, `right/`, `beside.y4m` and `above.y4m` of some pairs.
+fn recorded(pairs: usize) -> Place {
+    let place = Place::new();
+    let header = |w: usize, h: usize| format!("YUV4MPEG2 W{w} H{h} F25:1 Ip A1:1 Cmono\n").into_bytes();
+    let (mut beside, mut above) = (header(2 * WIDTH, HEIGHT), header(WIDTH, 2 * HEIGHT));
+    for (side, folder) in ["left", "right"].into_iter().enumerate() {
+        fs::create_dir(place.path(folder)).unwrap();
+        for index in 0..pairs {
+            let bytes = [format!("P5\n{WIDTH} {HEIGHT}\n255\n").into_bytes(), views(index)[side].clone()].concat();
+            fs::write(place.path(folder).join(format!("{index}.pgm")), bytes).unwrap();
+        }
+    }
+    for index in 0..pairs {
+        let [left, right] = views(index);
+        for film in [&mut beside, &mut above] {
+            film.extend(b"FRAME\n");
+        }
+        for (a, b) in left.chunks(WIDTH).zip(right.chunks(WIDTH)) {
+            beside.extend([a, b].concat());
+        }
+        above.extend([left, right].concat());
+    }
+    fs::write(place.path("beside.y4m"), beside).unwrap();
+    fs::write(place.path("above.y4m"), above).unwrap();
+    place
+}
+
+/// Median of the disparities in a file.
+fn median(place: &Place, name: &str, format: DisparityFormat) -> f32 {
+    let map = format.read(&place.path(name)).unwrap();
+    assert_eq!(map.disparity.size(), (WIDTH, HEIGHT));
+    let mut values: Vec<f32> = map.disparity.data().iter().copied().filter(|d| d.is_finite()).collect();
+    assert!(values.len() > 300, "{name}: {}", values.len());
+    values.sort_by(f32::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn every_layout_gives_the_same_disparities() {
+    let place = recorded(3);
+    let common = "--disparities -8,12 --format npz,pfm,kitti --json";
+    for (folder, line) in [
+        ("a", "stereo left right"),
+        ("b", "stereo beside.y4m --layout side-by-side"),
+        ("c", "stereo above.y4m --layout top-bottom"),
+    ] {
+        let summary = place.good(&format!("{line} {common} -o {folder}")).json();
+        assert_eq!((summary["pairs"].as_u64(), summary["files"].as_u64()), (Some(3), Some(9)));
+        assert!(summary["row_offset"].as_f64().unwrap().abs() < 0.05, "{summary}");
+        assert_eq!(place.names(folder).len(), 9);
+        for format in DisparityFormat::ALL {
+            for index in 0..3 {
+                let name = format!("{folder}/disparity_{index:06}.{}", format.extension());
+                assert!((median(&place, &name, format) - disparity(index) as f32).abs() < 0.1, "{name}");
+                assert_eq!(
+                    fs::read(place.path(&name)).unwrap(),
+                    fs::read(place.path(&name.replacen(folder, "a", 1))).unwrap()
+                );
+            }
+        }
+    }
+    let map = DisparityFormat::Npz.read(&place.path("a/disparity_000000.npz")).unwrap();
+    assert!(map.score.is_some() && map.row_offset.is_some());
+}
+
+#[test]
+fn classes_give_whole_pixels_and_pictures_show_them() {
+    let place = recorded(3);
+    let line = "stereo left right --method classes --disparities -8,12 --first 1 --limit 1 -o d.pfm --picture p";
+    let ended = place.good(line);
+    assert!(ended.err.contains("1 pairs") && ended.out.is_empty(), "{}", ended.err);
+    let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap();
+    assert!(map.disparity.data().iter().all(|d| d.is_nan() || d.fract() == 0.0));
+    assert_eq!(median(&place, "d.pfm", DisparityFormat::Pfm), 4.0);
+    assert_eq!(place.names("p"), ["stereo_000001.png"]);
+    assert!(read_image(place.path("p/stereo_000001.png"), Colour::Error).is_err(), "disparities are colours");
+    let picture = read_image(place.path("p/stereo_000001.png"), Colour::Luminance).unwrap();
+    assert_eq!(picture.size(), (WIDTH, HEIGHT));
+    let again = place.line(line);
+    assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
+    place.good(&format!("{line} --force --threads 1"));
+}
+
+#[test]
+fn disparities_that_a_format_cannot_hold_are_told() {
+    let place = recorded(1);
+    let ended = place.good("stereo right left --disparities -8,8 -o d.png --row-offset 0");
+    assert!(ended.err.contains("do not fit the kitti format"), "{}", ended.err);
+}
+
+#[test]
+fn mistakes_are_named_and_leave_nothing() {
+    let place = recorded(2);
+    fs::write(place.path("old.npz"), "mine").unwrap();
+    fs::remove_file(place.path("right/1.pgm")).unwrap();
+    let before = place.names(".");
+    for (line, words) in [
+        ("stereo", &["VIEW"][..]),
+        ("stereo left -o o", &["input", "--layout"]),
+        ("stereo left right --layout top-bottom -o o", &["input", "one input"]),
+        ("stereo left right", &["output", "--picture"]),
+        ("stereo left right -o o --method magic", &["method", "sgm"]),
+        ("stereo left right -o o --disparities 3", &["--disparities"]),
+        ("stereo left right -o o --disparities -4000,4000", &["disparity_range"]),
+        ("stereo left right -o o --row-offset nan", &["row_offset"]),
+        ("stereo left right -o o --threshold 0", &["threshold"]),
+        ("stereo left right -o o --format flo", &["format", "npz"]),
+        ("stereo left right -o d.flo", &["output", ".npz"]),
+        ("stereo left right -o d.npz --format pfm", &["output", "folder"]),
+        ("stereo left right -o old.npz", &["output", "--force"]),
+        ("stereo left right -o o --threads 0", &["--threads"]),
+        ("stereo left beside.y4m -o o.npz --limit 1", &["right", "(64, 96)", "(64, 192)"]),
+    ] {
+        let ended = place.line(line);
+        assert_eq!(ended.code, 2, "{line}: {}", ended.err);
+        for word in words {
+            assert!(ended.err.contains(word), "{line}: no {word:?} in {}", ended.err);
+        }
+    }
+    assert_eq!(place.names("."), before);
+    assert_eq!(fs::read_to_string(place.path("old.npz")).unwrap(), "mine");
+    let ended = place.line("stereo left right -o o");
+    assert!(ended.code == 2 && ended.err.contains("fewer right than left"), "{}", ended.err);
+    assert_eq!(place.line("stereo left nowhere -o o2").code, 1);
+}
