@@ -82,9 +82,9 @@ impl MixtureOptions {
     /// # Errors
     /// [`Error::Argument`] naming what cannot be used, whatever the points are.
     pub(super) fn check(&self) -> Result<()> {
-        let positive = |name, value: f64| match value.is_finite() && value > 0.0 {
-            true => Ok(()),
-            false => Err(Error::argument(name, "a finite number above 0", value)),
+        let positive = |name, value: f64| {
+            let sound = value.is_finite() && value > 0.0;
+            if sound { Ok(()) } else { Err(Error::argument(name, "a finite number above 0", value)) }
         };
         for (name, count) in [("n_components", self.components), ("max_iter", self.max_iter), ("n_init", self.n_init)] {
             if count == 0 {

@@ -63,7 +63,9 @@ impl Posterior {
     pub(super) fn retain(&mut self, keep: &[bool]) {
         let d = self.dimensions;
         let single = [&mut self.weight_concentration, &mut self.mean_precision, &mut self.degrees_of_freedom];
-        single.into_iter().for_each(|values| keep_rows(values, 1, keep));
+        for values in single {
+            keep_rows(values, 1, keep);
+        }
         keep_rows(&mut self.means, d, keep);
         keep_rows(&mut self.scale_inverses, d * d, keep);
     }
@@ -237,7 +239,9 @@ impl Densities {
             *share = (*share - most).exp();
             sum += *share;
         }
-        shares.iter_mut().for_each(|share| *share /= sum);
+        for share in shares.iter_mut() {
+            *share /= sum;
+        }
         most + sum.ln()
     }
 }

@@ -185,7 +185,7 @@ fn small_components_can_be_left_out() {
     let points = Points { dimensions: 2, values: &x, weights: Some(&f) };
     let pruned = fit(&points, &MixtureOptions { prune_weight: 5.0, ..options(20, 100) }, Start::Seeds).unwrap();
     let components = pruned.posterior.components();
-    assert!(components < 20 && components >= 4, "{components}");
+    assert!((4..20).contains(&components), "{components}");
     assert!(pruned.moments.counts.iter().all(|n| *n >= 5.0));
     let all = fit(&points, &MixtureOptions { prune_weight: 1e9, ..options(20, 100) }, Start::Seeds).unwrap();
     assert_eq!(all.posterior.components(), 1);

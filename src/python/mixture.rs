@@ -125,7 +125,7 @@ fn retained(from: &Bound<'_, PyDict>) -> PyResult<Retained> {
 }
 
 /// A fit as a dictionary of arrays.
-fn told<'py>(py: Python<'py>, fit: Fit) -> PyResult<Bound<'py, PyDict>> {
+fn told(py: Python<'_>, fit: Fit) -> PyResult<Bound<'_, PyDict>> {
     let out = PyDict::new(py);
     let (k, d) = (fit.posterior.components(), fit.posterior.dimensions);
     let rounds = fit.lower_bounds.len();

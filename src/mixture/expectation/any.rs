@@ -10,7 +10,7 @@ use std::ops::Range;
 pub(super) struct AnyBand<'a> {
     pub planes: &'a Planes,
     pub densities: &'a Densities,
-    pub band: Range<usize>,
+    pub points: Range<usize>,
 }
 
 impl Kernel<f64> for AnyBand<'_> {
@@ -25,7 +25,7 @@ impl Kernel<f64> for AnyBand<'_> {
         let mut off = vec![0.0; d * BLOCK];
         let mut weighted = vec![0.0; d * BLOCK];
         let mut negentropy = 0.0;
-        for from in self.band.step_by(BLOCK) {
+        for from in self.points.step_by(BLOCK) {
             let mut most = [f64::NEG_INFINITY; BLOCK];
             for (k, logs) in logs.chunks_exact_mut(BLOCK).enumerate() {
                 differences::<V>(self.planes, self.densities, k, from, &mut off);

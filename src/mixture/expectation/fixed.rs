@@ -10,7 +10,7 @@ use std::ops::Range;
 pub(super) struct Band<'a, const D: usize> {
     pub planes: &'a Planes,
     pub densities: &'a Densities,
-    pub band: Range<usize>,
+    pub points: Range<usize>,
 }
 
 impl<const D: usize> Kernel<f64> for Band<'_, D> {
@@ -23,7 +23,7 @@ impl<const D: usize> Kernel<f64> for Band<'_, D> {
         let mut lanes = vec![0.0; components * length * V::LANES];
         let mut logs = vec![0.0; components * BLOCK];
         let mut negentropy = 0.0;
-        for from in self.band.step_by(BLOCK) {
+        for from in self.points.step_by(BLOCK) {
             let mut points = [[0.0; BLOCK]; D];
             for d in 0..D {
                 points[d].copy_from_slice(&self.planes.plane(d)[from..from + BLOCK]);

@@ -51,13 +51,13 @@ pub(super) fn expect(planes: &Planes, densities: &Densities) -> Expected {
 fn band_sums(planes: &Planes, densities: &Densities, band: Range<usize>) -> Sums {
     let level = Level::detect();
     match planes.dimensions {
-        1 => dispatch(level, Band::<1> { planes, densities, band }),
-        2 => dispatch(level, Band::<2> { planes, densities, band }),
-        3 => dispatch(level, Band::<3> { planes, densities, band }),
-        4 => dispatch(level, Band::<4> { planes, densities, band }),
-        5 => dispatch(level, Band::<5> { planes, densities, band }),
-        6 => dispatch(level, Band::<6> { planes, densities, band }),
-        _ => dispatch(level, AnyBand { planes, densities, band }),
+        1 => dispatch(level, Band::<1> { planes, densities, points: band }),
+        2 => dispatch(level, Band::<2> { planes, densities, points: band }),
+        3 => dispatch(level, Band::<3> { planes, densities, points: band }),
+        4 => dispatch(level, Band::<4> { planes, densities, points: band }),
+        5 => dispatch(level, Band::<5> { planes, densities, points: band }),
+        6 => dispatch(level, Band::<6> { planes, densities, points: band }),
+        _ => dispatch(level, AnyBand { planes, densities, points: band }),
     }
 }
 
@@ -191,11 +191,11 @@ mod tests {
         let scale = plain.values.iter().fold(1.0f64, |m, v| m.max(v.abs()));
         for level in Level::available() {
             let (planes, densities, band) = (&planes, &densities, 0..planes.padded);
-            let fixed = dispatch(level, Band::<D> { planes, densities, band: band.clone() });
-            let any = dispatch(level, AnyBand { planes, densities, band });
+            let fixed = dispatch(level, Band::<D> { planes, densities, points: band.clone() });
+            let any = dispatch(level, AnyBand { planes, densities, points: band });
             for got in [fixed, any] {
                 let near = |got: f64, want: f64, scale: f64| {
-                    assert!((got - want).abs() < 1e-12 * scale, "{level:?}, D = {D}: {got} {want}")
+                    assert!((got - want).abs() < 1e-12 * scale, "{level:?}, D = {D}: {got} {want}");
                 };
                 near(got.negentropy, plain.negentropy, 10.0 * plain.negentropy.abs().max(1.0));
                 assert_eq!(got.values.len(), plain.values.len());

@@ -108,8 +108,8 @@ mod tests {
     use super::super::clusters::tests::made_up;
     use super::*;
 
-    fn moving(u: f64, depth: f64) -> Option<GroupMotion> {
-        Some(GroupMotion { affine: [u, 0.0, 0.0, 0.0, 0.0, 0.0], centre: [0.0, 0.0], depth })
+    fn moving(u: f64, depth: f64) -> GroupMotion {
+        GroupMotion { affine: [u, 0.0, 0.0, 0.0, 0.0, 0.0], centre: [0.0, 0.0], depth }
     }
 
     #[test]
@@ -117,7 +117,9 @@ mod tests {
         // In a row, 3 cells apart but for the last, which is 5 apart.
         let cells = [([10, 5, 9], 0), ([13, 5, 30], 1), ([16, 5, 9], 2), ([19, 5, 9], 3), ([24, 5, 9], 4)];
         let clusters = made_up(&cells, 6);
-        let motions = [moving(3.0, 0.0), moving(3.9, 0.1), moving(5.5, 0.0), moving(5.4, 0.3), moving(5.4, 0.3), None];
+        let moved =
+            [(3.0, 0.0), (3.9, 0.1), (5.5, 0.0), (5.4, 0.3), (5.4, 0.3)].map(|(u, depth)| Some(moving(u, depth)));
+        let motions = [&moved[..], &[None]].concat();
         assert_eq!(groups(&clusters, &motions, &Grouping::default()), [0, 0, 2, 3, 4, 5]);
         let far = Grouping { reach: 5.0, ..Grouping::default() };
         assert_eq!(groups(&clusters, &motions, &far), [0, 0, 2, 3, 3, 5]);
