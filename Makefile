@@ -49,7 +49,7 @@ pytest: install
 	$(BIN)/python -m pytest
 
 stubtest: install
-	cd $(VENV) && bin/python -m mypy.stubtest jacoflow
+	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
 
 typing: install
 	$(BIN)/python -m mypy --strict python/jacoflow tests/python/test_typing.py

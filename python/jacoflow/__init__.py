@@ -11,6 +11,7 @@ is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 """
 
 from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
 from . import filters, io, plot, scenes, stereo, track, video
@@ -63,6 +64,9 @@ __all__ = [
     "track",
     "video",
 ]
+
+if _TYPE_CHECKING:
+    from . import mixture
 
 
 def __getattr__(name: str) -> _Any:

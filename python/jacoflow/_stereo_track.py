@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
 
 if TYPE_CHECKING:
-    import networkx  # type: ignore[import-untyped, unused-ignore]
+    import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class TrackGraph:
             raise ValueError(f"node: expected a cluster of the graph, got ({t}, {k})")
         return self._graph.follow(t, k, float(threshold), bool(backward))
 
-    def to_networkx(self) -> networkx.DiGraph[tuple[int, int]]:
+    def to_networkx(self) -> _networkx.DiGraph[tuple[int, int]]:
         """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.
 
         Raises
@@ -134,7 +134,7 @@ class TrackGraph:
             import networkx
         except ImportError as error:
             raise MissingDependencyError('networkx is not installed; pip install "jacoflow[graph]"') from error
-        graph: networkx.DiGraph[tuple[int, int]] = networkx.DiGraph()
+        graph: _networkx.DiGraph[tuple[int, int]] = networkx.DiGraph()
         for node in self._graph.nodes():
             graph.add_node((node["time"], node["index"]), **node)
         for (start, end), (forward, backward) in self.arcs.items():
