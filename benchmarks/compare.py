@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow memory filter accuracy controlled coverage tracking stereo` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo", "stereo_tracking")
 
 
 def main() -> None:
@@ -92,6 +92,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import stereo
 
         return stereo.sections(quick, data)
+    if name == "stereo_tracking":
+        import stereo_tracking
+
+        return stereo_tracking.sections(quick)
     if data is None:
         return {}
     import accuracy
