@@ -163,8 +163,10 @@ mod tests {
                 let mut matches = vec![Some(Match { disparity: truth + start, cost: 0.1 }); view.edges.len()];
                 refine(&left, &view, &right, &mut matches);
                 let mut errors = Vec::new();
-                for (found, &x) in matches.iter().flatten().zip(&view.edges.columns) {
-                    if (14..66).contains(&x) {
+                let places = view.edges.columns.iter().zip(&view.edges.rows);
+                for (found, (x, y)) in matches.iter().flatten().zip(places) {
+                    // Windows that reach beyond the view are not refined.
+                    if (14..66).contains(x) && (8..52).contains(y) {
                         errors.push((found.disparity - truth).abs());
                     }
                 }
