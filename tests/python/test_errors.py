@@ -32,7 +32,7 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
         (GOOD.astype(object), TypeError, "frames: .* got object"),
         (np.zeros((3, 8, 10, 3), np.uint8), ValueError, 'frames: .*colour="luminance"'),
         (np.zeros((8, 10, 3), np.uint8), ValueError, "frames: .*looks like one colour image"),
-        ([np.zeros((8, 10, 3), np.uint8)] * 3, ValueError, r'frames: .*colour="luminance" or convert it with jacoflow.luminance'),
+        ([np.zeros((8, 10, 3), np.uint8)] * 3, ValueError, r'frames: .*convert it with jacoflow.luminance.frame.*colour="luminance"'),
         ([np.zeros((8, 10, 2), np.uint8)] * 3, ValueError, r"frames: expected a frame \(H, W\), got shape \[8, 10, 2\]"),
         (np.ma.masked_array(GOOD, GOOD == 1), TypeError, "frames: expected a plain array, got a masked one"),
         ("frames", TypeError, "frames|array"),
