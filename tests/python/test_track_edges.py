@@ -253,3 +253,27 @@ def test_every_frame_size_is_followed_alike():
 def test_an_ellipse_that_breathes_is_held_by_the_affine_model():
     scene = tracking_hard_scenes.breathing_ellipse()
     assert success(scene, follow(scene, model="affine")) >= 0.98
+
+
+@pytest.mark.parametrize("bar", [8, 15])
+@pytest.mark.parametrize("side", [25, 33])
+def test_a_large_plain_target_passes_behind_a_bar(side, bar):
+    """The bar's edge stands for the target's own and would hold it back: a strip of a large target is little."""
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:160, :192]
+    behind = gaussian_filter(rng.normal(size=x.shape), 3, mode="wrap")
+    behind = 90 + 20 * behind / behind.std()
+
+    def picture(t):
+        share = np.clip((side + 1) / 2 - abs(x - 30 - 1.5 * t), 0, 1) * np.clip((side + 1) / 2 - abs(y - 80), 0, 1)
+        frame = behind * (1 - share) + 200 * share
+        frame[:, 80 : 80 + bar] = 130
+        return np.clip(np.rint(frame + rng.normal(0, 2, frame.shape)), 0, 255).astype(np.uint8)
+
+    tracker = track.GradientTracker(picture(0), bbox=(30 - side / 2, 80 - side / 2, side, side))
+    results = [tracker.update(picture(t)) for t in range(1, 80)]
+    errors = np.array([np.hypot(*(result.position - [30 + 1.5 * t, 80])) for t, result in enumerate(results, 1)])
+    assert {"occluded"} <= {result.status for result in results} <= {"tracking", "occluded", "coasting"}
+    assert errors.max() < side / 2 and errors[-15:].max() < 0.5

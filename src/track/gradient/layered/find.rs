@@ -41,6 +41,8 @@ const GROWN: f64 = 0.04;
 const DROP: f64 = 0.08;
 /// Loss of visibility that noise alone may make.
 const SLIGHT: f64 = 0.03;
+/// Width of a strip along a side of the target that two poses may differ by in what they explain, px: visibilities are counted in whole nodes.
+const STRIP: f64 = 1.25;
 /// Reach of the search, px: at first, and at most.
 const REACH: (usize, usize) = (12, 36);
 
@@ -53,6 +55,14 @@ pub(super) struct Finding {
     pub nis: f64,
     pub occluded: bool,
     pub reason: &'static str,
+}
+
+/// Whether the target may as well be where it is expected, and `found`, as where nobody expects it, `plain`. The edge of what begins to cover a plain target stands for its own, and holds it
+/// back at the price of the opposite one; of the two strips that are then not explained one is as good as the other. A target that has really turned leaves one on either side of the
+/// expected place: brightness of its own beside it, and something else within.
+fn is_where_expected(found: &Finding, plain: &Finding, strip: f64) -> bool {
+    let explained = |look: &Look| look.visibility - look.leak;
+    plain.nis > DOUBT && found.nis < SURE && explained(&found.look) >= explained(&plain.look) - strip
 }
 
 impl Layered {
@@ -109,7 +119,11 @@ impl Layered {
         // What is seen as well as ever in a place that nobody expected has made a turn.
         let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT);
         let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, DROP) || plain.nis > DOUBT));
-        let taken = found.look.leak < LEAK && dropped(&found.look, DROP) && also;
+        let [width, height] = self.target.extent();
+        let strip = STRIP / width.min(height).max(1.0);
+        // Of smaller targets a strip is drop enough.
+        let begun = strip < DROP && plain.is_some_and(|plain| is_where_expected(&found, &plain, strip));
+        let taken = found.look.leak < LEAK && (begun || dropped(&found.look, DROP) && also);
         taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
     }
 
