@@ -4,7 +4,7 @@
 
 Purity is the share of edge pixels in clusters of their own majority label, recall the share of an object's edge pixels in clusters where it is the majority, path the steps over which the chain of strongest arcs stays on an object until
 it is hidden, index the same for its component, id for its track over the whole film. Errors of the motion are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure; gross are those off by more than
-2 px or 1 disparity. Everything is the mean over the seeds (of noise and of the mixture's starts), paths are the least of them. Times are wall time a step, best of the film's half.
+2 px or 1 disparity. Everything is the mean over the seeds (of noise and of the mixture's starts), paths are the least of them. Times are wall time, medians over steps and films.
 """
 
 from __future__ import annotations

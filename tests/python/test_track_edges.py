@@ -276,4 +276,5 @@ def test_a_large_plain_target_passes_behind_a_bar(side, bar):
     results = [tracker.update(picture(t)) for t in range(1, 80)]
     errors = np.array([np.hypot(*(result.position - [30 + 1.5 * t, 80])) for t, result in enumerate(results, 1)])
     assert {"occluded"} <= {result.status for result in results} <= {"tracking", "occluded", "coasting"}
-    assert errors.max() < side / 2 and errors[-5:].max() < 0.5
+    # What the bar left in the learnt background takes frames to fade.
+    assert errors.max() < side / 2 and errors[-15:].max() < 1.0 and errors[-5:].max() < 0.5
