@@ -1,8 +1,10 @@
 //! What a triple's step to the next frame differs by from the mean of its two steps.
 //!
-//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a scene, that is `M (u, v) / 2`, known without looking; where things
+//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a scene, that follows from the flow alone ([`steady`]); where things
 //! go on as they are, as objects do, it is nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left is measured like motion itself
 //! and believed as far as noise does not explain it.
+
+mod steady;
 
 use super::data::{MOTION, SEEN};
 use super::descend::{Found, Plan};
@@ -16,33 +18,76 @@ use crate::simd::SimdReal;
 /// Rounds of reweighing.
 const ROUNDS: usize = 4;
 
-/// Adds it to the `motion`, of which `coupled` is what it was before it was refined: the flow then tells where the middle frame's pixels are in the next, whether or not
-/// they go on as they came. Returns what its windows were chosen by.
-pub(super) fn add_change<T: SimdReal>(
+/// A flow whose change is steady to this share is steady, and one that lacks this share of it is not steady at all: the rest is what estimates smooth away.
+const STEADY: f64 = 0.9;
+
+/// Brings the `motion` of a triple to the pixels of the middle frame; `coupled` is what it was before it was refined. It becomes the mean of the two steps (`central`) or the step to the
+/// next frame, whether or not things go on as they came. Returns what the windows of the change were chosen by.
+///
+/// Frames that are warped by equal and opposite motions meet between where things were and will be, which is where the middle frame has them only if they do not accelerate.
+pub(super) fn settle<T: SimdReal>(
     plan: &Plan,
     workspace: &mut Workspace<T>,
-    coupled: Planes<T>,
+    mut coupled: Planes<T>,
     motion: &mut Planes<T>,
+    central: bool,
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
     let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
     let Workspace { pyramid, space, .. } = workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
-    add(&mut ahead, &coupled, -1.0);
-    space.keep(coupled);
-    continue_beyond(&data, &mut ahead);
-    let steady = steady(space, motion);
-    let share = share(&ahead, &steady);
-    add(&mut ahead, &steady, -share);
-    add(motion, &steady, share);
-    space.keep(steady);
-    let (change, evidence) = refine(simd, space, &Options::for_changes(), &ahead, &data);
-    add(motion, &change, 1.0);
-    for planes in [ahead, change, data] {
+    let mut rest = difference(space, &ahead, &coupled, &data);
+    let acceleration = acceleration(space, motion, &rest);
+    if let Some(acceleration) = &acceleration {
+        for mean in [&mut *motion, &mut coupled] {
+            let next = steady::next_step(space, mean, acceleration);
+            space.keep(std::mem::replace(mean, next));
+        }
+        let left = difference(space, &ahead, &coupled, &data);
+        space.keep(std::mem::replace(&mut rest, left));
+    }
+    let mut evidence = None;
+    if central {
+        acceleration.iter().for_each(|acceleration| add(motion, acceleration, -1.0));
+    } else {
+        let (change, chosen) = refine(simd, space, &Options::for_changes(), &rest, &data);
+        add(motion, &change, 1.0);
+        space.keep(change);
+        evidence = chosen;
+    }
+    for planes in [ahead, coupled, data, rest].into_iter().chain(acceleration) {
         space.keep(planes);
     }
     evidence
+}
+
+/// What the step `ahead` differs by from the step that is `known`.
+fn difference<T: SimdReal>(space: &Space<T>, ahead: &Planes<T>, known: &Planes<T>, data: &Planes<T>) -> Planes<T> {
+    let mut out = space.planes(ahead.width, ahead.height, MOTION);
+    out.data_mut().copy_from_slice(ahead.data());
+    add(&mut out, known, -1.0);
+    continue_beyond(data, &mut out);
+    out
+}
+
+/// Half the acceleration of that part of the `motion` which is steady, if the `change` from its mean step to the next shows any.
+fn acceleration<T: SimdReal>(space: &Space<T>, motion: &Planes<T>, change: &Planes<T>) -> Option<Planes<T>> {
+    let slow = steady::half_acceleration(space, motion);
+    let mut whole = steady::next_step(space, motion, &slow);
+    add(&mut whole, motion, -1.0);
+    let share = share(change, &whole);
+    space.keep(whole);
+    if share < 1.0 - STEADY {
+        space.keep(slow);
+        return None;
+    }
+    let mut acceleration = steady::settled(space, motion, slow);
+    if share < STEADY {
+        let share = T::from_f64(share);
+        acceleration.data_mut().iter_mut().for_each(|value| *value *= share);
+    }
+    Some(acceleration)
 }
 
 /// Adds `factor` times the first planes of `more`.
@@ -90,39 +135,6 @@ fn nearest(numbers: &[usize], to: usize) -> usize {
     if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
 }
 
-/// Half the acceleration of a steady flow, `M (u, v) / 2`, with its derivatives by differences of neighbouring sites.
-fn steady<T: SimdReal>(space: &Space<T>, motion: &Planes<T>) -> Planes<T> {
-    let (width, height) = (motion.width, motion.height);
-    let mut out = space.planes(width, height, MOTION);
-    let half = T::from_f64(0.5);
-    for y in 0..height {
-        let [u, v, u_x, v_x, u_y, v_y] = std::array::from_fn(|k| motion.line(k, y));
-        for (k, along, across) in [(0, u_x, u_y), (1, v_x, v_y)] {
-            for (x, out) in out.line_mut(k, y).iter_mut().enumerate() {
-                *out = half * (along[x] * u[x] + across[x] * v[x]);
-            }
-        }
-    }
-    for y in 0..height {
-        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
-        for x in 0..width {
-            let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
-            for k in 0..2 {
-                let along = slope(out.at(k, left, y), out.at(k, right, y), right - left);
-                let across = slope(out.at(k, x, above), out.at(k, x, below), below - above);
-                out.line_mut(2 + k, y)[x] = along;
-                out.line_mut(4 + k, y)[x] = across;
-            }
-        }
-    }
-    out
-}
-
-/// Over so many sites.
-fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
-    T::from_f64((to.to_f64() - from.to_f64()) / (PITCH * sites.max(1) as f64))
-}
-
 /// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights that fall where the rest is larger than usual (Cauchy's).
 fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     let (mut share, mut usual) = (0.0, f64::INFINITY);
@@ -153,7 +165,7 @@ fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
 mod tests {
     use super::*;
 
-    fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
+    pub(super) fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
         let mut planes = Planes::new(20, 15, MOTION);
         for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
             let line = planes.line_mut(k, y);
@@ -163,18 +175,8 @@ mod tests {
     }
 
     /// Rotation about (20, 15) px with `w` radians a frame.
-    fn rotation(w: f64) -> Planes<f64> {
+    pub(super) fn rotation(w: f64) -> Planes<f64> {
         filled(|k, x, y| [-w * (y - 15.0), w * (x - 20.0), 0.0, w, -w, 0.0][k])
-    }
-
-    #[test]
-    fn steady_rotation_accelerates_towards_its_centre() {
-        let w = 0.03;
-        let got = steady(&Space::default(), &rotation(w));
-        let want = filled(|k, x, y| -0.5 * w * w * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
-        for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
-            assert!(got.line(k, y).iter().zip(want.line(k, y)).all(|(a, b)| (a - b).abs() < 1e-15), "{k} {y}");
-        }
     }
 
     #[test]
@@ -196,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_share_of_steady_flow_is_found_beside_objects_with_their_own_ways() {
-        let steady = steady(&Space::default(), &rotation(0.03));
+        let steady = steady::half_acceleration(&Space::default(), &rotation(0.03));
         let seen = |share: f64| {
             let mut change = steady.clone();
             change.data_mut().iter_mut().for_each(|m| *m *= share);

@@ -4,7 +4,7 @@ use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
-use super::memory::Workspace;
+use super::memory::{Space, Workspace};
 use super::options::{Effort, Limits};
 use super::range::Range;
 use super::resample::{coarser, finer, rederive};
@@ -50,11 +50,16 @@ impl Plan {
         self.descend(workspace, Compared::All, motion, &limits)
     }
 
-    /// The same for the step to the next frame alone, from two levels above the finest down, where it is no other than `motion`.
+    /// Once more about a better `motion`, on the finest level.
+    pub fn again<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
+        let start = copy(&workspace.space, motion);
+        self.descend(workspace, Compared::All, start, &vec![self.effort.up_to(1); self.last + 1])
+    }
+
+    /// The way for the step to the next frame alone, from two levels above the finest down, where it is no other than `motion`.
     pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let (levels, [finest, others @ ..]) = (workspace.pyramid.levels(), self.effort.ahead);
-        let mut start = workspace.space.planes(motion.width, motion.height, MOTION);
-        start.data_mut().copy_from_slice(motion.data());
+        let mut start = copy(&workspace.space, motion);
         let mut limits = vec![self.effort.up_to(finest); self.last + 1];
         for (level, most) in levels[self.last + 1..].iter().zip(others) {
             limits.push(self.effort.up_to(most));
@@ -98,6 +103,15 @@ impl Plan {
         space.keep_small(data);
         Found { motion, data: summary, scale }
     }
+}
+
+/// The motion in planes of its own; there may be more planes in what it comes from.
+fn copy<T: SimdReal>(space: &Space<T>, motion: &Planes<T>) -> Planes<T> {
+    let mut out = space.planes(motion.width, motion.height, MOTION);
+    for (k, y) in (0..MOTION).flat_map(|k| (0..motion.height).map(move |y| (k, y))) {
+        out.line_mut(k, y).copy_from_slice(motion.line(k, y));
+    }
+    out
 }
 
 /// Sites along x and y of a level of `size` pixels.

@@ -74,13 +74,18 @@ pub(super) struct Options {
 }
 
 impl Options {
+    /// For motion whose last linearisation was about one that had been refined: what is left of the residual is noise then, and slopes need no more room than it explains.
+    pub fn again() -> Self {
+        Self { kappa_slopes: 2.0, ..Self::default() }
+    }
+
     /// For what one step of the motion differs by from another, which is small and smooth or nothing.
     pub fn for_changes() -> Self {
         let Self { ladder, kappa, kappa_edge, .. } = Self::default();
         Self {
             ladder: ladder.get(CHANGES..).unwrap_or(ladder),
-            kappa: 2.0 * kappa,
-            kappa_slopes: 5.0,
+            kappa: 4.0 * kappa,
+            kappa_slopes: 10.0,
             restless: 1.0,
             kappa_edge: 2.0 * kappa_edge,
             may_vanish: true,

@@ -1,6 +1,6 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
-use super::change::add_change;
+use super::change::settle;
 use super::covariance::Spread;
 use super::descend::{Found, Plan};
 use super::grid::Planes;
@@ -50,8 +50,7 @@ impl CoarseToFine {
             let levels = (self.options.levels, effort.last);
             let last = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
             let plan = Plan { simd, effort, range, last };
-            let changes = frames.len() == 3 && !self.options.central;
-            let mut estimate = estimate(&plan, changes, &mut workspace);
+            let mut estimate = estimate(&plan, frames.len() == 3, self.options.central, &mut workspace);
             let spread = spread(&mut estimate, &mut workspace, (frames, common), field);
             output::fill((&estimate, spread), &workspace.space, frames, common, field);
             estimate.keep(&workspace);
@@ -85,22 +84,30 @@ fn spread<T: SimdReal>(
     Some(spread)
 }
 
-/// From the filled pyramid to the motion; `changes`: of three frames, to the next and not the mean of both steps.
-fn estimate<T: SimdReal>(plan: &Plan, changes: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
-    let (simd, last) = (plan.simd, plan.last);
-    let Found { motion: mut coupled, data, scale } = plan.all(workspace);
-    let Workspace { pyramid, space, .. } = &mut *workspace;
-    let (mut motion, evidence) = refine(simd, space, &Refinement::default(), &coupled, &data);
-    let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::All), &motion, scale);
+/// From the filled pyramid to the motion of two frames or three.
+fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace: &mut Workspace<T>) -> Estimate<T> {
+    let simd = plan.simd;
+    let mut found = plan.all(workspace);
+    let (mut motion, mut evidence) = refine(simd, &workspace.space, &Refinement::default(), &found.motion, &found.data);
+    if is_triple {
+        // About the refined motion the residual is noise; about the coupled one it is also what the windows of the data smooth away.
+        evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
+        let better = plan.again(workspace, &motion);
+        [motion, found.motion, found.data].into_iter().for_each(|planes| workspace.space.keep(planes));
+        found = better;
+        (motion, evidence) = refine(simd, &workspace.space, &Refinement::again(), &found.motion, &found.data);
+    }
+    let Found { motion: mut coupled, data, scale } = found;
+    let locking = Locking::measure(simd, (&workspace.pyramid.levels()[plan.last], Compared::All), &motion, scale);
     locking.correct(simd, &mut motion);
     let mut change = None;
-    if changes {
+    if is_triple {
         locking.correct(simd, &mut coupled);
-        change = add_change(plan, workspace, coupled, &mut motion);
+        change = settle(plan, workspace, coupled, &mut motion, central);
     } else {
         workspace.space.keep(coupled);
     }
-    Estimate { level: last, motion, data, range: plan.range, evidence, change, locking }
+    Estimate { level: plan.last, motion, data, range: plan.range, evidence, change, locking }
 }
 
 /// The motion on the sites of the finest level worked on, and what it rests on.
