@@ -1,10 +1,15 @@
 //! What is followed, and how.
 
+use super::{LayoutArguments, SearchArguments};
 use crate::error::{Error, Result};
+use crate::parallel::Threads;
+use crate::stereo::Method;
 use crate::track::METHODS;
 use crate::track::gradient::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
+use crate::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use crate::types::TargetBox;
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 
 /// Targets in the first frame.
 #[derive(Debug, Clone, Args)]
@@ -19,6 +24,11 @@ pub struct TargetArguments {
 }
 
 impl TargetArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        self.boxes.first().map(|_| "box").or(self.points.first().map(|_| "point"))
+    }
+
     /// What is known of each target; without any, the one that moves first.
     pub fn starts(&self) -> Vec<Start> {
         let boxes = self.boxes.iter().map(|bounds| Start::Box(*bounds));
@@ -31,24 +41,24 @@ impl TargetArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct TrackerArguments {
-    /// Tracker: gradient
+    /// Tracker: gradient (given targets in one view) or stereo (everything that moves before two cameras)
     #[arg(long, value_name = "NAME", default_value = "gradient")]
     pub method: String,
-    /// gradient: which system follows the target
-    #[arg(long, value_enum, value_name = "NAME", default_value = "layered")]
-    pub mode: ModeWord,
+    /// Which system follows the targets [default: layered, stereo improved]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub mode: Option<ModeWord>,
     /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,
-    /// How the window follows the target (local)
-    #[arg(long, value_enum, value_name = "HOW", default_value = "integer")]
-    pub control: ControlWord,
-    /// What the target's picture does besides moving (layered)
-    #[arg(long, value_enum, value_name = "NAME", default_value = "similarity")]
-    pub model: ModelWord,
-    /// What the camera does (layered)
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "auto")]
-    pub camera: CameraWord,
+    /// How the window follows the target (local) [default: integer]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub control: Option<ControlWord>,
+    /// What the target's picture does besides moving (layered) [default: similarity]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub model: Option<ModelWord>,
+    /// What the camera does (layered) [default: auto]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub camera: Option<CameraWord>,
     /// Degree of the polynomials behind the derivatives, 1 to 4 [default: 4, paper 2]
     #[arg(long, value_name = "N")]
     pub order: Option<usize>,
@@ -67,6 +77,8 @@ pub enum ModeWord {
     Layered,
     /// Local flow in a moving window, with the repairs that it needs; the fastest
     Local,
+    /// Stereo: motion to fractions of a pixel carries the clusters along
+    Improved,
     /// The paper's text to the letter, for comparison
     Paper,
 }
@@ -108,25 +120,51 @@ pub enum Eps {
 }
 
 impl TrackerArguments {
+    /// The method's name, one that is known.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `method`.
+    pub fn method(&self) -> Result<&'static str> {
+        let known = METHODS.iter().copied().find(|name| *name == self.method);
+        known.ok_or_else(|| Error::argument("method", format!("one of {}", METHODS.join(", ")), &self.method))
+    }
+
+    /// Whether an option of the gradient tracker alone was given.
+    pub fn given(&self) -> Option<&'static str> {
+        [
+            self.fov.map(|_| "fov"),
+            self.control.map(|_| "control"),
+            self.model.map(|_| "model"),
+            self.camera.map(|_| "camera"),
+            self.order.map(|_| "order"),
+            self.window.map(|_| "window"),
+            self.eps.map(|_| "eps"),
+        ]
+        .into_iter()
+        .find_map(|given| given)
+    }
+
     /// The options of the gradient tracker.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
-    pub fn options(&self) -> Result<GradientOptions> {
-        if !METHODS.contains(&self.method.as_str()) {
-            return Err(Error::argument("method", format!("one of {}", METHODS.join(", ")), &self.method));
-        }
+    pub fn gradient(&self) -> Result<GradientOptions> {
         let defaults = GradientOptions::default();
         let options = GradientOptions {
             mode: match self.mode {
-                ModeWord::Layered => Mode::Layered,
-                ModeWord::Local => Mode::Local,
-                ModeWord::Paper => Mode::Paper,
+                None => defaults.mode,
+                Some(ModeWord::Layered) => Mode::Layered,
+                Some(ModeWord::Local) => Mode::Local,
+                Some(ModeWord::Paper) => Mode::Paper,
+                Some(ModeWord::Improved) => {
+                    return Err(Error::argument("mode", "layered, local or paper for gradient", "improved"));
+                }
             },
             fov: self.fov,
             control: match self.control {
-                ControlWord::Integer => Control::Integer,
-                ControlWord::Subpixel => Control::Subpixel,
+                None => defaults.control,
+                Some(ControlWord::Integer) => Control::Integer,
+                Some(ControlWord::Subpixel) => Control::Subpixel,
             },
             window: self.window,
             order: self.order,
@@ -136,14 +174,101 @@ impl TrackerArguments {
                 Some(Eps::Speed(speed)) => Some(speed),
             },
             shape: match self.model {
-                ModelWord::Similarity => Shape::Similarity,
-                ModelWord::Affine => Shape::Affine,
+                None => defaults.shape,
+                Some(ModelWord::Similarity) => Shape::Similarity,
+                Some(ModelWord::Affine) => Shape::Affine,
             },
             camera: match self.camera {
-                CameraWord::Auto => CameraMotion::Auto,
-                CameraWord::None => CameraMotion::None,
+                None => defaults.camera,
+                Some(CameraWord::Auto) => CameraMotion::Auto,
+                Some(CameraWord::None) => CameraMotion::None,
             },
         };
+        options.check()?;
+        Ok(options)
+    }
+
+    /// The mode of the stereo tracker.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `mode`.
+    pub fn stereo_mode(&self) -> Result<StereoMode> {
+        match self.mode {
+            None | Some(ModeWord::Improved) => Ok(StereoMode::Improved),
+            Some(ModeWord::Paper) => Ok(StereoMode::Paper),
+            Some(ModeWord::Layered | ModeWord::Local) => {
+                Err(Error::argument("mode", "improved or paper for stereo", "a mode of gradient"))
+            }
+        }
+    }
+}
+
+/// Options of the stereo tracker. Those that are not given keep the tracker's own default.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "With --method stereo")]
+pub struct StereoTrackerArguments {
+    #[command(flatten)]
+    pub layout: LayoutArguments,
+    #[command(flatten)]
+    pub search: SearchArguments,
+    /// How views are matched, as `jacoflow stereo --method` [default: sgm, paper classes]
+    #[arg(long, value_name = "NAME")]
+    pub matching: Option<String>,
+    /// Components of the mixture [default: 16, paper 12]
+    #[arg(long, value_name = "N")]
+    pub components: Option<usize>,
+    /// Seed of the mixture [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and velocities in space
+    #[arg(long, value_name = "FOCAL,BASELINE[,INFINITY]", allow_hyphen_values = true, value_parser = parse_cameras)]
+    pub cameras: Option<StereoCamera>,
+    /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a film *.y4m
+    #[arg(long, value_name = "FOLDER|FILM")]
+    pub disparity_overlay: Option<PathBuf>,
+    /// Draw the graph of all clusters over time: a .png file
+    #[arg(long, value_name = "FILE")]
+    pub graph: Option<PathBuf>,
+}
+
+impl StereoTrackerArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let own = [
+            self.matching.as_ref().map(|_| "matching"),
+            self.components.map(|_| "components"),
+            self.seed.map(|_| "seed"),
+            self.cameras.map(|_| "cameras"),
+            self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
+            self.graph.as_ref().map(|_| "graph"),
+        ];
+        self.layout.given().or(self.search.given()).or(own.into_iter().find_map(|given| given))
+    }
+
+    /// The options of the stereo tracker; layers of disparity as wide as the range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn options(&self, mode: StereoMode, threads: Threads) -> Result<StereoTrackerOptions> {
+        let mut options = StereoTrackerOptions::new(mode);
+        if let Some((least, greatest)) = self.search.disparities {
+            options = options.with_disparities([least, greatest]);
+        }
+        if let Some((least, greatest)) = self.search.rows {
+            options.row_range = [least, greatest];
+        }
+        options.row_offset = self.search.row_offset;
+        options.matching = match &self.matching {
+            Some(name) => Method::parse(name).map_err(|error| match error {
+                Error::Argument { expected, got, .. } => Error::Argument { argument: "matching", expected, got },
+                other => other,
+            })?,
+            None => options.matching,
+        };
+        options.components = self.components.unwrap_or(options.components);
+        options.seed = self.seed.unwrap_or(options.seed);
+        options.camera = self.cameras;
+        options.threads = threads;
         options.check()?;
         Ok(options)
     }
@@ -163,6 +288,16 @@ fn parse_box(text: &str) -> std::result::Result<TargetBox, String> {
 
 fn parse_point(text: &str) -> std::result::Result<[f64; 2], String> {
     numbers(text).ok_or_else(|| "expected two numbers X,Y in pixels".into())
+}
+
+fn parse_cameras(text: &str) -> std::result::Result<StereoCamera, String> {
+    let given = numbers(text).or_else(|| numbers(text).map(|[focal, baseline]: [f64; 2]| [focal, baseline, 0.0]));
+    match given {
+        Some([focal, baseline, d_infinity]) if focal > 0.0 && baseline > 0.0 => {
+            Ok(StereoCamera { focal, baseline, d_infinity })
+        }
+        _ => Err("expected FOCAL,BASELINE or FOCAL,BASELINE,INFINITY, the first two positive".into()),
+    }
 }
 
 fn parse_eps(text: &str) -> std::result::Result<Eps, String> {
@@ -187,6 +322,10 @@ mod tests {
         assert!(parse_point("3").is_err() && parse_point("inf,1").is_err());
         assert_eq!((parse_eps("auto"), parse_eps("0.3")), (Ok(Eps::Auto), Ok(Eps::Speed(0.3))));
         assert!(parse_eps("-1").is_err() && parse_eps("slow").is_err() && parse_eps("nan").is_err());
+        let camera = StereoCamera { focal: 700.0, baseline: 0.54, d_infinity: 0.0 };
+        assert_eq!(parse_cameras("700,0.54"), Ok(camera));
+        assert_eq!(parse_cameras("700,0.54,-44"), Ok(StereoCamera { d_infinity: -44.0, ..camera }));
+        assert!(parse_cameras("700").is_err() && parse_cameras("0,1").is_err() && parse_cameras("1,2,3,4").is_err());
     }
 
     #[test]

@@ -221,6 +221,15 @@ impl StereoTrackerOptions {
         }
     }
 
+    /// The same for another range of disparities, with a layer of the grid for each but the greatest, which is counted with the one before it.
+    pub fn with_disparities(mut self, range: [i32; 2]) -> Self {
+        let [least, greatest] = range;
+        self.disparity_range = range;
+        self.grid.first_disparity = least;
+        self.grid.layers = greatest.saturating_sub(least).max(1) as usize;
+        self
+    }
+
     /// Checks what the tracker itself uses; the mixture and the matching check their own.
     ///
     /// # Errors

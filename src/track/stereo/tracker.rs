@@ -58,6 +58,11 @@ impl StereoTracker {
         &self.options
     }
 
+    /// How many rows lower the right view shows a point, px, where that is given or was found once for all steps.
+    pub fn row_offset(&self) -> Option<f64> {
+        self.row_offset
+    }
+
     /// Steps taken.
     pub fn steps(&self) -> usize {
         self.time

@@ -6,7 +6,7 @@ use super::super::graph::Arc;
 use super::super::grouping::{GroupMotion, groups};
 use super::super::identity::Carried;
 use super::super::lucas_kanade::{SmoothedLevels, middle};
-use super::super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places};
+use super::super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places, voxel_motion};
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::step::Step;
 use super::super::voxels::{EdgePoints, Voxels};
@@ -76,8 +76,10 @@ impl StereoTracker {
         let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
         let motions = self.carry(view);
         let last = self.last.take();
-        let carried: Vec<Option<[f64; 3]>> =
-            motions.iter().map(|motion| motion.map(|(_, Carried { motion, .. })| motion)).collect();
+        let carried: Vec<Option<[f64; 3]>> = match &last {
+            Some(last) => (0..motions.len()).map(|k| voxel_motion(&last.clusters, k, &motions[k]?.0)).collect(),
+            None => vec![],
+        };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
         let Clustered { clusters, posterior, rounds } = clustered;
