@@ -6,6 +6,7 @@ mod input;
 mod method;
 mod output;
 mod sites;
+mod stereo_track;
 mod track;
 mod views;
 
@@ -15,7 +16,8 @@ pub use input::{InputArguments, SelectionArguments};
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use sites::SiteArguments;
-pub use track::{StereoTrackerArguments, TargetArguments, TrackerArguments};
+pub use stereo_track::StereoTrackerArguments;
+pub use track::{TargetArguments, TrackerArguments};
 pub use views::{LayoutArguments, SearchArguments};
 
 /// `KxL` (or `K` for a square): width and height of a neighbourhood or a frame.
