@@ -92,10 +92,7 @@ fn tracking(criterion: &mut Criterion) {
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(3));
     for count in [1, 2] {
         for mode in [StereoMode::Paper, StereoMode::Improved] {
-            let options = StereoTrackerOptions {
-                threads: threads(count),
-                ..StereoTrackerOptions::new(mode)
-            };
+            let options = StereoTrackerOptions { threads: threads(count), ..StereoTrackerOptions::new(mode) };
             let mut tracker = StereoTracker::new(options).expect("options in range");
             group.bench_function(BenchmarkId::new(mode.name(), count), |bencher| {
                 bencher.iter(|| {

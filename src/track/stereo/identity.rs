@@ -248,7 +248,9 @@ mod tests {
     fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
         let limits = Recognition::default();
         let mut all = identities();
-        (0..2).for_each(|_| drop(all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits))));
+        for _ in 0..2 {
+            all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
+        }
         all.rest(0, |k| k == 0);
         let there = at(2, [16.0, 10.0, 30.0]);
         for (seen, known) in [

@@ -230,11 +230,23 @@ impl StereoTrackerOptions {
         self
     }
 
-    /// Checks what the tracker itself uses; the mixture and the matching check their own.
+    /// Checks every option by itself.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
+        self.matching_options(self.row_offset).check()?;
+        self.mixture_options(false, 0).check()?;
+        if self.warm_max_iter == 0 {
+            return Err(Error::argument("warm_max_iter", "a positive integer", 0));
+        }
+        if !(self.degrees_of_freedom_prior > 2.0 && self.degrees_of_freedom_prior.is_finite()) {
+            let expected = "a finite number above 2, one less than there are coordinates";
+            return Err(Error::argument("degrees_of_freedom_prior", expected, self.degrees_of_freedom_prior));
+        }
+        if !(self.covariance_prior > 0.0 && self.covariance_prior.is_finite()) {
+            return Err(Error::argument("covariance_prior", "a finite number above 0, cells^2", self.covariance_prior));
+        }
         let VoxelGrid { columns, rows, layers, .. } = self.grid;
         if [columns, rows, layers].iter().any(|side| !(1..=4096).contains(side)) || columns * rows * layers > 1 << 26 {
             let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
@@ -280,6 +292,11 @@ mod tests {
         assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
         assert!(with(|o| o.components = 0).starts_with("n_components: "));
         assert!(with(|o| o.search = 0).starts_with("search: "));
+        assert!(with(|o| o.disparity_range = [5, -5]).starts_with("disparity_range: "));
+        assert!(with(|o| o.max_iter = 0).starts_with("max_iter: "));
+        assert!(with(|o| o.warm_max_iter = 0).starts_with("warm_max_iter: "));
+        assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
+        assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
         assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
         assert!(with(|o| o.arc_threshold = f64::NAN).starts_with("arc_threshold: "));
         let camera = StereoCamera { focal: 0.0, baseline: 0.075, d_infinity: 0.0 };
