@@ -120,13 +120,22 @@ pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
     clusters.pixels[k].iter().map(place).collect()
 }
 
-/// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from the motion before (`last`, px and disparity).
+/// What a cluster's motion may be, px and disparity, before it is measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Guess {
+    /// Its own one step ago.
+    pub last: Option<[f64; 3]>,
+    /// For want of that, the motion of who is nearest to it.
+    pub beside: Option<[f64; 3]>,
+}
+
+/// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from a guess.
 ///
 /// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell, or tell of more than is searched for.
 pub(super) fn fine_motions(
     from: &Seen,
     next: NextView<'_>,
-    last: &[Option<[f64; 3]>],
+    guesses: &[Guess],
     options: &StereoTrackerOptions,
 ) -> Vec<Option<FineMotion>> {
     let levels = from.levels.as_ref();
@@ -137,7 +146,7 @@ pub(super) fn fine_motions(
         if (pixels.len() as f64) < options.reseed_below {
             return None;
         }
-        let starts = starts(from, next.luminance, k, last[k], options);
+        let starts = starts(from, next.luminance, k, guesses[k], options);
         let plane = affine_motion(levels?, next.levels, &pixels, &starts)?;
         let mut changes: Vec<f64> = clusters.pixels[k]
             .iter()
@@ -158,15 +167,9 @@ pub(super) fn fine_motions(
 }
 
 /// First guesses of a cluster's translation, px.
-fn starts(
-    from: &Seen,
-    next: &CellLuminance,
-    k: usize,
-    last: Option<[f64; 3]>,
-    options: &StereoTrackerOptions,
-) -> Vec<[f64; 2]> {
+fn starts(from: &Seen, next: &CellLuminance, k: usize, guess: Guess, options: &StereoTrackerOptions) -> Vec<[f64; 2]> {
     let [cx, cy, _] = from.clusters.lattice().cell();
-    let window = match last.filter(|_| options.predicted_windows) {
+    let window = match guess.last.filter(|_| options.predicted_windows) {
         Some([u, v, _]) => {
             Window { centre: [(u / cx).round() as i32, (v / cy).round() as i32], reach: PREDICTED_REACH }
         }
@@ -175,7 +178,7 @@ fn starts(
     let matched = from.luminance.find(&from.clusters.template(k), next, window);
     let mut starts: Vec<[f64; 2]> =
         matched.iter().map(|found| [f64::from(found.shift[0]) * cx, f64::from(found.shift[1]) * cy]).collect();
-    if let Some([u, v, _]) = last
+    if let Some([u, v, _]) = guess.last.or(guess.beside)
         && starts.iter().all(|start| (start[0] - u).hypot(start[1] - v) > SAME_START)
     {
         starts.push([u, v]);
