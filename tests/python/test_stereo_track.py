@@ -239,6 +239,10 @@ def test_views_that_do_not_fit_are_refused_with_both_shapes():
         ("warm_max_iter", 0),
         ("disparity_range", (5, -5)),
         ("row_offset", float("nan")),
+        ("reseed_below", -1.0),
+        ("group_limits", (float("nan"), 1.0, 0.15)),
+        ("tolerance", (3.0, -4.0, 1.0)),
+        ("jump", (float("nan"), 1.5)),
     ],
 )
 def test_options_out_of_range_are_named(option, value):

@@ -264,6 +264,16 @@ impl StereoTrackerOptions {
         if !(self.arc_threshold >= 0.0 && self.arc_threshold <= 2.0) {
             return Err(Error::argument("arc_threshold", "a score, 0 to 2", self.arc_threshold));
         }
+        if let Some(limits) = &self.recognition {
+            let lengths = limits.tolerance.iter().chain(&limits.tolerance_per_step);
+            let each =
+                [("least_overlap", limits.least_overlap), ("jump", limits.jump), ("jump", limits.jump_disparity)];
+            not_negative(each.into_iter().chain(lengths.map(|length| ("tolerance", *length))))?;
+        }
+        if let Some(Grouping { reach, motion, depth_motion }) = self.grouping {
+            not_negative([reach, motion, depth_motion].into_iter().map(|limit| ("group_limits", limit)))?;
+        }
+        not_negative([("reseed_below", self.reseed_below)].into_iter())?;
         if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
             for (name, value) in [("focal", focal), ("baseline", baseline)] {
                 if !(value > 0.0 && value.is_finite()) {
@@ -276,6 +286,16 @@ impl StereoTrackerOptions {
         }
         Ok(())
     }
+}
+
+/// Refuses NaN and what is below 0.
+fn not_negative(limits: impl Iterator<Item = (&'static str, f64)>) -> Result<()> {
+    for (name, value) in limits {
+        if value.is_nan() || value < 0.0 {
+            return Err(Error::argument(name, "a number that is not negative", value));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -295,6 +315,13 @@ mod tests {
         assert!(with(|o| o.disparity_range = [5, -5]).starts_with("disparity_range: "));
         assert!(with(|o| o.max_iter = 0).starts_with("max_iter: "));
         assert!(with(|o| o.warm_max_iter = 0).starts_with("warm_max_iter: "));
+        assert!(with(|o| o.reseed_below = -1.0).starts_with("reseed_below: "));
+        let nowhere = |reach| Some(Grouping { reach, ..Grouping::default() });
+        let options = StereoTrackerOptions { grouping: nowhere(f64::NAN), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("group_limits: "));
+        let limits = Recognition { tolerance: [3.0, -4.0, 1.0], ..Recognition::default() };
+        let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("tolerance: "));
         assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
         assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
         assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
