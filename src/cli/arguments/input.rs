@@ -25,10 +25,12 @@ pub struct SelectionArguments {
 impl SelectionArguments {
     /// How sources are opened.
     pub fn options(&self) -> OpenOptions {
-        let mut options = OpenOptions::default();
-        options.colour = if self.luminance { Colour::Luminance } else { Colour::Error };
-        (options.first, options.limit, options.step) = (self.first, self.limit, self.step);
-        options
+        OpenOptions {
+            colour: if self.luminance { Colour::Luminance } else { Colour::Error },
+            first: self.first,
+            limit: self.limit,
+            step: self.step,
+        }
     }
 
     /// Which frames of the input these are: `given` frames per second of the input, or those that the source tells of the frames it delivers.

@@ -52,8 +52,7 @@ impl TrackCommand {
         self.output.make_folder()?;
         let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
-            let mut drawing = TrackOverlay::default();
-            drawing.enlargement = self.output.enlarge;
+            let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
             sinks.push(Box::new(Overlays::create(path, drawing, TrackOutputArguments::film_rate(rate))?));
         }
         for (target, format) in wanted {
