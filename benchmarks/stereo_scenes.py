@@ -8,6 +8,7 @@ Disparity is `x_left - x_right` in px; it is negative far away because the camer
 - `curved()`: a large ellipsoidal cab with 14 px of relief that drives and approaches, and a small person.
 - `cart()`: a cart that recedes between rows of seats.
 - `small()`: two boxes before a panning wall, 320 x 240, disparity -20..12, for tests.
+- `fence()`: a person behind a fence whose pales repeat every 22 px, so that wrong matches look right.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ ROUGHNESS = 6.0
 """Standard deviation of what is rough about a cell, grey levels."""
 SOFT_EDGE = 1.4
 """Width over which a layer's border fades, px."""
+PALE_DISTANCE = 22.0
+"""Distance of a fence's pales, px."""
 GAIN, BIAS = 1.02, 2.0
 """The right camera beside the left."""
 
@@ -59,11 +62,18 @@ def _person(x: Array, y: Array, half_width: float, half_height: float) -> Array:
     return np.maximum.reduce([head, body, *legs])
 
 
+def _pales(x: Array, y: Array, half_width: float, half_height: float) -> Array:
+    """Upright pales of a third of their distance, and two rails."""
+    pales = PALE_DISTANCE / 6 - abs((x + PALE_DISTANCE / 2) % PALE_DISTANCE - PALE_DISTANCE / 2)
+    rails = 4 - abs(abs(y) - 0.6 * half_height)
+    return np.minimum(np.maximum(pales, rails), _box(x, y, half_width, half_height))
+
+
 def _everywhere(x: Array, y: Array, half_width: float, half_height: float) -> Array:
     return np.full(x.shape, 99.0)
 
 
-OUTLINES: dict[str, Callable[[Array, Array, float, float], Array]] = {"box": _box, "ellipse": _ellipse, "person": _person, "all": _everywhere}
+OUTLINES: dict[str, Callable[[Array, Array, float, float], Array]] = {"box": _box, "ellipse": _ellipse, "person": _person, "pales": _pales, "all": _everywhere}
 """How far inside an outline a place is, px (negative: outside)."""
 
 
@@ -261,5 +271,16 @@ def small() -> Scene:
     return Scene("small", layers, 6, 1.0, 7, (320, 240), (-20, 12))
 
 
-SCENES: dict[str, Callable[[], Scene]] = {"crossing": crossing, "curved": curved, "cart": cart, "small": small}
+def fence() -> Scene:
+    """A person walks behind a fence."""
+    layers = (
+        _wall(320, 240, 0, -30, 10),
+        Layer("person", 1, (200, 240), (9, 0), -18, 0, (45, 110), 16),
+        # One grey all over: only its roughness tells a pale from the next.
+        Layer("pales", 2, (320, 320), (-3, 0), -8, 0, (420, 110), 2000),
+    )
+    return Scene("fence", layers, 6, 0.0, 9)
+
+
+SCENES: dict[str, Callable[[], Scene]] = {"crossing": crossing, "curved": curved, "cart": cart, "small": small, "fence": fence}
 """Every scene, by name."""

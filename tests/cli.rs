@@ -14,6 +14,8 @@ mod mistakes;
 mod recordings;
 #[path = "cli/stereo.rs"]
 mod stereo;
+#[path = "cli/stereo_tracks.rs"]
+mod stereo_tracks;
 #[path = "cli/streams.rs"]
 mod streams;
 #[path = "cli/tracks.rs"]

@@ -975,38 +975,12 @@ def _observability(
     threads: int | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def _edge_disparity(
-    left: ArrayLike,
-    right: ArrayLike,
-    method: str,
-    disparity_range: tuple[int, int],
-    row_range: tuple[int, int],
-    row_offset: float | None,
-    subpixel: bool,
-    check: bool,
-    prior: ArrayLike | None,
-    prior_radius: int,
-    sigma: float,
-    threshold: float,
-    classes: int,
-    window: int,
-    min_support: float,
-    threads: int | None,
+    left: ArrayLike, right: ArrayLike, options: dict[str, Any]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], float]: ...
 def _edge_pixels(
     view: ArrayLike, sigma: float, threshold: float, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
-def _estimate_row_offset(
-    left: ArrayLike,
-    right: ArrayLike,
-    disparity_range: tuple[int, int],
-    row_range: tuple[int, int],
-    sigma: float,
-    threshold: float,
-    classes: int,
-    window: int,
-    min_support: float,
-    threads: int | None,
-) -> float: ...
+def _estimate_row_offset(left: ArrayLike, right: ArrayLike, options: dict[str, Any]) -> float: ...
 def _open_frames(spec: _Path, colour: _Colour | None, first: int, limit: int | None, step: int) -> FrameReader: ...
 def _read_disparity(path: _Path) -> NDArray[np.float32]: ...
 def _write_disparity(path: _Path, disparity: ArrayLike) -> int: ...

@@ -193,7 +193,7 @@ class StereoTracker:
     grid : (rows, columns, layers)
         Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`.
     search : int
-        How far templates and depths are searched, cells and disparities; default 8.
+        How far templates and depths are searched, cells and disparities; default 8. What changes its disparity by more in one step has no motion.
     luminance_levels : int
         Levels of the reduced luminance; default 64.
     arc_threshold : float
@@ -273,7 +273,8 @@ class StereoTracker:
     def update(self, left: ArrayLike, right: ArrayLike) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
-        Pixels that are not finite leave no edges round them; views without edges give a step without clusters.
+        Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
+        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom).
 
         Raises
         ------

@@ -12,8 +12,9 @@ equations (1) to (5), and semi-global matching (H. Hirschmueller, 2008) of edge 
 3.0
 """
 
+import operator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,10 +102,7 @@ def edge_disparity(
 
     ValueError names an argument that is out of range or views that do not fit, with both shapes.
     """
-    found = _edge_disparity(
-        left, right, method, disparity_range, row_range, row_offset, subpixel, check, prior, prior_radius, sigma, threshold, classes, window, min_support, threads
-    )
-    return EdgeDisparity(*found)
+    return EdgeDisparity(*_edge_disparity(left, right, _options(locals())))
 
 
 def estimate_row_offset(
@@ -125,7 +123,7 @@ def estimate_row_offset(
     The most frequent row offset of the class matching, then twice: disparity by "sgm", then Lucas-Kanade steps along y over all matched edge pixels, robustly weighted. Arguments
     and units are those of `edge_disparity`. 0.0 where nothing can be matched; ValueError as there.
     """
-    return _estimate_row_offset(left, right, disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)
+    return _estimate_row_offset(left, right, _options(locals()))
 
 
 def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
@@ -134,3 +132,16 @@ def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, 
     They have a gradient (Gaussian of `sigma` px) of at least `threshold` grey levels/px and are the steepest along its direction.
     """
     return _edge_pixels(view, sigma, threshold, threads)
+
+
+def _options(arguments: dict[str, Any]) -> dict[str, Any]:
+    """The keyword options among a function's arguments; what is no count is refused by name."""
+    out = {name: value for name, value in arguments.items() if name not in ("left", "right")}
+    for name in _COUNTS & out.keys():
+        if out[name] is not None and operator.index(out[name]) < 0:
+            raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
+    return out
+
+
+_COUNTS = {"prior_radius", "classes", "window", "threads"}
+"""Options that are counts."""

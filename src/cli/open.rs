@@ -27,24 +27,13 @@ pub struct Opened {
 
 /// Opens the input and looks at its first frame.
 pub fn open_input(arguments: &InputArguments) -> Result<Opened> {
-    let source = open_source(&arguments.input, &options(arguments))?;
+    let source = open_source(&arguments.input, &arguments.selection.options())?;
     let frames = source.len_hint();
     let name = source.describe();
-    // The source speaks of the frames it delivers; the numbering of those of the input.
-    let rate = arguments.fps.or_else(|| source.frame_rate().map(|rate| rate * arguments.step as f64));
+    let numbering = arguments.selection.numbering(arguments.fps, source.frame_rate());
     let (first, source) = peek(source)?;
     let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
-    let numbering = Numbering { first: arguments.first, step: arguments.step, rate };
     Ok(Opened { source, first, frames, numbering, name })
-}
-
-fn options(arguments: &InputArguments) -> OpenOptions {
-    OpenOptions {
-        colour: if arguments.luminance { Colour::Luminance } else { Colour::Error },
-        first: arguments.first,
-        limit: arguments.limit,
-        step: arguments.step,
-    }
 }
 
 /// One specification, or several image files in the order given.
@@ -81,7 +70,10 @@ pub fn preprocess_for(estimator: &Estimator, arguments: &InputArguments) -> Resu
 
 /// Number of threads and instruction set.
 pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)> {
-    Ok((Threads::new(arguments.threads)?, Level::check(arguments.simd.as_deref().map(Level::parse).transpose()?)?))
+    Ok((
+        Threads::new(arguments.threads.threads)?,
+        Level::check(arguments.simd.as_deref().map(Level::parse).transpose()?)?,
+    ))
 }
 
 /// Whether to compute in double precision for frames of this type; `demanding` work does so unless told otherwise.

@@ -40,8 +40,8 @@ pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_frame_png, write_picture};
 pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_sink};
 pub use source::{
-    Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, Y4mSource, kind_of,
-    open,
+    Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout,
+    ViewPairs, Y4mSource, kind_of, open,
 };
 pub use table::{FieldTable, TableWriter, cell};
 pub use text_boxes::read_otb;

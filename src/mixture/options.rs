@@ -79,9 +79,11 @@ impl Default for MixtureOptions {
 }
 
 impl MixtureOptions {
+    /// Checks every option by itself, whatever the points are.
+    ///
     /// # Errors
-    /// [`Error::Argument`] naming what cannot be used, whatever the points are.
-    pub(super) fn check(&self) -> Result<()> {
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
         let positive = |name, value: f64| {
             let sound = value.is_finite() && value > 0.0;
             if sound { Ok(()) } else { Err(Error::argument(name, "a finite number above 0", value)) }

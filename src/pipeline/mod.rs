@@ -1,15 +1,18 @@
 //! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks; and, with trackers in their place, to
-//! tracks ([`TrackRun`]).
+//! tracks ([`TrackRun`]); and from pairs of views to tracks of everything that moves ([`StereoRun`]).
 //!
 //! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`] frames wait behind the reader,
 //! and a stage keeps the few frames that it needs (figures 1 and 2 of WO2010/098160). Frames are read and decoded on a thread of their own
 //! while the stage works; results come in the order of the frames and do not depend on timing.
 
+mod album;
 mod output;
 mod prefetch;
 mod run;
 mod sink;
 mod stage;
+mod stereo;
+mod text_format;
 mod track;
 
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_folder};
@@ -17,6 +20,11 @@ pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};
 pub use stage::{EstimatorStage, FilterStage, Output, Stage};
+pub use stereo::{
+    BeginSinks, ClusterRows, GraphChart, GraphFile, GreyPair, GreyPairs, StereoFormat, StereoOverlays, StereoPicture,
+    StereoRun, StereoSink, StereoStep, StereoSummary,
+};
+pub use text_format::TextFormat;
 pub use track::{
     Begin, Begun, Overlays, PATH_LENGTH, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackStep,
     TrackSummary,

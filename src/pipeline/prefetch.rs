@@ -2,7 +2,7 @@
 //! keeps the run from being stopped.
 
 use crate::error::{Error, Result};
-use crate::io::FrameSource;
+use crate::io::{FrameSource, ViewPairs};
 use crate::types::AnyFrame;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -14,18 +14,32 @@ pub const READ_AHEAD: usize = 2;
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// The receiving end of a reader thread.
-pub(super) struct Prefetch {
-    frames: Receiver<Result<AnyFrame>>,
+pub(super) struct Prefetch<T = AnyFrame> {
+    frames: Receiver<Result<T>>,
 }
 
 impl Prefetch {
-    /// Starts to read `source`. The thread ends with the source, at the first error, or when this end is dropped.
+    /// Starts to read the frames of `source`.
     pub(super) fn start(mut source: Box<dyn FrameSource>) -> Result<Self> {
+        Self::of(move || source.next_frame())
+    }
+}
+
+impl Prefetch<[AnyFrame; 2]> {
+    /// Starts to read pairs of views.
+    pub(super) fn pairs(mut views: ViewPairs) -> Result<Self> {
+        Self::of(move || views.next_pair())
+    }
+}
+
+impl<T: Send + 'static> Prefetch<T> {
+    /// Starts to call `read`. The thread ends with what there is to read, at the first error, or when this end is dropped.
+    fn of(mut read: impl FnMut() -> Result<Option<T>> + Send + 'static) -> Result<Self> {
         let (sender, frames) = sync_channel(READ_AHEAD);
         std::thread::Builder::new()
             .name("jacoflow-reader".into())
             .spawn(move || {
-                while let Some(frame) = source.next_frame().transpose() {
+                while let Some(frame) = read().transpose() {
                     let last = frame.is_err();
                     if sender.send(frame).is_err() || last {
                         break;
@@ -37,7 +51,7 @@ impl Prefetch {
     }
 
     /// The next frame; calls `wait` while there is none yet and stops when `wait` fails.
-    pub(super) fn next(&self, wait: impl Fn() -> Result<()>) -> Result<Option<AnyFrame>> {
+    pub(super) fn next(&self, wait: impl Fn() -> Result<()>) -> Result<Option<T>> {
         loop {
             match self.frames.recv_timeout(PATIENCE) {
                 Ok(frame) => return frame.map(Some),

@@ -8,6 +8,7 @@ use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method};
 use crate::track::GreyLevels;
 use crate::types::{AnyFrame, Frame};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 
 /// Views in 8-bit grey levels; the first decides what the white of floats is.
@@ -28,9 +29,10 @@ pub(super) fn in_levels(view: &AnyFrame, gain: f64) -> Frame<f32> {
     }
 }
 
-/// The arguments that both functions share.
-fn options(
-    method: &str,
+/// The keyword options that both functions have.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Search {
     disparity_range: (i32, i32),
     row_range: (i32, i32),
     sigma: f64,
@@ -39,19 +41,50 @@ fn options(
     window: usize,
     min_support: f64,
     threads: Option<usize>,
-) -> PyResult<EdgeDisparityOptions> {
-    Ok(EdgeDisparityOptions {
-        method: Method::parse(method)?,
-        disparity_range,
-        row_range,
-        sigma,
-        threshold,
-        classes,
-        window,
-        min_support,
-        threads: Threads::new(threads)?,
-        ..EdgeDisparityOptions::default()
-    })
+}
+
+/// The keyword options of `edge_disparity` alone.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Matching<'py> {
+    method: String,
+    row_offset: Option<f64>,
+    subpixel: bool,
+    check: bool,
+    prior: Option<Bound<'py, PyAny>>,
+    prior_radius: u32,
+}
+
+impl Search {
+    fn options(self) -> PyResult<EdgeDisparityOptions> {
+        Ok(EdgeDisparityOptions {
+            disparity_range: self.disparity_range,
+            row_range: self.row_range,
+            sigma: self.sigma,
+            threshold: self.threshold,
+            classes: self.classes,
+            window: self.window,
+            min_support: self.min_support,
+            threads: Threads::new(self.threads)?,
+            ..EdgeDisparityOptions::default()
+        })
+    }
+}
+
+impl Matching<'_> {
+    /// With these options, too.
+    fn add_to(self, options: EdgeDisparityOptions) -> PyResult<EdgeDisparityOptions> {
+        let prior = self.prior.map(|prior| arrays::frame("prior", &prior, ColourRule::Refuse)).transpose()?;
+        Ok(EdgeDisparityOptions {
+            method: Method::parse(&self.method)?,
+            row_offset: self.row_offset,
+            subpixel: self.subpixel,
+            check: self.check,
+            prior: prior.map(|prior| prior.to_real::<f32>()),
+            prior_radius: self.prior_radius,
+            ..options
+        })
+    }
 }
 
 /// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and scores (N,), then the row offset.
@@ -59,27 +92,12 @@ fn options(
 pub fn edge_disparity<'py>(
     left: &Bound<'py, PyAny>,
     right: &Bound<'py, PyAny>,
-    method: &str,
-    disparity_range: (i32, i32),
-    row_range: (i32, i32),
-    row_offset: Option<f64>,
-    subpixel: bool,
-    check: bool,
-    prior: Option<&Bound<'py, PyAny>>,
-    prior_radius: u32,
-    sigma: f64,
-    threshold: f64,
-    classes: usize,
-    window: usize,
-    min_support: f64,
-    threads: Option<usize>,
+    options: &Bound<'py, PyDict>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, f64)> {
     let py = left.py();
-    let common = options(method, disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
+    let (search, matching): (Search, Matching<'_>) = (options.extract()?, options.extract()?);
+    let options = matching.add_to(search.options()?)?;
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
-    let prior = prior.map(|prior| arrays::frame("prior", prior, ColourRule::Refuse)).transpose()?;
-    let prior = prior.map(|prior| prior.to_real::<f32>());
-    let options = EdgeDisparityOptions { row_offset, subpixel, check, prior, prior_radius, ..common };
     let found = py.detach(|| stereo::edge_disparity(&left, &right, &options))?;
     let count = [found.rows.len()];
     Ok((
@@ -97,16 +115,9 @@ pub fn edge_disparity<'py>(
 pub fn estimate_row_offset(
     left: &Bound<'_, PyAny>,
     right: &Bound<'_, PyAny>,
-    disparity_range: (i32, i32),
-    row_range: (i32, i32),
-    sigma: f64,
-    threshold: f64,
-    classes: usize,
-    window: usize,
-    min_support: f64,
-    threads: Option<usize>,
+    options: &Bound<'_, PyDict>,
 ) -> PyResult<f64> {
-    let options = options("sgm", disparity_range, row_range, sigma, threshold, classes, window, min_support, threads)?;
+    let options = options.extract::<Search>()?.options()?;
     let py = left.py();
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
     Ok(py.detach(|| stereo::estimate_row_offset(&left, &right, &options))?)

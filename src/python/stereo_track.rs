@@ -77,13 +77,11 @@ impl Given {
                 return Err(Error::argument("tol", "\"auto\", a number or None", format!("{word:?}")).into());
             }
         };
-        let [first, last] = self.disparity_range;
+        options = options.with_disparities(self.disparity_range);
         let (rows, columns, layers) = self.grid;
         options.grid.rows = rows;
         options.grid.columns = columns;
-        options.grid.layers = layers.unwrap_or_else(|| last.saturating_sub(first).max(1) as usize);
-        options.grid.first_disparity = first;
-        options.disparity_range = self.disparity_range;
+        options.grid.layers = layers.unwrap_or(options.grid.layers);
         options.row_range = self.row_range;
         options.row_offset = self.row_offset;
         if let Some(matching) = self.matching {

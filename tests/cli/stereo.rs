@@ -4,15 +4,15 @@ use super::support::Place;
 use jacoflow::io::{Colour, DisparityFormat, read_image};
 use std::fs;
 
-const WIDTH: usize = 96;
-const HEIGHT: usize = 64;
+pub const WIDTH: usize = 96;
+pub const HEIGHT: usize = 64;
 /// Disparity of the pair `index`, px.
 fn disparity(index: usize) -> usize {
     3 + index
 }
 
 /// Level of a cell of 8 px.
-fn cell(x: usize, y: usize) -> u8 {
+pub fn cell(x: usize, y: usize) -> u8 {
     let mut bits = ((x / 8) * 7919 + (y / 8) * 104_729 + 12_345) as u32;
     for _ in 0..3 {
         bits = (bits ^ (bits >> 7)).wrapping_mul(2_654_435_761);
@@ -25,17 +25,28 @@ fn views(index: usize) -> [Vec<u8>; 2] {
     [200, 200 + disparity(index)].map(|from| (0..WIDTH * HEIGHT).map(|i| cell(i % WIDTH + from, i / WIDTH)).collect())
 }
 
-/// A place with `left/`, `right/`, `beside.y4m` and `above.y4m` of some pairs.
+/// The beginning of a film.
+pub fn header(w: usize, h: usize) -> Vec<u8> {
+    format!("YUV4MPEG2 W{w} H{h} F25:1 Ip A1:1 Cmono\n").into_bytes()
+}
+
+/// A place with `left/`, `right/`, `left.y4m`, `right.y4m`, `beside.y4m` and `above.y4m` of some pairs.
 fn recorded(pairs: usize) -> Place {
+    recorded_as(pairs, views)
+}
+
+pub fn recorded_as(pairs: usize, views: impl Fn(usize) -> [Vec<u8>; 2]) -> Place {
     let place = Place::new();
-    let header = |w: usize, h: usize| format!("YUV4MPEG2 W{w} H{h} F25:1 Ip A1:1 Cmono\n").into_bytes();
     let (mut beside, mut above) = (header(2 * WIDTH, HEIGHT), header(WIDTH, 2 * HEIGHT));
     for (side, folder) in ["left", "right"].into_iter().enumerate() {
         fs::create_dir(place.path(folder)).unwrap();
+        let mut film = header(WIDTH, HEIGHT);
         for index in 0..pairs {
             let bytes = [format!("P5\n{WIDTH} {HEIGHT}\n255\n").into_bytes(), views(index)[side].clone()].concat();
             fs::write(place.path(folder).join(format!("{index}.pgm")), bytes).unwrap();
+            film.extend(b"FRAME\n".iter().chain(&views(index)[side]));
         }
+        fs::write(place.path(&format!("{folder}.y4m")), film).unwrap();
     }
     for index in 0..pairs {
         let [left, right] = views(index);
@@ -70,6 +81,8 @@ fn every_layout_gives_the_same_disparities() {
         ("a", "stereo left right"),
         ("b", "stereo beside.y4m --layout side-by-side"),
         ("c", "stereo above.y4m --layout top-bottom"),
+        ("d", "stereo left.y4m right.y4m"),
+        ("e", "stereo right left.y4m --swap"),
     ] {
         let summary = place.good(&format!("{line} {common} -o {folder}")).json();
         assert_eq!((summary["pairs"].as_u64(), summary["files"].as_u64()), (Some(3), Some(9)));

@@ -13,13 +13,21 @@ pub enum Precision {
     Double,
 }
 
+/// Threads.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Computation")]
+pub struct ThreadArguments {
+    /// Number of threads; the result does not depend on it [default: JACOFLOW_THREADS, else every processor]
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub threads: Option<usize>,
+}
+
 /// Threads, instruction set, precision.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Computation")]
 pub struct ComputeArguments {
-    /// Number of threads; the result does not depend on it [default: JACOFLOW_THREADS, else every processor]
-    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
-    pub threads: Option<usize>,
+    #[command(flatten)]
+    pub threads: ThreadArguments,
     /// Instruction set: scalar, avx2 or avx512 [default: JACOFLOW_SIMD, else the best of this processor]
     #[arg(long, value_name = "LEVEL")]
     pub simd: Option<String>,

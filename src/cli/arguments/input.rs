@@ -1,16 +1,13 @@
 //! Where frames come from and what is done to them first.
 
 use super::{parse_not_negative, parse_positive, parse_rate};
+use crate::io::{Colour, OpenOptions};
+use crate::pipeline::Numbering;
 use clap::Args;
 
-/// Frames and their preparation.
+/// Which frames of the input are used, and colour.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Input")]
-pub struct InputArguments {
-    /// Frames: a folder (natural order), a pattern ('frames/*.png'), several images, a .y4m or .npy file, `-` (Y4M on standard input),
-    /// or a video file (needs ffmpeg on the PATH)
-    #[arg(required = true, value_name = "INPUT")]
-    pub input: Vec<String>,
+pub struct SelectionArguments {
     /// Convert colour to luminance (0.299 R + 0.587 G + 0.114 B); without it colour is refused
     #[arg(long)]
     pub luminance: bool,
@@ -23,6 +20,36 @@ pub struct InputArguments {
     /// Use every N-th frame
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
     pub step: usize,
+}
+
+impl SelectionArguments {
+    /// How sources are opened.
+    pub fn options(&self) -> OpenOptions {
+        OpenOptions {
+            colour: if self.luminance { Colour::Luminance } else { Colour::Error },
+            first: self.first,
+            limit: self.limit,
+            step: self.step,
+        }
+    }
+
+    /// Which frames of the input these are: `given` frames per second of the input, or those that the source tells of the frames it delivers.
+    pub fn numbering(&self, given: Option<f64>, delivered: Option<f64>) -> Numbering {
+        let rate = given.or_else(|| delivered.map(|rate| rate * self.step as f64));
+        Numbering { first: self.first, step: self.step, rate }
+    }
+}
+
+/// Frames and their preparation.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Input")]
+pub struct InputArguments {
+    /// Frames: a folder (natural order), a pattern ('frames/*.png'), several images, a .y4m or .npy file, `-` (Y4M on standard input),
+    /// or a video file (needs ffmpeg on the PATH)
+    #[arg(required = true, value_name = "INPUT")]
+    pub input: Vec<String>,
+    #[command(flatten)]
+    pub selection: SelectionArguments,
     /// Frames per second of the input (a number or a fraction); replaces what the file says
     #[arg(long, value_name = "RATE", value_parser = parse_rate)]
     pub fps: Option<f64>,

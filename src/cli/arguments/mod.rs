@@ -6,15 +6,19 @@ mod input;
 mod method;
 mod output;
 mod sites;
+mod stereo_track;
 mod track;
+mod views;
 
-pub use compute::{ComputeArguments, Precision, TellArguments};
+pub use compute::{ComputeArguments, Precision, TellArguments, ThreadArguments};
 pub use filter::{FilterArguments, describe_filter};
-pub use input::InputArguments;
+pub use input::{InputArguments, SelectionArguments};
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use sites::SiteArguments;
+pub use stereo_track::StereoTrackerArguments;
 pub use track::{TargetArguments, TrackerArguments};
+pub use views::{LayoutArguments, SearchArguments};
 
 /// `KxL` (or `K` for a square): width and height of a neighbourhood or a frame.
 pub fn parse_size(text: &str) -> Result<(usize, usize), String> {
@@ -32,6 +36,13 @@ pub fn parse_pair(text: &str) -> Result<(f64, f64), String> {
         (Ok(a), Ok(b)) => Ok((a, b)),
         _ => Err("expected one or two positive numbers, such as 0.5 or 0.5,0.4".into()),
     }
+}
+
+/// Two whole numbers `A,B`, the lesser first.
+pub fn parse_range(text: &str) -> Result<(i32, i32), String> {
+    let ends = text.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+    ends.filter(|(least, greatest)| least <= greatest)
+        .ok_or_else(|| "expected LEAST,GREATEST, two whole numbers".into())
 }
 
 /// A positive finite number.
@@ -62,6 +73,12 @@ pub fn parse_rate(text: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ranges_are_two_whole_numbers_in_order() {
+        assert_eq!(parse_range("-40, 24"), Ok((-40, 24)));
+        assert!(parse_range("3,2").is_err() && parse_range("3").is_err() && parse_range("1.5,2").is_err());
+    }
 
     #[test]
     fn sizes_pairs_and_rates_are_read() {

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::track::METHODS;
 use crate::track::gradient::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
+use crate::track::stereo::StereoMode;
 use crate::types::TargetBox;
 use clap::{Args, ValueEnum};
 
@@ -19,6 +20,11 @@ pub struct TargetArguments {
 }
 
 impl TargetArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        self.boxes.first().map(|_| "box").or(self.points.first().map(|_| "point"))
+    }
+
     /// What is known of each target; without any, the one that moves first.
     pub fn starts(&self) -> Vec<Start> {
         let boxes = self.boxes.iter().map(|bounds| Start::Box(*bounds));
@@ -31,24 +37,24 @@ impl TargetArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct TrackerArguments {
-    /// Tracker: gradient
+    /// Tracker: gradient (given targets in one view) or stereo (everything that moves before two cameras)
     #[arg(long, value_name = "NAME", default_value = "gradient")]
     pub method: String,
-    /// gradient: which system follows the target
-    #[arg(long, value_enum, value_name = "NAME", default_value = "layered")]
-    pub mode: ModeWord,
+    /// Which system follows the targets [default: layered, stereo improved]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub mode: Option<ModeWord>,
     /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,
-    /// How the window follows the target (local)
-    #[arg(long, value_enum, value_name = "HOW", default_value = "integer")]
-    pub control: ControlWord,
-    /// What the target's picture does besides moving (layered)
-    #[arg(long, value_enum, value_name = "NAME", default_value = "similarity")]
-    pub model: ModelWord,
-    /// What the camera does (layered)
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "auto")]
-    pub camera: CameraWord,
+    /// How the window follows the target (local) [default: integer]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub control: Option<ControlWord>,
+    /// What the target's picture does besides moving (layered) [default: similarity]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub model: Option<ModelWord>,
+    /// What the camera does (layered) [default: auto]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub camera: Option<CameraWord>,
     /// Degree of the polynomials behind the derivatives, 1 to 4 [default: 4, paper 2]
     #[arg(long, value_name = "N")]
     pub order: Option<usize>,
@@ -67,6 +73,8 @@ pub enum ModeWord {
     Layered,
     /// Local flow in a moving window, with the repairs that it needs; the fastest
     Local,
+    /// Stereo: motion to fractions of a pixel carries the clusters along
+    Improved,
     /// The paper's text to the letter, for comparison
     Paper,
 }
@@ -108,25 +116,51 @@ pub enum Eps {
 }
 
 impl TrackerArguments {
+    /// The method's name, one that is known.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `method`.
+    pub fn method(&self) -> Result<&'static str> {
+        let known = METHODS.iter().copied().find(|name| *name == self.method);
+        known.ok_or_else(|| Error::argument("method", format!("one of {}", METHODS.join(", ")), &self.method))
+    }
+
+    /// Whether an option of the gradient tracker alone was given.
+    pub fn given(&self) -> Option<&'static str> {
+        [
+            self.fov.map(|_| "fov"),
+            self.control.map(|_| "control"),
+            self.model.map(|_| "model"),
+            self.camera.map(|_| "camera"),
+            self.order.map(|_| "order"),
+            self.window.map(|_| "window"),
+            self.eps.map(|_| "eps"),
+        ]
+        .into_iter()
+        .find_map(|given| given)
+    }
+
     /// The options of the gradient tracker.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
-    pub fn options(&self) -> Result<GradientOptions> {
-        if !METHODS.contains(&self.method.as_str()) {
-            return Err(Error::argument("method", format!("one of {}", METHODS.join(", ")), &self.method));
-        }
+    pub fn gradient(&self) -> Result<GradientOptions> {
         let defaults = GradientOptions::default();
         let options = GradientOptions {
             mode: match self.mode {
-                ModeWord::Layered => Mode::Layered,
-                ModeWord::Local => Mode::Local,
-                ModeWord::Paper => Mode::Paper,
+                None => defaults.mode,
+                Some(ModeWord::Layered) => Mode::Layered,
+                Some(ModeWord::Local) => Mode::Local,
+                Some(ModeWord::Paper) => Mode::Paper,
+                Some(ModeWord::Improved) => {
+                    return Err(Error::argument("mode", "layered, local or paper for gradient", "improved"));
+                }
             },
             fov: self.fov,
             control: match self.control {
-                ControlWord::Integer => Control::Integer,
-                ControlWord::Subpixel => Control::Subpixel,
+                None => defaults.control,
+                Some(ControlWord::Integer) => Control::Integer,
+                Some(ControlWord::Subpixel) => Control::Subpixel,
             },
             window: self.window,
             order: self.order,
@@ -136,20 +170,37 @@ impl TrackerArguments {
                 Some(Eps::Speed(speed)) => Some(speed),
             },
             shape: match self.model {
-                ModelWord::Similarity => Shape::Similarity,
-                ModelWord::Affine => Shape::Affine,
+                None => defaults.shape,
+                Some(ModelWord::Similarity) => Shape::Similarity,
+                Some(ModelWord::Affine) => Shape::Affine,
             },
             camera: match self.camera {
-                CameraWord::Auto => CameraMotion::Auto,
-                CameraWord::None => CameraMotion::None,
+                None => defaults.camera,
+                Some(CameraWord::Auto) => CameraMotion::Auto,
+                Some(CameraWord::None) => CameraMotion::None,
             },
         };
         options.check()?;
         Ok(options)
     }
+
+    /// The mode of the stereo tracker.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `mode`.
+    pub fn stereo_mode(&self) -> Result<StereoMode> {
+        match self.mode {
+            None | Some(ModeWord::Improved) => Ok(StereoMode::Improved),
+            Some(ModeWord::Paper) => Ok(StereoMode::Paper),
+            Some(ModeWord::Layered | ModeWord::Local) => {
+                Err(Error::argument("mode", "improved or paper for stereo", "a mode of gradient"))
+            }
+        }
+    }
 }
 
-fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+/// N finite numbers with commas between.
+pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let values: Vec<f64> = text.split(',').map(|word| word.trim().parse().ok()).collect::<Option<_>>()?;
     <[f64; N]>::try_from(values).ok().filter(|values| values.iter().all(|value| value.is_finite()))
 }

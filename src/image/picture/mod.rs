@@ -1,7 +1,9 @@
-//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks and disparities over them.
+//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks, clusters and disparities over them, graphs over time.
 //!
 //! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes it as PNG.
 
+mod chart;
+mod clusters;
 mod digits;
 mod disparity;
 mod diverging;
@@ -11,6 +13,8 @@ mod overlay;
 mod quiver;
 mod wheel;
 
+pub use chart::{ChartArc, ChartNode, chart_picture};
+pub use clusters::{ClusterMark, cluster_picture, identity_colour};
 pub use disparity::draw_disparity;
 pub use diverging::{SignedMap, symmetric_range};
 pub use grey::{GreyRange, grey_picture};

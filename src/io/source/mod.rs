@@ -7,6 +7,7 @@ mod list;
 mod memory;
 mod npy;
 mod select;
+mod views;
 mod y4m;
 
 pub use ffmpeg::FfmpegSource;
@@ -14,6 +15,7 @@ pub use files::FilesSource;
 pub use memory::MemorySource;
 pub use npy::NpySource;
 pub use select::Selected;
+pub use views::{ViewLayout, ViewPairs};
 pub use y4m::Y4mSource;
 
 use crate::error::{Error, Result};

@@ -1,6 +1,5 @@
 //! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in bounded memory.
 
-mod album;
 mod overlay;
 mod rows;
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Tracks over the frames, as pictures or a film.
 
-use super::album::Album;
 use super::{TrackSink, TrackStep};
 use crate::error::Result;
 use crate::image::picture::{GreyRange, PathPoint, TrackOverlay};
+use crate::pipeline::album::Album;
 use crate::pipeline::sink::Ending;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub const PATH_LENGTH: usize = 1000;
 
 /// First word of the files' names.
-pub(super) const STEM: &str = "track";
+const STEM: &str = "track";
 
 /// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one film.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ impl Overlays {
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
-        let album = Album::create(path.as_ref(), frame_rate)?;
+        let album = Album::create(path.as_ref(), STEM, frame_rate)?;
         Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 
@@ -38,7 +38,7 @@ impl Overlays {
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay`.
     pub fn check(path: &Path) -> Result<()> {
-        Album::check(path)
+        Album::check(path, STEM, "overlay")
     }
 
     /// Remembers where the targets are.

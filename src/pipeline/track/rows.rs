@@ -1,9 +1,10 @@
 //! Tracks as rows of text.
 
 use super::{TrackSink, TrackStep};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::{MotTable, TrackTable};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
+use crate::pipeline::text_format::TextFormat;
 use crate::types::TrackState;
 use std::path::{Path, PathBuf};
 
@@ -16,35 +17,21 @@ pub enum TrackFormat {
     Mot,
 }
 
-impl TrackFormat {
-    /// Every format.
-    pub const ALL: [Self; 2] = [Self::Csv, Self::Mot];
+impl TextFormat for TrackFormat {
+    const ALL: &'static [Self] = &[Self::Csv, Self::Mot];
 
-    /// The format's word.
-    pub fn name(self) -> &'static str {
+    fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
             Self::Mot => "mot",
         }
     }
 
-    /// The extension of its files.
-    pub fn extension(self) -> &'static str {
+    fn extension(self) -> &'static str {
         match self {
             Self::Csv => "csv",
             Self::Mot => "txt",
         }
-    }
-
-    /// The format called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `format`.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == name)
-            .ok_or_else(|| Error::argument("format", "csv or mot", name))
     }
 }
 

@@ -3,7 +3,7 @@ use crate::image::GaussianSmoother;
 use crate::image::picture::TrackOverlay;
 use crate::io::{Colour, MemorySource, read_image, read_mot};
 use crate::parallel::Silent;
-use crate::pipeline::{TableTarget, peek};
+use crate::pipeline::{TableTarget, TextFormat, peek};
 use crate::types::TargetBox;
 use std::path::Path;
 
@@ -58,7 +58,7 @@ fn names(folder: &Path) -> Vec<String> {
 fn into(folder: &Path) -> Vec<Box<dyn TrackSink>> {
     let mut sinks: Vec<Box<dyn TrackSink>> =
         vec![Box::new(Overlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap())];
-    for format in TrackFormat::ALL {
+    for &format in TrackFormat::ALL {
         let target = TableTarget::File(folder.join(format!("t.{}", format.extension())));
         sinks.push(Box::new(TrackRows::create(&target, format).unwrap()));
     }

@@ -58,7 +58,7 @@ fn neighbours(clusters: &Clusters, reach: f64) -> Vec<(usize, usize)> {
             there[usize::from(y) * grid.columns + usize::from(x)].push(k as u16);
         }
     }
-    let span = reach.max(0.0).floor() as i32;
+    let span = reach.clamp(0.0, grid.columns.max(grid.rows) as f64).floor() as i32;
     let offsets: Vec<(i32, i32)> = (-span..=span)
         .flat_map(|dy| (-span..=span).map(move |dx| (dx, dy)))
         .filter(|&(dx, dy)| f64::from(dx * dx + dy * dy) <= reach * reach && (dy, dx) >= (0, 0))
@@ -123,6 +123,8 @@ mod tests {
         assert_eq!(groups(&clusters, &motions, &Grouping::default()), [0, 0, 2, 3, 4, 5]);
         let far = Grouping { reach: 5.0, ..Grouping::default() };
         assert_eq!(groups(&clusters, &motions, &far), [0, 0, 2, 3, 3, 5]);
+        let everywhere = Grouping { reach: f64::INFINITY, motion: 9.0, depth_motion: 9.0 };
+        assert_eq!(groups(&clusters, &motions, &everywhere), [0, 0, 0, 0, 0, 5]);
     }
 
     #[test]

@@ -16,6 +16,8 @@ pub(super) struct Identity {
     pub position: [f64; 3],
     /// Most edge pixels of late.
     pub peak: f64,
+    /// Standard deviation in depth when it was last mostly seen, layers.
+    pub thickness: f64,
 }
 
 /// A component that is seen.
@@ -26,10 +28,16 @@ pub(super) struct Sighting {
     pub position: [f64; 3],
     /// Edge pixels.
     pub pixels: usize,
+    /// Standard deviation in depth, layers.
+    pub thickness: f64,
 }
 
-/// Share of the most pixels of late below which a track counts as mostly covered.
-const COVERED: f64 = 0.5;
+/// Share of the most pixels of late below which a track counts as partly covered: its mean is then that of what is left.
+const COVERED: f64 = 0.8;
+/// By how much a thing may be thicker or thinner than a lost one that it is taken for: a factor, and layers. What covers part of a thing does not change its extent in depth.
+const AS_THICK: (f64, f64) = (2.0, 0.5);
+/// How many times as many pixels as the lost one had a thing that is taken for it may have.
+const AS_LARGE: f64 = 1.5;
 /// What the memory of that loses each step.
 const FORGET: f64 = 0.9;
 
@@ -125,7 +133,7 @@ impl Identities {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
                 for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
-                    if let Some(distance) = resting.distance(time, new.position, limits) {
+                    if let Some(distance) = resting.distance(time, new, limits) {
                         pairs.push((distance, r, new.component));
                     }
                 }
@@ -141,34 +149,44 @@ impl Identities {
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
         }
-        for &Sighting { component, position, pixels } in seen {
+        for &Sighting { component, position, pixels, thickness } in seen {
             if self.live[component].is_none() {
                 let id = self.name();
-                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0 };
+                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, thickness };
                 self.live[component] = Some(unknown);
             }
             if let Some(identity) = &mut self.live[component] {
-                identity.see(position, pixels as f64);
+                identity.see(position, pixels as f64, thickness);
             }
         }
     }
 }
 
 impl Identity {
-    fn see(&mut self, position: [f64; 3], pixels: f64) {
+    fn see(&mut self, position: [f64; 3], pixels: f64, thickness: f64) {
         self.peak = pixels.max(FORGET * self.peak);
         self.position = match self.velocity {
             Some(velocity) if pixels < COVERED * self.peak => std::array::from_fn(|i| self.position[i] + velocity[i]),
-            _ => position,
+            _ => {
+                self.thickness = thickness;
+                position
+            }
         };
+    }
+
+    /// Whether a thing may be this one, seen wholly or in part.
+    fn resembles(&self, seen: &Sighting) -> bool {
+        let (factor, layers) = AS_THICK;
+        let (thinner, thicker) = (self.thickness.min(seen.thickness), self.thickness.max(seen.thickness));
+        thicker <= factor * thinner + layers && seen.pixels as f64 <= AS_LARGE * self.peak
     }
 }
 
 impl Resting {
-    /// How far a component is from where the track is expected, in tolerances; `None` beyond them, and for a track just lost.
-    fn distance(&self, time: usize, position: [f64; 3], limits: &Recognition) -> Option<f64> {
+    /// How far a component is from where the track is expected, in tolerances; `None` beyond them, for one that does not resemble it, and for a track just lost.
+    fn distance(&self, time: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
         let gap = time - self.since;
-        if gap < 2 {
+        if gap < 2 || !self.identity.resembles(seen) {
             return None;
         }
         let velocity = self.identity.velocity?;
@@ -176,7 +194,7 @@ impl Resting {
         for i in 0..3 {
             let expected = self.identity.position[i] + gap as f64 * velocity[i];
             let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i];
-            let off = (position[i] - expected).abs() / tolerance;
+            let off = (seen.position[i] - expected).abs() / tolerance;
             if off > 1.0 {
                 return None;
             }
@@ -195,7 +213,7 @@ mod tests {
     const LEAST: f64 = 20.0;
 
     fn at(component: usize, position: [f64; 3]) -> Sighting {
-        Sighting { component, position, pixels: 100 }
+        Sighting { component, position, pixels: 100, thickness: 0.3 }
     }
 
     fn identities() -> Identities {
@@ -224,6 +242,28 @@ mod tests {
         assert_eq!(all.live[2].as_ref().unwrap().id, 0);
         elsewhere.name_all(5, &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
         assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
+    }
+
+    #[test]
+    fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        for _ in 0..2 {
+            all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
+        }
+        all.rest(0, |k| k == 0);
+        let there = at(2, [16.0, 10.0, 30.0]);
+        for (seen, known) in [
+            (there, true),
+            (Sighting { pixels: 40, ..there }, true),
+            (Sighting { pixels: 160, ..there }, false),
+            (Sighting { thickness: 1.0, ..there }, true),
+            (Sighting { thickness: 4.0, ..there }, false),
+        ] {
+            let mut all = all.clone();
+            all.name_all(3, &[seen], LEAST, Some(&limits));
+            assert_eq!(all.live[2].as_ref().unwrap().id == 0, known, "{seen:?}");
+        }
     }
 
     #[test]
@@ -259,7 +299,7 @@ mod tests {
         let limits = Recognition::default();
         let mut all = identities();
         all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits)).unwrap();
-        all.name_all(1, &[Sighting { pixels: 60, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
+        all.name_all(1, &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
         assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
         all.name_all(2, &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
         assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);

@@ -17,6 +17,7 @@ mod lucas_kanade;
 mod motion;
 mod options;
 mod overlap;
+mod settings;
 mod step;
 mod tracker;
 mod voxels;

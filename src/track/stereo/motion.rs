@@ -98,6 +98,19 @@ pub(super) struct NextView<'a> {
     pub disparity: &'a Frame<f32>,
 }
 
+/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew. Counting in whole voxels moves it by up to half of one more or less than
+/// the pixels, all of a flat cluster's alike in depth. `None` for a cluster without pixels.
+pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -> Option<[f64; 3]> {
+    let (lattice, pixels) = (clusters.lattice(), &clusters.pixels[k]);
+    let mut sum = [0.0; 3];
+    for &i in pixels {
+        let place = clusters.points.at(i as usize);
+        let (now, then) = (lattice.cell_at(place), lattice.cell_at(motion.moved(place)));
+        (0..3).for_each(|axis| sum[axis] += then[axis] - now[axis]);
+    }
+    (!pixels.is_empty()).then(|| sum.map(|sum| sum / pixels.len() as f64))
+}
+
 /// Places `(x, y)` of a cluster's pixels, px.
 pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
     let place = |&i: &u32| {
@@ -107,13 +120,22 @@ pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
     clusters.pixels[k].iter().map(place).collect()
 }
 
-/// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from the motion before (`last`, px and disparity).
+/// What a cluster's motion may be, px and disparity, before it is measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Guess {
+    /// Its own one step ago.
+    pub last: Option<[f64; 3]>,
+    /// For want of that, the motion of who is nearest to it.
+    pub beside: Option<[f64; 3]>,
+}
+
+/// Motion of all clusters towards the next view by affine Lucas-Kanade, from the template's shift and from a guess.
 ///
-/// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell.
+/// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell, or tell of more than is searched for.
 pub(super) fn fine_motions(
     from: &Seen,
     next: NextView<'_>,
-    last: &[Option<[f64; 3]>],
+    guesses: &[Guess],
     options: &StereoTrackerOptions,
 ) -> Vec<Option<FineMotion>> {
     let levels = from.levels.as_ref();
@@ -124,7 +146,7 @@ pub(super) fn fine_motions(
         if (pixels.len() as f64) < options.reseed_below {
             return None;
         }
-        let starts = starts(from, next.luminance, k, last[k], options);
+        let starts = starts(from, next.luminance, k, guesses[k], options);
         let plane = affine_motion(levels?, next.levels, &pixels, &starts)?;
         let mut changes: Vec<f64> = clusters.pixels[k]
             .iter()
@@ -137,21 +159,17 @@ pub(super) fn fine_motions(
         if (changes.len() as f64) < LEAST_SHARE * pixels.len() as f64 {
             return None;
         }
-        robust_mean(&mut changes).map(|depth| FineMotion { plane, depth })
+        // Pixels that meet another surface tell a change of disparity, too, but not a motion.
+        let depth = robust_mean(&mut changes).filter(|depth| depth.abs() <= options.search as f64)?;
+        Some(FineMotion { plane, depth })
     };
     (0..from.clusters.components()).into_par_iter().map(one).collect()
 }
 
 /// First guesses of a cluster's translation, px.
-fn starts(
-    from: &Seen,
-    next: &CellLuminance,
-    k: usize,
-    last: Option<[f64; 3]>,
-    options: &StereoTrackerOptions,
-) -> Vec<[f64; 2]> {
+fn starts(from: &Seen, next: &CellLuminance, k: usize, guess: Guess, options: &StereoTrackerOptions) -> Vec<[f64; 2]> {
     let [cx, cy, _] = from.clusters.lattice().cell();
-    let window = match last.filter(|_| options.predicted_windows) {
+    let window = match guess.last.filter(|_| options.predicted_windows) {
         Some([u, v, _]) => {
             Window { centre: [(u / cx).round() as i32, (v / cy).round() as i32], reach: PREDICTED_REACH }
         }
@@ -160,10 +178,27 @@ fn starts(
     let matched = from.luminance.find(&from.clusters.template(k), next, window);
     let mut starts: Vec<[f64; 2]> =
         matched.iter().map(|found| [f64::from(found.shift[0]) * cx, f64::from(found.shift[1]) * cy]).collect();
-    if let Some([u, v, _]) = last
+    if let Some([u, v, _]) = guess.last.or(guess.beside)
         && starts.iter().all(|start| (start[0] - u).hypot(start[1] - v) > SAME_START)
     {
         starts.push([u, v]);
     }
     starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clusters::tests::made_up;
+    use super::*;
+
+    #[test]
+    fn voxels_move_by_what_counting_makes_of_the_motion() {
+        // Pixels at x = 84 and 92, disparity -10.
+        let clusters = made_up(&[([10, 5, 30], 0), ([11, 5, 30], 0)], 2);
+        let moved = |motion| voxel_motion(&clusters, 0, &FineMotion::translation(motion, [88.0, 44.0]));
+        assert_eq!(moved([8.0, -8.0, 2.0]), Some([1.0, -1.0, 2.0]));
+        assert_eq!(moved([3.0, 4.0, 0.4]), Some([0.0, 1.0, 0.0]));
+        assert_eq!(moved([3.6, 0.0, 0.6]), Some([1.0, 0.0, 1.0]));
+        assert_eq!(voxel_motion(&clusters, 1, &FineMotion::translation([1.0; 3], [0.0; 2])), None);
+    }
 }

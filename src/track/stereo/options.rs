@@ -221,11 +221,32 @@ impl StereoTrackerOptions {
         }
     }
 
-    /// Checks what the tracker itself uses; the mixture and the matching check their own.
+    /// The same for another range of disparities, with a layer of the grid for each but the greatest, which is counted with the one before it.
+    pub fn with_disparities(mut self, range: [i32; 2]) -> Self {
+        let [least, greatest] = range;
+        self.disparity_range = range;
+        self.grid.first_disparity = least;
+        self.grid.layers = greatest.saturating_sub(least).max(1) as usize;
+        self
+    }
+
+    /// Checks every option by itself.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
+        self.matching_options(self.row_offset).check()?;
+        self.mixture_options(false, 0).check()?;
+        if self.warm_max_iter == 0 {
+            return Err(Error::argument("warm_max_iter", "a positive integer", 0));
+        }
+        if !(self.degrees_of_freedom_prior > 2.0 && self.degrees_of_freedom_prior.is_finite()) {
+            let expected = "a finite number above 2, one less than there are coordinates";
+            return Err(Error::argument("degrees_of_freedom_prior", expected, self.degrees_of_freedom_prior));
+        }
+        if !(self.covariance_prior > 0.0 && self.covariance_prior.is_finite()) {
+            return Err(Error::argument("covariance_prior", "a finite number above 0, cells^2", self.covariance_prior));
+        }
         let VoxelGrid { columns, rows, layers, .. } = self.grid;
         if [columns, rows, layers].iter().any(|side| !(1..=4096).contains(side)) || columns * rows * layers > 1 << 26 {
             let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
@@ -243,6 +264,16 @@ impl StereoTrackerOptions {
         if !(self.arc_threshold >= 0.0 && self.arc_threshold <= 2.0) {
             return Err(Error::argument("arc_threshold", "a score, 0 to 2", self.arc_threshold));
         }
+        if let Some(limits) = &self.recognition {
+            let lengths = limits.tolerance.iter().chain(&limits.tolerance_per_step);
+            let each =
+                [("least_overlap", limits.least_overlap), ("jump", limits.jump), ("jump", limits.jump_disparity)];
+            not_negative(each.into_iter().chain(lengths.map(|length| ("tolerance", *length))))?;
+        }
+        if let Some(Grouping { reach, motion, depth_motion }) = self.grouping {
+            not_negative([reach, motion, depth_motion].into_iter().map(|limit| ("group_limits", limit)))?;
+        }
+        not_negative([("reseed_below", self.reseed_below)].into_iter())?;
         if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
             for (name, value) in [("focal", focal), ("baseline", baseline)] {
                 if !(value > 0.0 && value.is_finite()) {
@@ -255,6 +286,16 @@ impl StereoTrackerOptions {
         }
         Ok(())
     }
+}
+
+/// Refuses NaN and what is below 0.
+fn not_negative(limits: impl Iterator<Item = (&'static str, f64)>) -> Result<()> {
+    for (name, value) in limits {
+        if value.is_nan() || value < 0.0 {
+            return Err(Error::argument(name, "a number that is not negative", value));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -271,6 +312,18 @@ mod tests {
         assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
         assert!(with(|o| o.components = 0).starts_with("n_components: "));
         assert!(with(|o| o.search = 0).starts_with("search: "));
+        assert!(with(|o| o.disparity_range = [5, -5]).starts_with("disparity_range: "));
+        assert!(with(|o| o.max_iter = 0).starts_with("max_iter: "));
+        assert!(with(|o| o.warm_max_iter = 0).starts_with("warm_max_iter: "));
+        assert!(with(|o| o.reseed_below = -1.0).starts_with("reseed_below: "));
+        let nowhere = |reach| Some(Grouping { reach, ..Grouping::default() });
+        let options = StereoTrackerOptions { grouping: nowhere(f64::NAN), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("group_limits: "));
+        let limits = Recognition { tolerance: [3.0, -4.0, 1.0], ..Recognition::default() };
+        let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("tolerance: "));
+        assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
+        assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
         assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
         assert!(with(|o| o.arc_threshold = f64::NAN).starts_with("arc_threshold: "));
         let camera = StereoCamera { focal: 0.0, baseline: 0.075, d_infinity: 0.0 };

@@ -13,7 +13,7 @@ use super::step::{Step, Track};
 use super::voxels::{EdgePoints, Lattice, Voxels};
 use crate::error::{Error, Result};
 use crate::mixture::Posterior;
-use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, Method, edge_disparity};
+use crate::stereo::{EdgeDisparity, Method, edge_disparity};
 use crate::types::Frame;
 use std::collections::BTreeMap;
 
@@ -58,6 +58,11 @@ impl StereoTracker {
         &self.options
     }
 
+    /// How many rows lower the right view shows a point, px, where that is given or was found once for all steps.
+    pub fn row_offset(&self) -> Option<f64> {
+        self.row_offset
+    }
+
     /// Steps taken.
     pub fn steps(&self) -> usize {
         self.time
@@ -79,16 +84,7 @@ impl StereoTracker {
     /// [`Error::Argument`] for views of different size, of less than 17 px or of another size than before (`left`, with both shapes), and for options of the matching out of range.
     pub fn update(&mut self, left: &Frame<f32>, right: &Frame<f32>) -> Result<Step> {
         self.check(left, &EdgePoints::default())?;
-        let [least, greatest] = self.options.disparity_range;
-        let [first_row, last_row] = self.options.row_range;
-        let matching = EdgeDisparityOptions {
-            method: self.options.matching,
-            disparity_range: (least, greatest),
-            row_range: (first_row, last_row),
-            row_offset: self.row_offset,
-            threads: self.options.threads,
-            ..EdgeDisparityOptions::default()
-        };
+        let matching = self.options.matching_options(self.row_offset);
         let found = edge_disparity(left, right, &matching)?;
         if self.options.matching == Method::SemiGlobal && !found.values.is_empty() {
             self.row_offset = Some(found.row_offset);

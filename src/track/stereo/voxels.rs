@@ -97,6 +97,12 @@ impl Lattice {
         Some(std::array::from_fn(|i| (at[i] as usize).min(last[i]) as u16))
     }
 
+    /// Cells along x, y and disparity in which an edge pixel at real coordinates would be counted; along x and y also outside of the picture.
+    pub fn cell_at(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
+        let [cx, cy, _] = self.cell();
+        [(x.round() / cx).floor(), (y.round() / cy).floor(), f64::from(self.layer(d))]
+    }
+
     /// A voxel moved by whole cells; `None` outside the grid.
     pub fn shifted(&self, voxel: [u16; 3], by: [i32; 3]) -> Option<[u16; 3]> {
         let size = [self.grid.columns, self.grid.rows, self.grid.layers];
@@ -193,6 +199,10 @@ pub(super) mod tests {
         };
         let voxels = Voxels::count(&points, lattice());
         assert_eq!(voxels.cells, [[0, 0, 0], [1, 1, 1], [79, 59, 63]]);
+        for i in 0..points.len() {
+            let cell = voxels.cells[voxels.of_point[i] as usize];
+            assert_eq!(lattice().cell_at(points.at(i)), cell.map(f64::from));
+        }
         assert_eq!((voxels.counts, voxels.of_point), (vec![2, 1, 1], vec![0, 0, 1, 2]));
     }
 

@@ -34,7 +34,9 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
 }
 
 /// Seeds every component to which fewer than `reseed_below` pixels belong at the voxel that the others explain worst, among those whose
-/// neighbourhood holds as many pixels. Returns which were seeded anew.
+/// neighbourhood holds as many pixels that such a seed would explain better. Returns which were seeded anew.
+///
+/// Pixels that are explained already do not count: a seed beside a flat component could take it over, as the sharper of the two, and with it the identity.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -55,14 +57,19 @@ pub(super) fn reseed(
     if dead.is_empty() {
         return Ok(seeded);
     }
-    let mut worst: Vec<usize> = (0..densities.len()).collect();
+    let least = options.reseed_below.max(1.0);
+    let share = least / voxels.counts.iter().map(|&count| f64::from(count)).sum::<f64>().max(least);
+    let explained = share.ln() + seed_log_density();
+    let mut worst: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
+    let unexplained = worst.clone();
     worst.sort_by(|&a, &b| densities[a].total_cmp(&densities[b]).then(a.cmp(&b)));
     let mut seeds: Vec<[u16; D]> = Vec::new();
     let mut candidates = worst.into_iter();
     for k in dead {
         let found = candidates.by_ref().map(|n| voxels.cells[n]).find_map(|cell| {
             let far = !seeds.iter().any(|&seed| near(cell, seed));
-            far.then(|| (cell, support(voxels, cell))).filter(|(_, support)| *support >= options.reseed_below)
+            far.then(|| (cell, support(voxels, &unexplained, cell)))
+                .filter(|(_, support)| *support >= options.reseed_below)
         });
         let Some((cell, support)) = found else { break };
         seeds.push(cell);
@@ -77,10 +84,14 @@ fn near(a: [u16; D], b: [u16; D]) -> bool {
     (0..D).all(|i| (i32::from(a[i]) - i32::from(b[i])).abs() <= SEED_REACH[i])
 }
 
-/// Pixels in the neighbourhood of a voxel.
-fn support(voxels: &Voxels, cell: [u16; D]) -> f64 {
-    let counts = voxels.cells.iter().zip(&voxels.counts);
-    counts.filter(|(other, _)| near(**other, cell)).map(|(_, &count)| f64::from(count)).sum()
+/// Logarithm of a seed's density at one standard deviation along every axis.
+fn seed_log_density() -> f64 {
+    SEED_SPREAD.iter().map(|spread| -0.5 * (std::f64::consts::TAU * spread * spread).ln() - 0.5).sum()
+}
+
+/// Pixels in those voxels, of some, that are in the neighbourhood of one.
+fn support(voxels: &Voxels, some: &[usize], cell: [u16; D]) -> f64 {
+    some.iter().filter(|&&n| near(voxels.cells[n], cell)).map(|&n| f64::from(voxels.counts[n])).sum()
 }
 
 /// Makes component `k` a small one with `pixels` about a voxel.
@@ -139,5 +150,19 @@ mod tests {
         let mean = &posterior.means[3..];
         assert!((40.0..=42.0).contains(&mean[0]) && (20.0..=22.0).contains(&mean[1]) && mean[2] == 20.0, "{mean:?}");
         assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+    }
+
+    #[test]
+    fn nobody_is_seeded_into_what_is_explained() {
+        // A flat block with a few voxels beside its layer: near one of them there are enough pixels, but not of its kind.
+        let block = |z: u16, n: u16| (0..n).map(move |i| ([10 + i % 3, 10 + i / 3 % 3, z], 0));
+        let cells: Vec<_> = block(30, 90).chain(block(31, 9)).collect();
+        let voxels = made_up(&cells, 1).voxels;
+        let (values, weights) = (voxels.centres(), voxels.weights());
+        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+        let mut posterior = posterior();
+        let options = StereoTrackerOptions::default();
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+        assert_eq!(posterior.means[3..], [70.0, 50.0, 3.0]);
     }
 }

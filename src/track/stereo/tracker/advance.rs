@@ -6,7 +6,9 @@ use super::super::graph::Arc;
 use super::super::grouping::{GroupMotion, groups};
 use super::super::identity::Carried;
 use super::super::lucas_kanade::{SmoothedLevels, middle};
-use super::super::motion::{CellMotion, FineMotion, NextView, Seen, cell_motions, fine_motions, places};
+use super::super::motion::{
+    CellMotion, FineMotion, Guess, NextView, Seen, cell_motions, fine_motions, places, voxel_motion,
+};
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::step::Step;
 use super::super::voxels::{EdgePoints, Voxels};
@@ -76,8 +78,10 @@ impl StereoTracker {
         let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
         let motions = self.carry(view);
         let last = self.last.take();
-        let carried: Vec<Option<[f64; 3]>> =
-            motions.iter().map(|motion| motion.map(|(_, Carried { motion, .. })| motion)).collect();
+        let carried: Vec<Option<[f64; 3]>> = match &last {
+            Some(last) => (0..motions.len()).map(|k| voxel_motion(&last.clusters, k, &motions[k]?.0)).collect(),
+            None => vec![],
+        };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
         let Clustered { clusters, posterior, rounds } = clustered;
@@ -134,17 +138,34 @@ impl StereoTracker {
         Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
     }
 
+    /// What the motion of each component may be: its last one, or that of the nearest component whose last one is known. A cluster that has just been seeded has few pixels, often along one edge,
+    /// which agree with many motions; what it probably belongs to is the better guess than a template of a few cells.
+    fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Guess> {
+        let known: Vec<(usize, [f64; 3])> = (0..components)
+            .filter_map(|k| {
+                let velocity = self.identities.live.get(k)?.as_ref()?.velocity?;
+                Some((k, std::array::from_fn(|i| velocity[i] * cell[i])))
+            })
+            .collect();
+        let mean = |k: usize| self.posterior.as_ref().and_then(|posterior| posterior.means.get(3 * k..3 * k + 3));
+        let apart = |a: usize, b: usize| match (mean(a), mean(b)) {
+            (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum(),
+            _ => f64::INFINITY,
+        };
+        (0..components)
+            .map(|k| {
+                let nearest = known.iter().min_by(|(a, _), (b, _)| apart(k, *a).total_cmp(&apart(k, *b)));
+                let last = known.iter().find(|(other, _)| *other == k).map(|(_, velocity)| *velocity);
+                Guess { last, beside: nearest.map(|(_, velocity)| *velocity) }
+            })
+            .collect()
+    }
+
     /// How each cluster of the last step gets to the next view.
     fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(FineMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
         let cell = last.clusters.lattice().cell();
-        let before: Vec<Option<[f64; 3]>> = (0..last.clusters.components())
-            .map(|k| {
-                let identity = self.identities.live.get(k)?.as_ref()?;
-                identity.velocity.map(|velocity| std::array::from_fn(|i| velocity[i] * cell[i]))
-            })
-            .collect();
-        let measured = fine_motions(last, view, &before, &self.options);
+        let measured = fine_motions(last, view, &self.guesses(cell, last.clusters.components()), &self.options);
         let limits = self.options.recognition.as_ref();
         let mut out = Vec::with_capacity(measured.len());
         for (k, measured) in measured.into_iter().enumerate() {

@@ -50,7 +50,7 @@ impl StereoTracker {
             }
         }
         self.identities.live = live;
-        let seen = sightings(clusters, |_| [0.0; 3]);
+        let seen = sightings(clusters, |_| ([0.0; 3], 0.0));
         self.identities.name_all(self.time, &seen, 0.0, None);
     }
 
@@ -71,7 +71,10 @@ impl StereoTracker {
         self.identities.rest(self.time.saturating_sub(1), lost);
         self.identities.live.resize(clusters.components(), None);
         let Some(posterior) = posterior else { return };
-        let seen = sightings(clusters, |k| std::array::from_fn(|i| posterior.means[3 * k + i]));
+        let seen = sightings(clusters, |k| {
+            let variance = posterior.scale_inverses[9 * k + 8] / posterior.degrees_of_freedom[k];
+            (std::array::from_fn(|i| posterior.means[3 * k + i]), variance.sqrt())
+        });
         self.identities.name_all(self.time, &seen, self.options.reseed_below, limits);
     }
 
@@ -166,11 +169,16 @@ impl StereoTracker {
     }
 }
 
-/// All components that have edge pixels.
-fn sightings(clusters: &Clusters, position: impl Fn(usize) -> [f64; 3]) -> Vec<Sighting> {
+/// All components that have edge pixels; `told` tells of each where it is and how thick, cells.
+fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], f64)) -> Vec<Sighting> {
     let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
-    pixels.map(|(component, pixels)| Sighting { component, position: position(component), pixels }).collect()
+    let sighting = |(component, pixels)| {
+        let (position, thickness) = told(component);
+        Sighting { component, position, pixels, thickness }
+    };
+    pixels.map(sighting).collect()
 }
+
 /// Covariance `W_k^-1 / nu_k` of a component in px and disparity.
 fn covariance(posterior: &Posterior, k: usize, cell: [f64; 3]) -> [[f64; 3]; 3] {
     let matrix = &posterior.scale_inverses[9 * k..9 * k + 9];

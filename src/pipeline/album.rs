@@ -1,6 +1,5 @@
 //! Where drawn pictures go: numbered files in a folder, or a film.
 
-use super::overlay::STEM;
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
 use crate::io::{FilmWriter, NumberedFiles, write_picture};
@@ -28,38 +27,38 @@ fn is_film(path: &Path) -> bool {
 }
 
 impl Album {
-    /// A folder, which is made when it does not exist, or a film of `frame_rate` frames per second.
-    pub fn create(path: &Path, frame_rate: f64) -> Result<Self> {
+    /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a film of `frame_rate` frames per second.
+    pub fn create(path: &Path, stem: &str, frame_rate: f64) -> Result<Self> {
         let place = if is_film(path) {
             Place::Film(TableTarget::File(path.to_path_buf()), Some(FilmWriter::create(path, frame_rate)?))
         } else {
-            Place::Folder(NumberedFiles::create(path, STEM, "png")?)
+            Place::Folder(NumberedFiles::create(path, stem, "png")?)
         };
         Ok(Self { place, written: 0, latest: None })
     }
 
-    /// Refuses to replace a film, or to mix pictures with those of an earlier run.
-    pub fn check(path: &Path) -> Result<()> {
+    /// Refuses, naming `argument`, to replace a film, or to mix pictures with those of an earlier run.
+    pub fn check(path: &Path, stem: &str, argument: &'static str) -> Result<()> {
         if is_film(path) {
             return check_target(path, false).map_err(|error| match error {
-                Error::Argument { expected, got, .. } => Error::argument("overlay", expected, got),
+                Error::Argument { expected, got, .. } => Error::Argument { argument, expected, got },
                 other => other,
             });
         }
         if path.exists() && !path.is_dir() {
-            return Err(Error::argument("overlay", "a folder or a .y4m file", path.display()));
+            return Err(Error::argument(argument, "a folder or a .y4m file", path.display()));
         }
         let entries = path.read_dir().into_iter().flatten().flatten();
         let ours = |path: &PathBuf| {
-            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            let number = stem.strip_prefix(STEM).and_then(|rest| rest.strip_prefix('_'));
+            let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            let number = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix('_'));
             path.extension().is_some_and(|e| e == "png")
                 && number.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
         };
         match entries.map(|entry| entry.path()).find(ours) {
             Some(path) => {
                 let wanted = "a place without earlier results (--force replaces them)";
-                Err(Error::argument("overlay", wanted, path.display()))
+                Err(Error::argument(argument, wanted, path.display()))
             }
             None => Ok(()),
         }

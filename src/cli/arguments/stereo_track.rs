@@ -1,0 +1,104 @@
+//! How the stereo tracker works, and what it draws.
+
+use super::track::numbers;
+use super::{LayoutArguments, SearchArguments};
+use crate::error::{Error, Result};
+use crate::parallel::Threads;
+use crate::stereo::Method;
+use crate::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Options of the stereo tracker. Those that are not given keep the tracker's own default.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "With --method stereo")]
+pub struct StereoTrackerArguments {
+    #[command(flatten)]
+    pub layout: LayoutArguments,
+    #[command(flatten)]
+    pub search: SearchArguments,
+    /// How views are matched, as `jacoflow stereo --method` [default: sgm, paper classes]
+    #[arg(long, value_name = "NAME")]
+    pub matching: Option<String>,
+    /// Components of the mixture [default: 16, paper 12]
+    #[arg(long, value_name = "N")]
+    pub components: Option<usize>,
+    /// Seed of the mixture [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and velocities in space
+    #[arg(long, value_name = "FOCAL,BASELINE[,INFINITY]", allow_hyphen_values = true, value_parser = parse_cameras)]
+    pub cameras: Option<StereoCamera>,
+    /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a film *.y4m
+    #[arg(long, value_name = "FOLDER|FILM")]
+    pub disparity_overlay: Option<PathBuf>,
+    /// Draw the graph of all clusters over time: a .png file
+    #[arg(long, value_name = "FILE")]
+    pub graph: Option<PathBuf>,
+}
+
+impl StereoTrackerArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let own = [
+            self.matching.as_ref().map(|_| "matching"),
+            self.components.map(|_| "components"),
+            self.seed.map(|_| "seed"),
+            self.cameras.map(|_| "cameras"),
+            self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
+            self.graph.as_ref().map(|_| "graph"),
+        ];
+        self.layout.given().or(self.search.given()).or(own.into_iter().find_map(|given| given))
+    }
+
+    /// The options of the stereo tracker; layers of disparity as wide as the range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn options(&self, mode: StereoMode, threads: Threads) -> Result<StereoTrackerOptions> {
+        let mut options = StereoTrackerOptions::new(mode);
+        if let Some((least, greatest)) = self.search.disparities {
+            options = options.with_disparities([least, greatest]);
+        }
+        if let Some((least, greatest)) = self.search.rows {
+            options.row_range = [least, greatest];
+        }
+        options.row_offset = self.search.row_offset;
+        options.matching = match &self.matching {
+            Some(name) => Method::parse(name).map_err(|error| match error {
+                Error::Argument { expected, got, .. } => Error::Argument { argument: "matching", expected, got },
+                other => other,
+            })?,
+            None => options.matching,
+        };
+        options.components = self.components.unwrap_or(options.components);
+        options.seed = self.seed.unwrap_or(options.seed);
+        options.camera = self.cameras;
+        options.threads = threads;
+        options.check()?;
+        Ok(options)
+    }
+}
+
+fn parse_cameras(text: &str) -> std::result::Result<StereoCamera, String> {
+    let given = numbers(text).or_else(|| numbers(text).map(|[focal, baseline]: [f64; 2]| [focal, baseline, 0.0]));
+    match given {
+        Some([focal, baseline, d_infinity]) if focal > 0.0 && baseline > 0.0 => {
+            Ok(StereoCamera { focal, baseline, d_infinity })
+        }
+        _ => Err("expected FOCAL,BASELINE or FOCAL,BASELINE,INFINITY, the first two positive".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_are_two_lengths_and_a_disparity() {
+        let camera = StereoCamera { focal: 700.0, baseline: 0.54, d_infinity: 0.0 };
+        assert_eq!(parse_cameras("700,0.54"), Ok(camera));
+        assert_eq!(parse_cameras("700,0.54,-44"), Ok(StereoCamera { d_infinity: -44.0, ..camera }));
+        assert!(parse_cameras("700").is_err() && parse_cameras("0,1").is_err() && parse_cameras("1,2,3,4").is_err());
+    }
+}

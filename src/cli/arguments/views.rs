@@ -1,0 +1,78 @@
+//! Two views of each moment: where they are, and how they may differ.
+
+use super::{SelectionArguments, parse_range};
+use crate::error::Result;
+use crate::io::{ViewLayout, ViewPairs};
+use crate::pipeline::Numbering;
+use clap::{Args, ValueEnum};
+
+/// Where both views are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LayoutWord {
+    /// In two inputs
+    Separate,
+    /// In one frame, the left view in its left half
+    SideBySide,
+    /// In one frame, the left view in its upper half
+    TopBottom,
+}
+
+/// How the input holds two views.
+#[derive(Debug, Clone, Args)]
+pub struct LayoutArguments {
+    /// Where both views are, the left one first [default: separate, in two inputs]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub layout: Option<LayoutWord>,
+    /// The right view comes first
+    #[arg(long)]
+    pub swap: bool,
+}
+
+impl LayoutArguments {
+    /// Opens the pairs of views, and tells which of the input they are.
+    ///
+    /// # Errors
+    /// Those of [`ViewPairs::open`].
+    pub fn open(
+        &self,
+        input: &[String],
+        selection: &SelectionArguments,
+        rate: Option<f64>,
+    ) -> Result<(ViewPairs, Numbering)> {
+        let layout = match self.layout {
+            None | Some(LayoutWord::Separate) => None,
+            Some(LayoutWord::SideBySide) => Some(ViewLayout::SideBySide),
+            Some(LayoutWord::TopBottom) => Some(ViewLayout::TopBottom),
+        };
+        let views = ViewPairs::open(input, layout, &selection.options())?.with_swapped(self.swap);
+        let numbering = selection.numbering(rate, views.frame_rate());
+        Ok((views, numbering))
+    }
+
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        self.layout.map(|_| "layout").or(self.swap.then_some("swap"))
+    }
+}
+
+/// Where matches are looked for.
+#[derive(Debug, Clone, Args)]
+pub struct SearchArguments {
+    /// Least and greatest disparity, px [default: -40,24]
+    #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
+    pub disparities: Option<(i32, i32)>,
+    /// Least and greatest row offset that are searched, rows [default: -4,4]
+    #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
+    pub rows: Option<(i32, i32)>,
+    /// How many rows lower the right view shows a point [default: estimated from the first pair (sgm), searched at every pixel (classes)]
+    #[arg(long, value_name = "ROWS")]
+    pub row_offset: Option<f64>,
+}
+
+impl SearchArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let rows = self.rows.map(|_| "rows").or(self.row_offset.map(|_| "row_offset"));
+        self.disparities.map(|_| "disparities").or(rows)
+    }
+}

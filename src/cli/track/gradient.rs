@@ -1,0 +1,137 @@
+//! Targets followed by the gradient tracker.
+
+use super::TrackCommand;
+use super::output::{TrackOutputArguments, Wanted, files_in_words};
+use crate::cli::interrupt::Watch;
+use crate::cli::open::{Opened, open_input, preprocess};
+use crate::cli::progress::Bar;
+use crate::cli::report::{Report, tell};
+use crate::error::{Error, Result};
+use crate::image::picture::TrackOverlay;
+use crate::parallel::Threads;
+use crate::pipeline::{Begun, Overlays, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary};
+use crate::track::gradient::{GradientOptions, Start};
+use crate::track::{GradientTracker, Tracker};
+use crate::types::{Frame, TrackStatus};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+impl TrackCommand {
+    /// Runs the command with the gradient tracker.
+    pub(super) fn follow_targets(&self, watch: &Watch) -> Result<Report> {
+        self.refuse(self.stereo.given(), "stereo")?;
+        let options = self.tracker.gradient()?;
+        let threads = Threads::new(self.threads.threads)?;
+        let wanted = self.output.wanted(self.tell.json, self.output.overlay.is_some())?;
+        if let Some(folder) = self.output.overlay.as_ref().filter(|_| !self.output.force) {
+            Overlays::check(folder)?;
+        }
+        let opened = open_input(&self.input)?;
+        if let Some(frames) = opened.frames.filter(|frames| *frames < 2) {
+            return Err(Error::argument("frames", "at least 2 frames to track through", frames));
+        }
+        let mut run = TrackRun::default()
+            .with_preprocess(preprocess(&self.input, None)?)
+            .with_threads(threads)
+            .with_numbering(opened.numbering);
+        let details = self.details(&opened, &options);
+        let rate = opened.numbering.rate;
+        let begin = |frame: &Frame<f64>| {
+            let trackers = trackers(frame, &self.targets.starts(), &options)?;
+            Ok(Begun { trackers, sinks: self.sinks(&wanted, rate)? })
+        };
+        let failure = {
+            let bar = Bar::new(watch, "track", self.tell.quiet);
+            run.run(opened.source, Box::new(begin), &bar).err()
+        };
+        Ok(self.report(&run.summary(), failure, details))
+    }
+
+    /// Begins what is written; folders are made.
+    fn sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<dyn TrackSink>>> {
+        self.output.make_folder()?;
+        let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
+        if let Some(path) = &self.output.overlay {
+            let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
+            sinks.push(Box::new(Overlays::create(path, drawing, TrackOutputArguments::film_rate(rate))?));
+        }
+        for (target, format) in wanted {
+            sinks.push(Box::new(TrackRows::create(target, *format)?));
+        }
+        Ok(sinks)
+    }
+
+    fn details(&self, opened: &Opened, options: &GradientOptions) -> Value {
+        let (width, height) = opened.first.size;
+        json!({
+            "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype, "fps": opened.numbering.rate,
+            "method": self.tracker.method, "mode": options.mode.name(),
+        })
+    }
+
+    fn report(&self, summary: &TrackSummary, failure: Option<Error>, details: Value) -> Report {
+        let interrupted = matches!(failure, Some(Error::Interrupted));
+        let output = self.output.place(summary.latest.as_ref());
+        if !self.tell.quiet && (failure.is_none() || interrupted) {
+            let place = output.or(self.output.overlay.as_ref());
+            tell(&in_words(summary, place.map(PathBuf::as_path)));
+        }
+        let mut object = json!({
+            "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,
+            "seconds": summary.seconds, "output": output, "overlay": self.output.overlay, "interrupted": interrupted,
+        });
+        if let (Some(object), Value::Object(details)) = (object.as_object_mut(), details) {
+            object.extend(details);
+        }
+        Report { summary: object, failure }
+    }
+}
+
+/// A tracker for each target.
+fn trackers(frame: &Frame<f64>, starts: &[Start], options: &GradientOptions) -> Result<Vec<Box<dyn Tracker>>> {
+    let begin = |(index, start): (usize, &Start)| -> Result<Box<dyn Tracker>> {
+        let tracker = GradientTracker::new(frame, *start, options).map_err(|error| in_our_words(error, index + 1))?;
+        Ok(Box::new(tracker))
+    };
+    starts.iter().enumerate().map(begin).collect()
+}
+
+/// An error of a tracker under the names that this command has for its arguments, with the target that it is about.
+fn in_our_words(error: Error, target: usize) -> Error {
+    let named =
+        |ours, expected, got| Error::Argument { argument: ours, expected, got: format!("{got} (target {target})") };
+    match error {
+        Error::Argument { argument: "bbox", expected, got } => named("box", expected, got),
+        Error::Argument { argument: "center", expected, got } => named("point", expected, got),
+        other => other,
+    }
+}
+
+/// The targets for the summary: how often each status was, and the last state.
+fn targets(summary: &TrackSummary) -> Value {
+    let one = |(index, target): (usize, &TargetSummary)| {
+        let counts: serde_json::Map<String, Value> = TrackStatus::ALL
+            .into_iter()
+            .map(|status| (status.name().to_string(), json!(target.counts[status as usize])))
+            .collect();
+        let (last, bounds) = (&target.last, target.last.bounds);
+        json!({
+            "target": index + 1, "frames": counts, "status": last.status.name(), "reason": last.reason,
+            "position": last.position, "velocity": last.velocity, "visibility": last.visibility,
+            "box": [bounds.x, bounds.y, bounds.width, bounds.height],
+        })
+    };
+    summary.targets.iter().enumerate().map(one).collect()
+}
+
+fn in_words(summary: &TrackSummary, output: Option<&Path>) -> String {
+    let mut parts = vec![format!("{} frames", summary.frames)];
+    for (index, target) in summary.targets.iter().enumerate() {
+        let measured = target.counts[TrackStatus::Tracking as usize] + target.counts[TrackStatus::Occluded as usize];
+        let share = 100.0 * measured as f64 / summary.frames.max(1) as f64;
+        parts.push(format!("target {}: seen in {share:.1} %, at last {}", index + 1, target.last.status.name()));
+    }
+    parts.push(format!("{:.2} s", summary.seconds));
+    parts.extend(files_in_words(summary.files, output));
+    parts.join(", ")
+}

@@ -1,0 +1,169 @@
+//! Two views of each moment: from two sources, or cut out of frames that hold both.
+
+use super::{FrameSource, OpenOptions, open};
+use crate::error::{Error, Result};
+use crate::types::{AnyFrame, Frame};
+
+/// How one frame holds both views, the left one first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ViewLayout {
+    /// The left view in the left half.
+    SideBySide,
+    /// The left view in the upper half.
+    TopBottom,
+}
+
+/// Pairs of views, left and right, one pair at a time.
+///
+/// Movies that squeeze both views into a frame of the ordinary size ("half" formats) are taken as they are stored: side by side, disparities are then half as large.
+pub struct ViewPairs {
+    views: Views,
+    swapped: bool,
+}
+
+enum Views {
+    Two([Box<dyn FrameSource>; 2]),
+    One(Box<dyn FrameSource>, ViewLayout),
+}
+
+impl ViewPairs {
+    /// Left and right views from sources of their own.
+    pub fn separate(left: Box<dyn FrameSource>, right: Box<dyn FrameSource>) -> Self {
+        Self { views: Views::Two([left, right]), swapped: false }
+    }
+
+    /// Both views out of the frames of one source.
+    pub fn joined(both: Box<dyn FrameSource>, layout: ViewLayout) -> Self {
+        Self { views: Views::One(both, layout), swapped: false }
+    }
+
+    /// Opens two specifications, or with a layout one, each as [`open`] takes it; the options choose pairs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `input` for another number of specifications; those of [`open`].
+    pub fn open(specs: &[String], layout: Option<ViewLayout>, options: &OpenOptions) -> Result<Self> {
+        match (specs, layout) {
+            ([left, right], None) => Ok(Self::separate(open(left, options)?, open(right, options)?)),
+            ([both], Some(layout)) => Ok(Self::joined(open(both, options)?, layout)),
+            (_, None) => {
+                let expected = "two views, or --layout for one input that holds both";
+                Err(Error::argument("input", expected, specs.len()))
+            }
+            (_, Some(_)) => Err(Error::argument("input", "one input that holds both views", specs.len())),
+        }
+    }
+
+    /// The same with the right view first.
+    pub fn with_swapped(mut self, swapped: bool) -> Self {
+        self.swapped = swapped;
+        self
+    }
+
+    /// The next left and right view; `None` after the last.
+    ///
+    /// # Errors
+    /// Those of the sources; [`Error::Argument`] named `input` where one of two ends before the other, `layout` for frames that cannot be cut in half.
+    pub fn next_pair(&mut self) -> Result<Option<[AnyFrame; 2]>> {
+        let pair = match &mut self.views {
+            Views::Two([left, right]) => match (left.next_frame()?, right.next_frame()?) {
+                (Some(left), Some(right)) => Some([left, right]),
+                (None, None) => None,
+                (ended, _) => {
+                    let got = if ended.is_none() { "fewer left than right" } else { "fewer right than left" };
+                    return Err(Error::argument("input", "as many left views as right ones", got));
+                }
+            },
+            Views::One(both, layout) => both.next_frame()?.map(|frame| halves(&frame, *layout)).transpose()?,
+        };
+        let swapped = self.swapped;
+        Ok(pair.map(|[first, second]| if swapped { [second, first] } else { [first, second] }))
+    }
+
+    /// How many pairs are left, where that is known without reading them.
+    pub fn len_hint(&self) -> Option<usize> {
+        self.first().len_hint()
+    }
+
+    /// Pairs per second, where the source says so.
+    pub fn frame_rate(&self) -> Option<f64> {
+        self.first().frame_rate()
+    }
+
+    /// What this is, for messages.
+    pub fn describe(&self) -> String {
+        match &self.views {
+            Views::Two([left, right]) => format!("{}, {}", left.describe(), right.describe()),
+            Views::One(both, _) => both.describe(),
+        }
+    }
+
+    fn first(&self) -> &dyn FrameSource {
+        match &self.views {
+            Views::Two([source, _]) | Views::One(source, _) => source.as_ref(),
+        }
+    }
+}
+
+/// Both views of a frame that holds them.
+fn halves(frame: &AnyFrame, layout: ViewLayout) -> Result<[AnyFrame; 2]> {
+    match frame {
+        AnyFrame::U8(frame) => Ok(cut(frame, layout)?.map(AnyFrame::U8)),
+        AnyFrame::U16(frame) => Ok(cut(frame, layout)?.map(AnyFrame::U16)),
+        AnyFrame::F32(frame) => Ok(cut(frame, layout)?.map(AnyFrame::F32)),
+        AnyFrame::F64(frame) => Ok(cut(frame, layout)?.map(AnyFrame::F64)),
+    }
+}
+
+/// The left or upper half, and the other one.
+fn cut<T: Copy>(frame: &Frame<T>, layout: ViewLayout) -> Result<[Frame<T>; 2]> {
+    let (width, height) = frame.size();
+    let beside = layout == ViewLayout::SideBySide;
+    let divided = if beside { width } else { height };
+    if !divided.is_multiple_of(2) {
+        let expected = "frames of an even width (side-by-side) or height (top-bottom)";
+        return Err(Error::argument("layout", expected, divided));
+    }
+    let (w, h) = if beside { (width / 2, height) } else { (width, height / 2) };
+    let (dx, dy) = if beside { (w, 0) } else { (0, h) };
+    Ok([0, 1].map(|half| Frame::from_fn(w, h, |x, y| frame.get(x + half * dx, y + half * dy))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MemorySource;
+    use super::*;
+
+    #[test]
+    fn frames_are_cut_in_halves() {
+        let frame = Frame::from_fn(4, 2, |x, y| 10 * y + x);
+        let [left, right] = cut(&frame, ViewLayout::SideBySide).unwrap();
+        assert_eq!((left.data(), right.data()), (&[0, 1, 10, 11][..], &[2, 3, 12, 13][..]));
+        let [upper, lower] = cut(&frame, ViewLayout::TopBottom).unwrap();
+        assert_eq!((upper.data(), lower.data()), (&[0, 1, 2, 3][..], &[10, 11, 12, 13][..]));
+        let odd = cut(&Frame::filled(3, 2, 0), ViewLayout::SideBySide).unwrap_err();
+        assert!(odd.to_string().starts_with("layout: "));
+    }
+
+    fn source(levels: &[u8]) -> Box<dyn FrameSource> {
+        let frames = levels.iter().map(|&level| AnyFrame::U8(Frame::from_fn(2, 1, |x, _| level + x as u8))).collect();
+        Box::new(MemorySource::new(frames).unwrap())
+    }
+
+    fn levels(pair: &[AnyFrame; 2]) -> [f32; 2] {
+        [0, 1].map(|i| pair[i].to_real::<f32>().get(0, 0))
+    }
+
+    #[test]
+    fn pairs_come_in_step_and_the_first_view_is_the_left_one() {
+        let mut pairs = ViewPairs::separate(source(&[10, 20]), source(&[30, 40]));
+        assert_eq!(pairs.len_hint(), Some(2));
+        assert_eq!(levels(&pairs.next_pair().unwrap().unwrap()), [10.0, 30.0]);
+        assert_eq!(levels(&pairs.next_pair().unwrap().unwrap()), [20.0, 40.0]);
+        assert!(pairs.next_pair().unwrap().is_none());
+        let mut pairs = ViewPairs::joined(source(&[10]), ViewLayout::SideBySide).with_swapped(true);
+        assert_eq!(levels(&pairs.next_pair().unwrap().unwrap()), [11.0, 10.0]);
+        let mut uneven = ViewPairs::separate(source(&[10]), source(&[30, 40]));
+        uneven.next_pair().unwrap();
+        assert!(uneven.next_pair().unwrap_err().to_string().contains("fewer left than right"));
+    }
+}

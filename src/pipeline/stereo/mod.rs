@@ -1,0 +1,147 @@
+//! From pairs of views to tracks of everything that moves: views, preparation, grey levels, the stereo tracker, sinks; one pair at a time.
+
+mod graph;
+mod overlay;
+mod pairs;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+pub use graph::{GraphChart, GraphFile};
+pub use overlay::{StereoOverlays, StereoPicture};
+pub use pairs::{GreyPair, GreyPairs};
+pub use rows::{ClusterRows, StereoFormat};
+
+use super::run::Numbering;
+use super::sink::Ending;
+use crate::error::{Error, Result};
+use crate::parallel::Progress;
+use crate::track::StereoTracker;
+use crate::track::stereo::{Step, TrackGraph};
+use crate::types::AnyFrame;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// What the tracker says of one pair.
+#[derive(Debug)]
+pub struct StereoStep<'a> {
+    /// Index of the pair in the input.
+    pub frame_index: usize,
+    /// Its time, s from the first frame of the input; `None` where the frame rate is not known.
+    pub time: Option<f64>,
+    /// The left view as it came.
+    pub left: &'a AnyFrame,
+    /// Clusters and edge pixels.
+    pub step: &'a Step,
+}
+
+/// A receiver of clusters.
+pub trait StereoSink: Send {
+    /// Takes the clusters of one pair.
+    ///
+    /// # Errors
+    /// Files that cannot be written; the run then ends.
+    fn accept(&mut self, step: &StereoStep<'_>) -> Result<()>;
+
+    /// Called once at the end, however the run ended, with the clusters of all steps: brings what is complete under its final name and removes the rest.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    fn finish(&mut self, ending: Ending, graph: &TrackGraph) -> Result<()>;
+
+    /// Files in place so far: their number and the latest one.
+    fn files(&self) -> (usize, Option<PathBuf>);
+}
+
+/// Begins the sinks once there is a pair that can be used, so that no file is begun for others.
+pub type BeginSinks<'a> = Box<dyn FnOnce() -> Result<Vec<Box<dyn StereoSink>>> + 'a>;
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StereoSummary {
+    /// Pairs taken by every sink.
+    pub pairs: usize,
+    /// Edge pixels with a disparity, all pairs together.
+    pub pixels: usize,
+    /// Clusters, all pairs together.
+    pub clusters: usize,
+    /// Different tracks.
+    pub tracks: usize,
+    /// How many rows lower the right view shows a point, where that was found or given once for all pairs.
+    pub row_offset: Option<f64>,
+    /// Files written.
+    pub files: usize,
+    /// The last of them, under the name that it really has.
+    pub latest: Option<PathBuf>,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// A run: pairs of views in, clusters and their graph out.
+pub struct StereoRun {
+    tracker: StereoTracker,
+    numbering: Numbering,
+    sinks: Vec<Box<dyn StereoSink>>,
+    summary: StereoSummary,
+}
+
+impl StereoRun {
+    /// A run of a tracker that has seen nothing yet; `numbering` says which pairs of the input come.
+    pub fn new(tracker: StereoTracker, numbering: Numbering) -> Self {
+        Self { tracker, numbering, sinks: Vec::new(), summary: StereoSummary::default() }
+    }
+
+    /// What was done so far; valid after a failed or interrupted run too.
+    pub fn summary(&self) -> StereoSummary {
+        self.summary.clone()
+    }
+
+    /// Works through `pairs` and ends every sink, however the run ends.
+    ///
+    /// `progress` is told the number of pairs taken, at least once a pair and while waiting for one; its error stops the run, and what is complete then stays.
+    ///
+    /// # Errors
+    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named `frames` for fewer than two pairs.
+    pub fn run(&mut self, mut pairs: GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
+        let start = Instant::now();
+        let worked = self.work(&mut pairs, begin, progress);
+        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
+        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        let mut result = worked;
+        for sink in &mut self.sinks {
+            result = result.and(sink.finish(ending, self.tracker.graph()));
+        }
+        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
+        self.summary.files = files.iter().map(|(number, _)| number).sum();
+        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
+        self.summary.tracks = self.tracker.tracks().len();
+        self.summary.row_offset = self.tracker.row_offset();
+        self.summary.seconds = start.elapsed().as_secs_f64();
+        result
+    }
+
+    fn work(&mut self, pairs: &mut GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
+        let mut begin = Some(begin);
+        while let Some(GreyPair { views: [left, _], grey }) = pairs.next(self.summary.pairs, progress)? {
+            let step = self.tracker.update(&grey[0], &grey[1])?;
+            if let Some(begin) = begin.take() {
+                self.sinks = begin()?;
+            }
+            let frame_index = self.numbering.index(self.summary.pairs);
+            let told = StereoStep { frame_index, time: self.numbering.time(frame_index), left: &left, step: &step };
+            for sink in &mut self.sinks {
+                sink.accept(&told)?;
+            }
+            self.summary.pairs += 1;
+            self.summary.pixels += step.rows.len();
+            self.summary.clusters += step.clusters.len();
+        }
+        match self.summary.pairs {
+            0 | 1 => {
+                let expected = "at least 2 pairs of views to track through";
+                Err(Error::argument("frames", expected, self.summary.pairs))
+            }
+            _ => Ok(()),
+        }
+    }
+}
