@@ -181,6 +181,8 @@ class GradientTracker:
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
 
+        So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is.
+
         Raises
         ------
         ValueError
