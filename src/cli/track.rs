@@ -10,7 +10,7 @@ use crate::image::picture::TrackOverlay;
 use crate::parallel::Threads;
 use crate::pipeline::{
     Begun, Overlays, TableTarget, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary,
-    check_target, is_folder,
+    check_target, is_device, is_folder,
 };
 use crate::track::gradient::{GradientOptions, Start};
 use crate::track::{GradientTracker, Tracker};
@@ -154,6 +154,13 @@ impl TrackCommand {
     }
 
     fn in_file(&self, path: &Path, formats: &[TrackFormat]) -> Result<Vec<Wanted>> {
+        if is_device(path) {
+            let formats = if formats.is_empty() { &[TrackFormat::Csv] } else { formats };
+            let [format] = formats else {
+                return Err(Error::argument("output", "a folder for several formats", path.display()));
+            };
+            return Ok(vec![(TableTarget::File(path.to_path_buf()), *format)]);
+        }
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let Some(by_name) = TrackFormat::ALL.into_iter().find(|format| format.extension() == extension) else {
             let wanted = "a .csv or .txt file, a folder, or - for standard output";
@@ -188,13 +195,18 @@ impl TrackCommand {
             (Some(file), Some(asked)) if !is_folder(asked) && file.extension() == asked.extension() => Some(file),
             (_, asked) => asked.as_ref(),
         };
+        // Pictures are the first of the sinks. A film that was stopped has another name, too, or was not begun.
+        let overlay = match &self.overlay {
+            Some(film) if !is_folder(film) => summary.latest_of_sinks.first().and_then(Option::as_ref),
+            folder => folder.as_ref(),
+        };
         if !self.tell.quiet && (failure.is_none() || interrupted) {
-            let place = output.or(self.overlay.as_ref());
+            let place = output.or(overlay);
             tell(&in_words(summary, place.map(PathBuf::as_path)));
         }
         let mut object = json!({
             "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,
-            "seconds": summary.seconds, "output": output, "overlay": self.overlay, "interrupted": interrupted,
+            "seconds": summary.seconds, "output": output, "overlay": overlay, "interrupted": interrupted,
         });
         if let (Some(object), Value::Object(details)) = (object.as_object_mut(), details) {
             object.extend(details);

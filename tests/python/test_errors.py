@@ -17,8 +17,8 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
     [
         (GOOD[:2], ValueError, "frames: expected at least 3 frames, got 2 frames"),
         (GOOD[:0], ValueError, "frames: expected at least 3 frames, got 0 frames"),
-        ([], ValueError, "frames: expected at least 3 frames, got 0 frames"),
-        (list(GOOD[:1]), ValueError, "frames: expected at least"),
+        ([], ValueError, "frames: expected at least 2 frames, got 0 frames"),
+        (list(GOOD[:1]), ValueError, "frames: expected at least 2 frames, got 1 frames"),
         (GOOD[0], ValueError, r"frames: expected a list of frames \(H, W\) or a stack \(T, H, W\), got an array of shape \[8, 10\]"),
         (GOOD[:, :2], ValueError, "frames: expected at least 3 x 3 pixels, got 10 x 2"),
         (GOOD[:, :, :1], ValueError, "frames: expected at least 3 x 3 pixels"),
@@ -271,3 +271,11 @@ def test_frames_beyond_memory_are_refused():
     with pytest.raises(ValueError, match="^count: "):
         scene.frames(-1)
     assert scene.frames(0).shape == (0, 48, 64)
+
+
+def test_noise_that_no_covariance_can_hold_is_refused():
+    frames = np.random.default_rng(1).integers(0, 255, (3, 24, 24)).astype(np.uint8)
+    with pytest.raises(ValueError, match="noise: expected"):
+        jacoflow.estimate(frames, noise=1e30)
+    field = jacoflow.estimate(list(frames), method="windowed", noise=1e12)
+    assert np.isfinite(field.covariance[:, :, field.valid]).all() and field.valid.any()

@@ -4,7 +4,7 @@ use super::overlay::STEM;
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
 use crate::io::{FilmWriter, NumberedFiles, write_picture};
-use crate::pipeline::output::check_target;
+use crate::pipeline::output::{check_target, is_folder};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
 use std::path::{Path, PathBuf};
 
@@ -22,15 +22,29 @@ enum Place {
     Film(TableTarget, Option<FilmWriter>),
 }
 
-/// Whether a path names a film.
-fn is_film(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m"))
+/// Whether a path names a film, and not a folder. Other files than films are not written, and a folder that looks like one is not made by mistake.
+fn is_film(path: &Path) -> Result<bool> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m")) {
+        return Ok(true);
+    }
+    let wanted = "a folder for pictures, or a film by the name *.y4m";
+    if path == Path::new("-") {
+        return Err(Error::argument("overlay", wanted, "- (standard output)"));
+    }
+    if path.exists() && !path.is_dir() {
+        return Err(Error::argument("overlay", wanted, path.display()));
+    }
+    if !is_folder(path) {
+        let got = format!("{0}; for a new folder of this name write {0}/", path.display());
+        return Err(Error::argument("overlay", wanted, got));
+    }
+    Ok(false)
 }
 
 impl Album {
     /// A folder, which is made when it does not exist, or a film of `frame_rate` frames per second.
     pub fn create(path: &Path, frame_rate: f64) -> Result<Self> {
-        let place = if is_film(path) {
+        let place = if is_film(path)? {
             Place::Film(TableTarget::File(path.to_path_buf()), Some(FilmWriter::create(path, frame_rate)?))
         } else {
             Place::Folder(NumberedFiles::create(path, STEM, "png")?)
@@ -40,14 +54,11 @@ impl Album {
 
     /// Refuses to replace a film, or to mix pictures with those of an earlier run.
     pub fn check(path: &Path) -> Result<()> {
-        if is_film(path) {
+        if is_film(path)? {
             return check_target(path, false).map_err(|error| match error {
                 Error::Argument { expected, got, .. } => Error::argument("overlay", expected, got),
                 other => other,
             });
-        }
-        if path.exists() && !path.is_dir() {
-            return Err(Error::argument("overlay", "a folder or a .y4m file", path.display()));
         }
         let entries = path.read_dir().into_iter().flatten().flatten();
         let ours = |path: &PathBuf| {
