@@ -96,8 +96,8 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
     };
     let mut changes: Vec<f64> = spread(previous.size(), hidden, LIGHT_SAMPLES).filter_map(change).collect();
     let middle = median(&mut changes);
-    changes.iter_mut().for_each(|change| *change = (*change - middle).abs());
-    MAD * median(&mut changes)
+    let mut off: Vec<f64> = changes.iter().map(|change| (change - middle).abs()).collect();
+    MAD * median(&mut off)
 }
 
 /// Means over squares of `factor` px, then a Gaussian.
