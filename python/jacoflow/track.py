@@ -408,5 +408,7 @@ def _measured(name: str, value: ArrayLike | None, variance: ArrayLike) -> tuple[
     values = _numbers(name, value, "one number an axis", 2)
     if values is None:
         return None
-    both = variance if np.ndim(variance) else [variance, variance]
-    return values, _needed(f"{name}_variance", both, "one variance, or one an axis", 2)
+    expected = "one variance, or one an axis"
+    if np.ndim(variance) == 0:
+        return values, 2 * _needed(f"{name}_variance", np.atleast_1d(np.asarray(variance)), expected, 1)
+    return values, _needed(f"{name}_variance", variance, expected, 2)

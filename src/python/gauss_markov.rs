@@ -71,8 +71,8 @@ impl PyGaussMarkovFilter {
         state.set_item("alpha", self.0.alpha)?;
         state.set_item("q", self.0.q)?;
         state.set_item("measures", if self.0.velocity == Velocity::Mean { "mean" } else { "instant" })?;
-        state.set_item("x", self.0.x.map(|x| <[f64; 3]>::from(x)))?;
-        state.set_item("p", self.0.p.map(|p| <[[f64; 3]; 3]>::from(p)))?;
+        state.set_item("x", self.0.x.map(<[f64; 3]>::from))?;
+        state.set_item("p", self.0.p.map(<[[f64; 3]; 3]>::from))?;
         Ok(state)
     }
 
