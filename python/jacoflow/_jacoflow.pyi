@@ -902,13 +902,17 @@ class _GradientTracker:
 
 @final
 class _GaussMarkovFilter:
-    def __new__(cls, position: list[float], alpha: float, q: float, start: list[float], measures: str) -> _GaussMarkovFilter: ...
+    def __new__(cls, position: Sequence[float], alpha: float, q: float, start: Sequence[float], measures: str) -> _GaussMarkovFilter: ...
     def predict(self) -> None:
         """To the next frame."""
     def update(self, position: tuple[list[float], list[float]] | None, velocity: tuple[list[float], list[float]] | None) -> float:
         """Takes a measurement: values and variances along x and y; returns its normalised innovation squared."""
     def state(self) -> NDArray[np.float64]:
         """Position, velocity and acceleration along x and along y, (2, 3), px and frames."""
+    def save(self) -> dict[str, Any]:
+        """Everything, as a dictionary for a pickle."""
+    def restore(self, x: Sequence[Sequence[float]], p: Sequence[Sequence[Sequence[float]]]) -> None:
+        """State and covariances (column by column) as they were saved."""
     def covariance(self) -> NDArray[np.float64]:
         """Their covariances along x and along y, (2, 3, 3)."""
 

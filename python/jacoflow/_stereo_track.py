@@ -313,7 +313,10 @@ def _checked(options: Mapping[str, Any]) -> dict[str, Any]:
     out = dict(options)
     for name in COUNTS:
         if out[name] is not None:
-            out[name] = operator.index(out[name])
+            try:
+                out[name] = operator.index(out[name])
+            except TypeError:
+                raise TypeError(f"{name}: expected an integer, got {out[name]!r}") from None
             if out[name] < 0:
                 raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
     lengths = {"disparity_range": 2, "row_range": 2, "grid": 3, "tolerance": 3, "tolerance_per_step": 3, "jump": 2, "group_limits": 3}

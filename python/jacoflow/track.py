@@ -16,10 +16,9 @@ Frames are arrays (H, W) of uint8, uint16, float32 or float64; positions are (x,
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -120,6 +119,7 @@ class GradientTracker:
     """Follows one target by the gradient equation.
 
     Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers.
+    It holds what it has learnt of the scene, several planes as large as the frame, and cannot be pickled; its results can.
 
     Parameters
     ----------
@@ -173,13 +173,13 @@ class GradientTracker:
         box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
         if isinstance(eps, str) and eps != "auto":
             raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
-        if fov is not None and operator.index(fov) < 0:
-            raise ValueError(f"fov: expected at least 15 px, got {fov}")
         slowest = None if eps == "auto" else float(eps)
         self._tracker = _GradientTracker(_frame(frame), box, point, method, fov, control, model, camera, order, window, slowest)
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
+
+        So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is.
 
         Raises
         ------
@@ -187,6 +187,9 @@ class GradientTracker:
             For a frame of another size, naming `frame`.
         """
         return TrackResult(**self._tracker.update(_frame(frame)))
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("GradientTracker: expected its results or its last box to be kept, got a tracker to pickle; it holds the whole scene")
 
     @property
     def result(self) -> TrackResult:
@@ -201,9 +204,17 @@ def _frame(frame: ArrayLike) -> NDArray[Any]:
 
 def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float] | None:
     """A short list of numbers."""
-    if value is None:
-        return None
-    array = np.asarray(value, float)
+    return None if value is None else _needed(name, value, expected, count)
+
+
+def _needed(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float]:
+    """A short list of numbers that must be there."""
+    try:
+        array = None if value is None else np.asarray(value, float)
+    except (TypeError, ValueError):
+        array = None
+    if array is None:
+        raise ValueError(f"{name}: expected {expected}, got {value!r}")
     if array.shape != (count,):
         raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
     return [float(number) for number in array]
@@ -272,9 +283,14 @@ class MeanFlow:
 def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
     """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `eps` px/frame: one set for both axes (11).
 
-    Raises `ValueError` for a negative `eps`.
+    Raises `ValueError` for a negative `eps` and for arrays of another shape.
     """
-    velocity, centroid, count = _mean_flow(np.ascontiguousarray(flow.flow, float), np.ascontiguousarray(flow.valid, bool), eps)
+    field, valid = np.ascontiguousarray(flow.flow, float), np.ascontiguousarray(flow.valid, bool)
+    if field.ndim != 3 or field.shape[2] != 2:
+        raise ValueError(f"flow: expected a field (H, W, 2), got shape {field.shape}")
+    if valid.shape != field.shape[:2]:
+        raise ValueError(f"valid: expected an array {field.shape[:2]} like the flow, got shape {valid.shape}")
+    velocity, centroid, count = _mean_flow(field, valid, eps)
     return MeanFlow(np.array(velocity), np.array(centroid), count)
 
 
@@ -335,9 +351,15 @@ class GaussMarkovFilter:
     def __init__(
         self, position: ArrayLike, *, alpha: float = 0.8, q: float = 0.5, start: ArrayLike = (1.0, 4.0, 1.0), measures: str = "mean"
     ) -> None:
-        place, variances = _numbers("position", position, "(x, y)", 2), _numbers("start", start, "three variances", 3)
-        assert place is not None and variances is not None
+        place, variances = _needed("position", position, "(x, y)", 2), _needed("start", start, "three variances", 3)
         self._filter = _GaussMarkovFilter(place, alpha, q, variances, measures)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._filter.save()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._filter = _GaussMarkovFilter((0.0, 0.0), state["alpha"], state["q"], (0.0, 0.0, 0.0), state["measures"])
+        self._filter.restore(state["x"], state["p"])
 
     def predict(self) -> None:
         """Goes to the next frame (19)(20); the unit of time is the frame, lengths are in px."""
@@ -386,6 +408,7 @@ def _measured(name: str, value: ArrayLike | None, variance: ArrayLike) -> tuple[
     values = _numbers(name, value, "one number an axis", 2)
     if values is None:
         return None
-    variances = _numbers(f"{name}_variance", np.broadcast_to(np.asarray(variance, float), np.shape(variance) or (2,)), "one variance, or one an axis", 2)
-    assert variances is not None
-    return values, variances
+    expected = "one variance, or one an axis"
+    if np.ndim(variance) == 0:
+        return values, 2 * _needed(f"{name}_variance", np.atleast_1d(np.asarray(variance)), expected, 1)
+    return values, _needed(f"{name}_variance", variance, expected, 2)

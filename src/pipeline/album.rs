@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
 use crate::io::{FilmWriter, NumberedFiles, write_picture};
-use crate::pipeline::output::check_target;
+use crate::pipeline::output::{check_target, is_folder};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
 use std::path::{Path, PathBuf};
 
@@ -21,15 +21,31 @@ enum Place {
     Film(TableTarget, Option<FilmWriter>),
 }
 
-/// Whether a path names a film.
-fn is_film(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m"))
+/// Whether a path names a film, and not a folder. Other files than films are not written, and a folder that looks like one is not made by mistake.
+fn is_film(path: &Path, argument: &'static str) -> Result<bool> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m")) {
+        return Ok(true);
+    }
+    let wanted = "a folder for pictures, or a film by the name *.y4m";
+    if path == Path::new("-") {
+        return Err(Error::argument(argument, wanted, "- (standard output)"));
+    }
+    if path.exists() && !path.is_dir() {
+        return Err(Error::argument(argument, wanted, path.display()));
+    }
+    if !is_folder(path) {
+        let got = format!("{0}; for a new folder of this name write {0}/", path.display());
+        return Err(Error::argument(argument, wanted, got));
+    }
+    Ok(false)
 }
 
 impl Album {
     /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a film of `frame_rate` frames per second.
-    pub fn create(path: &Path, stem: &str, frame_rate: f64) -> Result<Self> {
-        let place = if is_film(path) {
+    ///
+    /// Errors name `argument`.
+    pub fn create(path: &Path, stem: &str, argument: &'static str, frame_rate: f64) -> Result<Self> {
+        let place = if is_film(path, argument)? {
             Place::Film(TableTarget::File(path.to_path_buf()), Some(FilmWriter::create(path, frame_rate)?))
         } else {
             Place::Folder(NumberedFiles::create(path, stem, "png")?)
@@ -39,14 +55,11 @@ impl Album {
 
     /// Refuses, naming `argument`, to replace a film, or to mix pictures with those of an earlier run.
     pub fn check(path: &Path, stem: &str, argument: &'static str) -> Result<()> {
-        if is_film(path) {
+        if is_film(path, argument)? {
             return check_target(path, false).map_err(|error| match error {
                 Error::Argument { expected, got, .. } => Error::Argument { argument, expected, got },
                 other => other,
             });
-        }
-        if path.exists() && !path.is_dir() {
-            return Err(Error::argument(argument, "a folder or a .y4m file", path.display()));
         }
         let entries = path.read_dir().into_iter().flatten().flatten();
         let ours = |path: &PathBuf| {

@@ -15,7 +15,7 @@ mod stereo;
 mod text_format;
 mod track;
 
-pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_folder};
+pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_device, is_folder};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};

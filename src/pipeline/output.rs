@@ -313,10 +313,15 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Whether a path means a folder: it exists as one, ends in a separator or has no extension.
+/// Whether a path means a folder: it exists as one, ends in a separator, or has no extension and is no device or pipe.
 pub fn is_folder(path: &Path) -> bool {
     let ends_in_separator = path.to_string_lossy().ends_with(std::path::is_separator);
-    path.is_dir() || ends_in_separator || path.extension().is_none()
+    path.is_dir() || ends_in_separator || path.extension().is_none() && !is_device(path)
+}
+
+/// Whether something is there that is neither a folder nor a regular file: it is written as it is, whatever its name.
+pub fn is_device(path: &Path) -> bool {
+    path.metadata().is_ok_and(|meta| !meta.is_dir() && !meta.is_file())
 }
 
 /// A regular file; devices and pipes may be written without being replaced.

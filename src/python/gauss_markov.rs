@@ -4,6 +4,7 @@ use super::arrays;
 use crate::error::{Error, Result};
 use crate::track::gradient::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// The compiled part of `jacoflow.track.GaussMarkovFilter`.
 #[pyclass(name = "_GaussMarkovFilter", module = "jacoflow._jacoflow")]
@@ -47,10 +48,12 @@ impl PyGaussMarkovFilter {
         position: Option<([f64; 2], [f64; 2])>,
         velocity: Option<([f64; 2], [f64; 2])>,
     ) -> PyResult<f64> {
-        for (value, variance) in [("position", &position), ("velocity", &velocity)] {
-            for (z, r) in variance.iter().flat_map(|(z, r)| z.iter().zip(r)) {
+        for (value, variance, given) in
+            [("position", "position_variance", &position), ("velocity", "velocity_variance", &velocity)]
+        {
+            for (z, r) in given.iter().flat_map(|(z, r)| z.iter().zip(r)) {
                 checked(value, *z, "finite numbers", |_| true)?;
-                checked("variance", *r, "a variance above 0", |r| r > 0.0)?;
+                checked(variance, *r, "a variance above 0", |r| r > 0.0)?;
             }
         }
         Ok(self.0.update(&Measurement { position, velocity }))
@@ -60,6 +63,23 @@ impl PyGaussMarkovFilter {
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let values = self.0.x.iter().flat_map(|x| x.iter().copied()).collect();
         Ok(arrays::owned::<f64>(py, &[2, 3], values)?.into_any())
+    }
+
+    /// Everything, as a dictionary for a pickle.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let state = PyDict::new(py);
+        state.set_item("alpha", self.0.alpha)?;
+        state.set_item("q", self.0.q)?;
+        state.set_item("measures", if self.0.velocity == Velocity::Mean { "mean" } else { "instant" })?;
+        state.set_item("x", self.0.x.map(<[f64; 3]>::from))?;
+        state.set_item("p", self.0.p.map(<[[f64; 3]; 3]>::from))?;
+        Ok(state)
+    }
+
+    /// State and covariances (column by column) as they were saved.
+    fn restore(&mut self, x: [[f64; 3]; 2], p: [[[f64; 3]; 3]; 2]) {
+        self.0.x = x.map(Into::into);
+        self.0.p = p.map(Into::into);
     }
 
     /// Their covariances along x and along y, (2, 3, 3).

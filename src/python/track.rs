@@ -1,6 +1,7 @@
 //! Trackers for Python: frames in, plain values out; the classes a user meets are in `jacoflow.track`.
 
 use super::arrays::{self, ColourRule};
+use super::options::{Integer, count};
 use crate::error::{Error, Result};
 use crate::track::gradient::{
     CameraMotion, Control, GradientOptions, LocalFlow, LocalFlowOptions, MeanFlow, Mode, MovingTarget, RefineOptions,
@@ -37,23 +38,23 @@ impl PyGradientTracker {
         bbox: Option<[f64; 4]>,
         center: Option<[f64; 2]>,
         method: &str,
-        fov: Option<usize>,
+        fov: Option<Integer>,
         control: &str,
         model: &str,
         camera: &str,
-        order: Option<usize>,
-        window: Option<usize>,
+        order: Option<Integer>,
+        window: Option<Integer>,
         eps: Option<f64>,
     ) -> PyResult<Self> {
         let modes = Mode::ALL.map(|mode| (mode.name(), mode));
         let options = GradientOptions {
             mode: word("method", method, &modes)?,
-            fov,
+            fov: fov.map(|fov| count("fov", fov)).transpose()?,
             control: word("control", control, &[("integer", Control::Integer), ("subpixel", Control::Subpixel)])?,
             shape: word("model", model, &[("similarity", Shape::Similarity), ("affine", Shape::Affine)])?,
             camera: word("camera", camera, &[("auto", CameraMotion::Auto), ("none", CameraMotion::None)])?,
-            order,
-            window,
+            order: order.map(|order| count("order", order)).transpose()?,
+            window: window.map(|window| count("window", window)).transpose()?,
             eps,
         };
         let start = match (bbox, center) {
@@ -187,7 +188,8 @@ fn pair(first: &Bound<'_, PyAny>, second: &Bound<'_, PyAny>) -> PyResult<(Frame<
 
 /// Masks (value, x, y) of `jacoflow.track.derivative_kernels`.
 #[pyfunction(name = "_derivative_kernels")]
-pub fn kernels(py: Python<'_>, order: usize) -> PyResult<Vec<Bound<'_, PyAny>>> {
+pub fn kernels(py: Python<'_>, order: Integer) -> PyResult<Vec<Bound<'_, PyAny>>> {
+    let order = count("order", order)?;
     if !(1..=4).contains(&order) {
         return Err(Error::argument("order", "1, 2, 3 or 4", order).into());
     }
@@ -205,13 +207,14 @@ pub fn flow<'py>(
     first: &Bound<'py, PyAny>,
     second: &Bound<'py, PyAny>,
     refine: bool,
-    window: usize,
-    order: usize,
+    window: Integer,
+    order: Integer,
     cond_max: f64,
     min_sigma: f64,
     step_max: f64,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = first.py();
+    let (window, order) = (count("window", window)?, count("order", order)?);
     let options = LocalFlowOptions { window, order, cond_max, min_sigma, step_max };
     check(&options)?;
     let (first, second) = pair(first, second)?;

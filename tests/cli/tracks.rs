@@ -170,6 +170,9 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m -o - --json", &["output", "--json"]),
         ("track s.y4m -o old.csv", &["output", "--force"]),
         ("track s.y4m --overlay old.csv", &["overlay", "folder"]),
+        ("track s.y4m --overlay film.mp4", &["overlay", "*.y4m", "film.mp4/"]),
+        ("track s.y4m --overlay film.mp4 --force", &["overlay", "*.y4m"]),
+        ("track s.y4m --overlay -", &["overlay", "*.y4m", "standard output"]),
         ("track s.y4m --enlarge 2", &["--overlay"]),
         ("track s.y4m --limit 1 --json", &["frames", "at least 2"]),
         ("track s.y4m --threads 0", &["--threads"]),
@@ -217,6 +220,56 @@ fn an_interrupted_run_leaves_no_half_file() {
     assert_eq!(place.names("."), ["o", "t.partial.csv"]);
     assert_eq!(rows(&fs::read_to_string(place.path("t.partial.csv")).unwrap()).len(), 4);
     assert!(temporary(&place.path("o")).is_empty());
+}
+
+#[test]
+fn an_interrupted_film_is_told_by_the_name_that_it_has() {
+    let place = Place::new();
+    let line = format!("track - {BOX} --overlay film.y4m -o - --format mot");
+    let mut command = place.command(&line.split_whitespace().collect::<Vec<_>>());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&recording(3)).unwrap();
+    pipe.flush().unwrap();
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    for _ in 0..3 {
+        out.read_line(&mut String::new()).unwrap();
+    }
+    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    wait_until("the end", || child.try_wait().unwrap().is_some());
+    drop(pipe);
+    let output = child.wait_with_output().unwrap();
+    let words = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(place.names("."), ["film.partial.y4m"]);
+    assert!(!words.contains("film.y4m"), "{words}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn devices_are_written_and_a_full_one_says_so() {
+    let place = recorded(3);
+    let full = place.line(&format!("track s.y4m {BOX} -o /dev/full"));
+    assert!(full.code != 0 && full.err.contains("/dev/full: no storage space"), "{}", full.err);
+    place.good(&format!("track s.y4m {BOX} -o /dev/null --format mot"));
+    let two = place.line(&format!("track s.y4m {BOX} -o /dev/null --format mot,csv"));
+    assert!(two.code == 2 && two.err.contains("folder for several formats"), "{}", two.err);
+}
+
+#[test]
+fn coloured_films_need_luminance() {
+    let place = Place::new();
+    let mono = recording(3);
+    let mut film = String::from_utf8(header()).unwrap().replace("Cmono", "C420").into_bytes();
+    for frame in mono[header().len()..].chunks(6 + WIDTH * HEIGHT) {
+        film.extend_from_slice(frame);
+        film.extend(std::iter::repeat_n(90, WIDTH * HEIGHT / 2));
+    }
+    fs::write(place.path("s.y4m"), film).unwrap();
+    let refused = place.line(&format!("track s.y4m {BOX}"));
+    assert!(refused.code != 0 && refused.err.contains("--luminance"), "{}", refused.err);
+    place.good(&format!("track s.y4m {BOX} --luminance"));
 }
 
 #[test]

@@ -17,8 +17,8 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
     [
         (GOOD[:2], ValueError, "frames: expected at least 3 frames, got 2 frames"),
         (GOOD[:0], ValueError, "frames: expected at least 3 frames, got 0 frames"),
-        ([], ValueError, "frames: expected at least 3 frames, got 0 frames"),
-        (list(GOOD[:1]), ValueError, "frames: expected at least"),
+        ([], ValueError, "frames: expected at least [23] frames, got 0 frames"),
+        (list(GOOD[:1]), ValueError, "frames: expected at least [23] frames, got 1 frames"),
         (GOOD[0], ValueError, r"frames: expected a list of frames \(H, W\) or a stack \(T, H, W\), got an array of shape \[8, 10\]"),
         (GOOD[:, :2], ValueError, "frames: expected at least 3 x 3 pixels, got 10 x 2"),
         (GOOD[:, :, :1], ValueError, "frames: expected at least 3 x 3 pixels"),
@@ -271,3 +271,19 @@ def test_frames_beyond_memory_are_refused():
     with pytest.raises(ValueError, match="^count: "):
         scene.frames(-1)
     assert scene.frames(0).shape == (0, 48, 64)
+
+
+@pytest.mark.parametrize("method", ["coarse_to_fine", "instantaneous", "lucas_kanade"])
+def test_noise_that_no_covariance_can_hold_is_refused(method):
+    y, x = np.mgrid[:40, :40]
+    frames = [(120 + 40 * np.sin(0.4 * (x - t)) * np.cos(0.3 * y)).astype(np.float32) for t in range(3)]
+    with pytest.raises(ValueError, match="noise: expected"):
+        jacoflow.estimate(frames, noise=1e30, method=method)
+    field = jacoflow.estimate(frames, noise=1e12, method=method)
+    assert field.valid.any() and np.isfinite(field.covariance[field.valid]).all()
+
+
+@pytest.mark.parametrize(("method", "needed"), [("coarse_to_fine", 2), ("windowed", 2), ("lucas_kanade", 2), ("instantaneous", 3)])
+def test_a_lone_frame_is_told_how_many_suffice(method, needed):
+    with pytest.raises(ValueError, match=f"frames: expected at least {needed} frames, got 1 frames"):
+        jacoflow.estimate([GOOD[0]], method=method)

@@ -1,5 +1,7 @@
 """Parts of the gradient tracker that stand for themselves: the Gauss-Markov filter, mean flow, and the first thing that moves."""
 
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -126,3 +128,73 @@ def test_what_moves_first_is_found_with_its_box():
     assert track.detect_moving_target(first, first) is None
     with pytest.raises(ValueError, match="second"):
         track.detect_moving_target(first, second[:-1])
+
+
+FRAME = np.full((32, 32), 90, np.uint8)
+
+
+@pytest.mark.parametrize("name", ["order", "window"])
+@pytest.mark.parametrize(("value", "error"), [(-1, ValueError), (0, ValueError), (-(10**30), ValueError), (2.5, TypeError), ("x", TypeError)])
+def test_integers_are_refused_by_name(name, value, error):
+    with pytest.raises(error, match=name):
+        track.local_flow(FRAME, FRAME, **{name: value})
+    with pytest.raises(error, match=name):
+        track.refine_flow(FRAME, FRAME, **{name: value})
+    with pytest.raises(error, match=name):
+        track.GradientTracker(FRAME, (9, 9, 9, 9), method="local", **{name: value})
+    with pytest.raises(error, match="fov"):
+        track.GradientTracker(FRAME, (9, 9, 9, 9), fov=value)
+    with pytest.raises(error, match="order"):
+        track.derivative_kernels(value)
+
+
+@pytest.mark.parametrize(("value", "error"), [(-1, ValueError), (1.5, TypeError), ("x", TypeError)])
+def test_threads_of_the_stereo_tracker_are_refused_by_name(value, error):
+    with pytest.raises(error, match="threads"):
+        track.StereoTracker(threads=value)
+
+
+@pytest.mark.parametrize("box", ["abcd", 3.0, (1, 2, 3), [None, 1, 2, 3], object()])
+def test_boxes_are_refused_by_name(box):
+    with pytest.raises(ValueError, match="bbox: expected"):
+        track.GradientTracker(FRAME, box)
+
+
+def test_the_filter_names_its_arguments():
+    for position in (None, "ab", (1, 2, 3)):
+        with pytest.raises(ValueError, match="position: expected"):
+            track.GaussMarkovFilter(position)
+    with pytest.raises(ValueError, match="start: expected"):
+        track.GaussMarkovFilter((1, 2), start=None)
+    point = track.GaussMarkovFilter((1, 2))
+    for variance in (-1.0, (1.0, 0.0), (1, 2, 3), None, "x"):
+        with pytest.raises(ValueError, match="position_variance: expected"):
+            point.update(position=(1, 2), position_variance=variance)
+        with pytest.raises(ValueError, match="velocity_variance: expected"):
+            point.update(velocity=(1, 2), velocity_variance=variance)
+
+
+@pytest.mark.parametrize(("flow", "valid", "name"), [((8, 9), (8, 9), "flow"), ((8, 9, 3), (8, 9), "flow"), ((8, 9, 2), (9, 8), "valid"), ((8, 9, 2), (8,), "valid")])
+def test_mean_flow_refuses_other_shapes(flow, valid, name):
+    with pytest.raises(ValueError, match=f"{name}: expected"):
+        track.mean_flow(track.PixelFlow(np.zeros(flow), np.zeros(valid, bool)))
+
+
+@pytest.mark.parametrize("measures", ["mean", "instant"])
+def test_a_pickled_filter_goes_on_as_the_first(measures):
+    first = track.GaussMarkovFilter((3, 4), alpha=0.7, q=0.3, start=(1, 2, 3), measures=measures)
+    first.predict()
+    first.update((3.5, 4.5), (1.0, 0.5))
+    second = pickle.loads(pickle.dumps(first))
+    for each in (first, second):
+        each.predict()
+        each.update((4.5, 5.0), (1.0, 0.25), position_variance=0.5)
+    assert np.array_equal(first.covariance, second.covariance) and np.array_equal(first.acceleration, second.acceleration)
+    assert np.array_equal(first.position, second.position) and np.array_equal(first.velocity, second.velocity)
+
+
+def test_trackers_say_that_they_are_not_pickled_and_results_are():
+    tracker = track.GradientTracker(FRAME, (9, 9, 9, 9))
+    with pytest.raises(TypeError, match="GradientTracker"):
+        pickle.dumps(tracker)
+    assert np.array_equal(pickle.loads(pickle.dumps(tracker.result)).box, tracker.result.box)

@@ -9,7 +9,9 @@ use crate::cli::report::{Report, tell};
 use crate::error::{Error, Result};
 use crate::image::picture::TrackOverlay;
 use crate::parallel::Threads;
-use crate::pipeline::{Begun, Overlays, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary};
+use crate::pipeline::{
+    Begun, Overlays, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary, is_folder,
+};
 use crate::track::gradient::{GradientOptions, Start};
 use crate::track::{GradientTracker, Tracker};
 use crate::types::{Frame, TrackStatus};
@@ -72,13 +74,18 @@ impl TrackCommand {
     fn report(&self, summary: &TrackSummary, failure: Option<Error>, details: Value) -> Report {
         let interrupted = matches!(failure, Some(Error::Interrupted));
         let output = self.output.place(summary.latest.as_ref());
+        // Pictures are the first of the sinks. A film that was stopped has another name, too, or was not begun.
+        let overlay = match &self.output.overlay {
+            Some(film) if !is_folder(film) => summary.latest_of_sinks.first().and_then(Option::as_ref),
+            folder => folder.as_ref(),
+        };
         if !self.tell.quiet && (failure.is_none() || interrupted) {
-            let place = output.or(self.output.overlay.as_ref());
+            let place = output.or(overlay);
             tell(&in_words(summary, place.map(PathBuf::as_path)));
         }
         let mut object = json!({
             "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,
-            "seconds": summary.seconds, "output": output, "overlay": self.output.overlay, "interrupted": interrupted,
+            "seconds": summary.seconds, "output": output, "overlay": overlay, "interrupted": interrupted,
         });
         if let (Some(object), Value::Object(details)) = (object.as_object_mut(), details) {
             object.extend(details);

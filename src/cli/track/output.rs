@@ -1,7 +1,7 @@
 //! Where tracks go.
 
 use crate::error::{Error, Result};
-use crate::pipeline::{TableTarget, TextFormat, check_target, is_folder};
+use crate::pipeline::{TableTarget, TextFormat, check_target, is_device, is_folder};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -73,6 +73,13 @@ impl TrackOutputArguments {
     }
 
     fn in_file<F: TextFormat>(&self, path: &Path, formats: &[F]) -> Result<Vec<Wanted<F>>> {
+        if is_device(path) {
+            let formats = if formats.is_empty() { &F::ALL[..1] } else { formats };
+            let [format] = formats else {
+                return Err(Error::argument("output", "a folder for several formats", path.display()));
+            };
+            return Ok(vec![(TableTarget::File(path.to_path_buf()), *format)]);
+        }
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let endings: Vec<String> = F::ALL.iter().map(|format| format!(".{}", format.extension())).collect();
         let Some(by_name) = F::ALL.iter().copied().find(|format| format.extension() == extension) else {

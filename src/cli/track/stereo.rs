@@ -74,10 +74,7 @@ impl TrackCommand {
         if self.output.force {
             return Ok(());
         }
-        pictures.iter().try_for_each(|(path, kind)| {
-            let option = if *kind == StereoPicture::Clusters { "overlay" } else { "disparity_overlay" };
-            StereoOverlays::check(path, *kind, option)
-        })
+        pictures.iter().try_for_each(|(path, kind)| StereoOverlays::check(path, *kind))
     }
 
     /// Begins what is written; folders are made.

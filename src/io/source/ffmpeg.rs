@@ -1,6 +1,6 @@
 //! Compressed video, decoded by an `ffmpeg` program on the `PATH`.
 
-use super::{FrameSource, Kind, Y4mSource};
+use super::{Colour, FrameSource, Kind, Y4mSource};
 use crate::error::{Error, Result};
 use crate::types::AnyFrame;
 use std::fs::File;
@@ -11,7 +11,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
-    open: |spec, _| Ok(Box::new(FfmpegSource::open(spec)?)),
+    open: |spec, colour| Ok(Box::new(FfmpegSource::open(spec)?.with_colour(colour))),
 };
 
 /// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier ones.
@@ -64,6 +64,13 @@ impl FfmpegSource {
             }
         }
         Err(failure.unwrap_or_else(|| Error::format(path, "ffmpeg gave no output")))
+    }
+}
+
+impl FfmpegSource {
+    /// What to do with colour: see [`Y4mSource::with_colour`].
+    pub fn with_colour(self, colour: Colour) -> Self {
+        Self { stream: self.stream.with_colour(colour), ..self }
     }
 }
 

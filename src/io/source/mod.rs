@@ -121,13 +121,13 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// | specification | source |
 /// |---|---|
 /// | `-` | Y4M on standard input |
-/// | `*.y4m` | Y4M file; its luma plane |
+/// | `*.y4m` | Y4M file; its luma plane, where the others are grey or luminance is asked for |
 /// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of uint8, uint16, float32 or float64; colour `(T, H, W, 3)` |
 /// | `*.txt`, `*.lst` | list of image files, one a line |
 /// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
 /// | an image file | its picture, or the pages of a TIFF |
 /// | `*`, `?`, `[` in it | the image files it matches, in natural order |
-/// | another file | compressed video, through an `ffmpeg` on the `PATH`; its luma plane |
+/// | another file | compressed video, through an `ffmpeg` on the `PATH`; likewise |
 ///
 /// # Errors
 /// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems, [`Error::Argument`] for a `step` of 0,

@@ -1,8 +1,8 @@
 //! YUV4MPEG2 (`.y4m`): uncompressed video with a text header, from a file or standard input. The luma plane is the grey image.
 
-use super::{FrameSource, Kind, has_extension};
+use super::{Colour, FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
-use crate::io::decode::check_size;
+use crate::io::decode::{check_size, refuse_colour};
 use crate::types::{AnyFrame, Frame};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "y4m",
     accepts: |spec| spec == "-" || has_extension(spec, &["y4m"]),
-    open: |spec, _| {
+    open: |spec, colour| {
         Ok(match spec {
-            "-" => Box::new(Y4mSource::new("standard input", BufReader::new(io::stdin()))?),
-            path => Box::new(Y4mSource::open(path)?),
+            "-" => Box::new(Y4mSource::new("standard input", BufReader::new(io::stdin()))?.with_colour(colour)),
+            path => Box::new(Y4mSource::open(path)?.with_colour(colour)),
         })
     },
 };
@@ -24,7 +24,7 @@ const MAX_LINE: u64 = 4096;
 
 /// Frames of a YUV4MPEG2 stream: `mono`, `420` (all variants), `411`, `422`, `440` and `444` with or without alpha, 8 to 16 bit.
 ///
-/// Luma is taken as coded (so `16..=235` for studio range). Eight-bit streams give uint8; deeper ones (`p10`, `p12`, ..., `mono16`) give
+/// Colour is refused where [`Y4mSource::with_colour`] says so, else luma is taken. Luma is taken as coded (so `16..=235` for studio range). Eight-bit streams give uint8; deeper ones (`p10`, `p12`, ..., `mono16`) give
 /// uint16, shifted left so that the stream's full scale is that of 16 bits.
 #[derive(Debug)]
 pub struct Y4mSource<R> {
@@ -33,8 +33,9 @@ pub struct Y4mSource<R> {
     width: usize,
     height: usize,
     bits: u32,
-    /// Bytes after the luma plane of each frame.
-    chroma_bytes: u64,
+    /// Bytes of both chroma planes, after the luma plane of each frame, and of what follows them.
+    chroma_bytes: [u64; 2],
+    colour: Colour,
     frame_rate: Option<f64>,
     frame: usize,
 }
@@ -74,10 +75,39 @@ impl<R: BufRead> Y4mSource<R> {
             }
         }
         check_size(&name, width, height)?;
-        let (bits, chroma_samples) = parse_layout(layout, width, height)
+        let (bits, samples) = parse_layout(layout, width, height)
             .ok_or_else(|| Error::format(&name, format!("unknown YUV4MPEG2 layout C{layout}")))?;
-        let chroma_bytes = chroma_samples * if bits > 8 { 2 } else { 1 };
-        Ok(Self { name, input, width, height, bits, chroma_bytes, frame_rate, frame: 0 })
+        let chroma_bytes = samples.map(|count| count * if bits > 8 { 2 } else { 1 });
+        Ok(Self { name, input, width, height, bits, chroma_bytes, colour: Colour::Luminance, frame_rate, frame: 0 })
+    }
+
+    /// What to do with colour; [`Colour::Luminance`] until it is said, which takes the luma plane. Grey in a coloured layout is grey: its chroma is in the middle of the scale.
+    pub fn with_colour(self, colour: Colour) -> Self {
+        Self { colour, ..self }
+    }
+
+    /// Passes the chroma planes of a frame, which must be grey where colour is refused.
+    fn pass_chroma(&mut self) -> Result<()> {
+        let [chroma, alpha] = self.chroma_bytes;
+        if self.colour == Colour::Luminance {
+            return self.discard(chroma + alpha);
+        }
+        let mut planes = Vec::new();
+        (&mut self.input).take(chroma).read_to_end(&mut planes).map_err(|e| Error::io(&self.name, e))?;
+        if (planes.len() as u64) < chroma {
+            return Err(self.cut_off("is cut off"));
+        }
+        let middle = 1_u16 << (self.bits - 1);
+        // Conversion from red, green and blue rounds.
+        let is_grey = |sample: u16| sample.abs_diff(middle) <= 1;
+        let grey = match self.bits {
+            8 => planes.iter().all(|sample| is_grey(u16::from(*sample))),
+            _ => planes.chunks_exact(2).all(|b| is_grey(u16::from_le_bytes([b[0], b[1]]))),
+        };
+        if !grey {
+            return Err(refuse_colour(&self.name));
+        }
+        self.discard(alpha)
     }
 
     /// Passes the line in front of a frame; false at the end of the stream.
@@ -131,11 +161,11 @@ fn parse_rate(value: &str) -> Option<f64> {
     (rate > 0.0 && rate.is_finite()).then_some(rate)
 }
 
-/// Bits of a sample and number of samples after the luma plane.
-fn parse_layout(layout: &str, width: usize, height: usize) -> Option<(u32, u64)> {
+/// Bits of a sample, and how many samples of chroma and of alpha follow the luma plane.
+fn parse_layout(layout: &str, width: usize, height: usize) -> Option<(u32, [u64; 2])> {
     let (w, h) = (width as u64, height as u64);
     if let Some(depth) = layout.strip_prefix("mono") {
-        return Some((if depth.is_empty() { 8 } else { parse_bits(depth)? }, 0));
+        return Some((if depth.is_empty() { 8 } else { parse_bits(depth)? }, [0, 0]));
     }
     let digits = layout.find(|c: char| !c.is_ascii_digit()).unwrap_or(layout.len());
     let (sampling, rest) = layout.split_at(digits);
@@ -148,9 +178,9 @@ fn parse_layout(layout: &str, width: usize, height: usize) -> Option<(u32, u64)>
         _ => return None,
     };
     match rest {
-        "" | "jpeg" | "mpeg2" | "paldv" => Some((8, chroma)),
-        "alpha" => Some((8, chroma + w * h)),
-        _ => Some((parse_bits(rest.strip_prefix('p')?)?, chroma)),
+        "" | "jpeg" | "mpeg2" | "paldv" => Some((8, [chroma, 0])),
+        "alpha" => Some((8, [chroma, w * h])),
+        _ => Some((parse_bits(rest.strip_prefix('p')?)?, [chroma, 0])),
     }
 }
 
@@ -169,7 +199,7 @@ impl<R: BufRead + Send> FrameSource for Y4mSource<R> {
         if luma.len() < length {
             return Err(self.cut_off("is cut off"));
         }
-        self.discard(self.chroma_bytes)?;
+        self.pass_chroma()?;
         self.frame += 1;
         if self.bits == 8 {
             return Frame::new(self.width, self.height, luma).map(|f| Some(AnyFrame::U8(f)));
@@ -183,7 +213,7 @@ impl<R: BufRead + Send> FrameSource for Y4mSource<R> {
             if !self.begin_frame()? {
                 return Ok(done);
             }
-            self.discard(self.luma_bytes() as u64 + self.chroma_bytes)?;
+            self.discard(self.luma_bytes() as u64 + self.chroma_bytes.iter().sum::<u64>())?;
             self.frame += 1;
         }
         Ok(count)

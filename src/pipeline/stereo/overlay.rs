@@ -28,6 +28,14 @@ impl StereoPicture {
         }
     }
 
+    /// What its place is called in errors.
+    fn argument(self) -> &'static str {
+        match self {
+            Self::Clusters => "overlay",
+            Self::Disparities(..) => "disparity_overlay",
+        }
+    }
+
     fn draw(self, mut view: Picture, step: &Step, enlargement: usize) -> Picture {
         let pixels = step.columns.iter().zip(&step.rows).map(|(&x, &y)| [x, y]);
         match self {
@@ -73,16 +81,16 @@ impl StereoOverlays {
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: &Path, kind: StereoPicture, enlargement: usize, frame_rate: f64) -> Result<Self> {
-        let album = Album::create(path, kind.stem(), frame_rate)?;
+        let album = Album::create(path, kind.stem(), kind.argument(), frame_rate)?;
         Ok(Self { album, kind, enlargement, range: None })
     }
 
     /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film that exists. Nothing is made.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) named `argument`.
-    pub fn check(path: &Path, kind: StereoPicture, argument: &'static str) -> Result<()> {
-        Album::check(path, kind.stem(), argument)
+    /// [`Error::Argument`](crate::Error::Argument) named `overlay` or `disparity_overlay`.
+    pub fn check(path: &Path, kind: StereoPicture) -> Result<()> {
+        Album::check(path, kind.stem(), kind.argument())
     }
 }
 

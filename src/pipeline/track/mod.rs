@@ -83,6 +83,8 @@ pub struct TrackSummary {
     pub files: usize,
     /// The last of them, under the name that it really has.
     pub latest: Option<PathBuf>,
+    /// The last of each sink, in the order of the sinks.
+    pub latest_of_sinks: Vec<Option<PathBuf>>,
     /// Wall-clock seconds.
     pub seconds: f64,
 }
@@ -137,7 +139,8 @@ impl TrackRun {
         }
         let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
         self.summary.files = files.iter().map(|(number, _)| number).sum();
-        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
+        self.summary.latest_of_sinks = files.into_iter().map(|(_, latest)| latest).collect();
+        self.summary.latest = self.summary.latest_of_sinks.iter().rev().flatten().next().cloned();
         self.summary.seconds = start.elapsed().as_secs_f64();
         result
     }

@@ -29,7 +29,7 @@ impl Overlays {
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
-        let album = Album::create(path.as_ref(), STEM, frame_rate)?;
+        let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 

@@ -190,7 +190,7 @@ fn estimate_sequence(
     let py = frames.py();
     let colour = arrays::ColourRule::parse(arguments.colour.as_deref())?;
     let frames = Frames::new(frames, colour)?;
-    if !frames.is_array && frames.count == 2 && arguments.time_scheme.is_none() && arguments.takes_pairs() {
+    if !frames.is_array && frames.count <= 2 && arguments.time_scheme.is_none() && arguments.takes_pairs() {
         arguments.time_scheme = Some(PAIR.into());
     }
     run(py, &frames, &arguments.plan(py)?, &Reporter::new(py, progress)?)

@@ -46,6 +46,31 @@ fn luma_is_taken_from_every_layout() {
 }
 
 #[test]
+fn colour_is_refused_unless_luminance_is_asked_for() {
+    let grey = |bytes: &[u8], colour| {
+        let mut source = Y4mSource::new("test.y4m", bytes).unwrap().with_colour(colour);
+        source.next_frame().and_then(|_| source.next_frame())
+    };
+    // The chroma of the stream is 99 and not 128; mono has none, and alpha is no colour.
+    for (layout, chroma) in [("C420", 4), ("C444alpha", 18), ("", 4)] {
+        let bytes = stream(layout, chroma);
+        let refused = grey(&bytes, Colour::Error).unwrap_err().to_string();
+        assert!(refused.contains("test.y4m: holds colour") && refused.contains("--luminance"), "{refused}");
+        assert!(grey(&bytes, Colour::Luminance).unwrap().is_some());
+    }
+    assert!(grey(&stream("Cmono", 0), Colour::Error).unwrap().is_some());
+    let mut frame = b"YUV4MPEG2 W2 H1 F25:1 C444alpha\nFRAME\n".to_vec();
+    frame.extend([5, 6, 128, 127, 129, 128, 0, 255]);
+    assert_eq!(grey(&frame, Colour::Error).unwrap(), None);
+    let mut deep = b"YUV4MPEG2 W2 H1 F25:1 C420p10\nFRAME\n".to_vec();
+    deep.extend([0xff, 0x03, 0x01, 0x00, 0, 2, 1, 2]);
+    assert_eq!(grey(&deep, Colour::Error).unwrap(), None);
+    *deep.last_mut().unwrap() = 3;
+    assert!(grey(&deep, Colour::Error).is_err());
+    assert!(grey(&frame[..frame.len() - 4], Colour::Error).unwrap_err().to_string().contains("cut off"));
+}
+
+#[test]
 fn deep_samples_are_scaled_to_sixteen_bits() {
     let mut bytes = b"YUV4MPEG2 W2 H1 F25:1 C420p10\nFRAME\n".to_vec();
     bytes.extend([0xff, 0x03, 0x01, 0x00, 0, 2, 0, 2]);

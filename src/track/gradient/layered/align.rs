@@ -61,7 +61,7 @@ impl Freedom {
 }
 
 /// Which points have no vote.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Silence {
     /// All vote.
     None,
@@ -69,6 +69,8 @@ pub(super) enum Silence {
     Covered,
     /// Nor those beside it that look like it: a look-alike touches.
     Lookalike,
+    /// Not those of the half that lies in a direction, in the picture.
+    Towards([f64; 2]),
 }
 
 /// A task of alignment.

@@ -3,7 +3,7 @@
 use super::layers::{Background, grown, holds, is_inside};
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
-use crate::track::gradient::local_flow::{median, shifted};
+use crate::track::gradient::local_flow::{MAD, median, shifted};
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
 
@@ -82,6 +82,22 @@ pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, nois
         }
     }
     motion
+}
+
+/// Scatter of what the still scene changed by since the frame before, grey levels: the deviation of differences from their median, robustly, where the scene moved by `motion` in the picture.
+/// Light that falls on all of it alike is no scatter.
+pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox, motion: [f64; 2]) -> f64 {
+    let hidden = grown(target, (0.0, AROUND));
+    let still = motion == [0.0; 2];
+    let change = |(x, y): (usize, usize)| {
+        let place = [x as f64 + motion[0], y as f64 + motion[1]];
+        let there = if still { now.get(x, y) } else { cubic_at(now, place[0], place[1]) };
+        (still || is_inside(place, now)).then(|| there - previous.get(x, y))
+    };
+    let mut changes: Vec<f64> = spread(previous.size(), hidden, LIGHT_SAMPLES).filter_map(change).collect();
+    let middle = median(&mut changes);
+    let mut off: Vec<f64> = changes.iter().map(|change| (change - middle).abs()).collect();
+    MAD * median(&mut off)
 }
 
 /// Means over squares of `factor` px, then a Gaussian.

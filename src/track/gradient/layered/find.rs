@@ -25,6 +25,8 @@ pub(super) const DOUBT: f64 = 12.0;
 pub(super) const YOUNG: usize = 6;
 /// Least difference of the target from what is behind it, over the noise.
 const VISIBLE: f64 = 1.0;
+/// What is said of a target that something hides in part.
+pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
 const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
@@ -38,11 +40,13 @@ pub(super) const SEARCHED: &str = "found by looking all around";
 /// Growth from one frame to the next that a look-alike makes.
 const GROWN: f64 = 0.04;
 /// Loss of visibility that is one.
-const DROP: f64 = 0.08;
+pub(super) const DROP: f64 = 0.08;
 /// Loss of visibility that noise alone may make.
 const SLIGHT: f64 = 0.03;
-/// Width of a strip along a side of the target that two poses may differ by in what they explain, px: visibilities are counted in whole nodes.
+/// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a loss of visibility.
 const STRIP: f64 = 1.25;
+/// Distance of two poses that a covered edge makes, px.
+const HELD_BACK: f64 = 0.5;
 /// Reach of the search, px: at first, and at most.
 const REACH: (usize, usize) = (12, 36);
 
@@ -55,14 +59,6 @@ pub(super) struct Finding {
     pub nis: f64,
     pub occluded: bool,
     pub reason: &'static str,
-}
-
-/// Whether the target may as well be where it is expected, and `found`, as where nobody expects it, `plain`. The edge of what begins to cover a plain target stands for its own, and holds it
-/// back at the price of the opposite one; of the two strips that are then not explained one is as good as the other. A target that has really turned leaves one on either side of the
-/// expected place: brightness of its own beside it, and something else within.
-fn is_where_expected(found: &Finding, plain: &Finding, strip: f64) -> bool {
-    let explained = |look: &Look| look.visibility - look.leak;
-    plain.nis > DOUBT && found.nis < SURE && explained(&found.look) >= explained(&plain.look) - strip
 }
 
 impl Layered {
@@ -97,8 +93,10 @@ impl Layered {
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
         let mut best = plain;
         let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
-        if (doubted || interrupted) && self.age >= YOUNG {
-            best = self.covered(frame, plain, levels).or(best);
+        let held_back = plain.filter(|plain| self.age >= YOUNG && self.may_be_held_back(plain));
+        if (doubted || interrupted || held_back.is_some()) && self.age >= YOUNG {
+            let begun = || held_back.and_then(|plain| self.begun(frame, &plain));
+            best = self.covered(frame, plain, levels).or_else(begun).or(best);
         }
         let touched = best.filter(|found| !found.occluded).and_then(|found| self.is_touched(&found));
         if let Some(reason) = touched {
@@ -118,13 +116,54 @@ impl Layered {
         let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
         // What is seen as well as ever in a place that nobody expected has made a turn.
         let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT);
-        let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, DROP) || plain.nis > DOUBT));
+        // The last strip of a large target is not to be taken for background.
+        let drop = if self.hidden && self.is_large() { SLIGHT } else { DROP };
+        let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, drop) || plain.nis > DOUBT));
+        let held_back = plain.is_some_and(|plain| self.may_be_held_back(&plain) && self.is_held_back(&found, &plain));
+        let taken = found.look.leak < LEAK && dropped(&found.look, drop) && (also || held_back);
+        taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
+    }
+
+    /// Something known begins to cover a large target, and its edge stands for the target's own: what is on the side towards which the target is off has no vote.
+    fn begun(&self, frame: &Frame<f64>, plain: &Finding) -> Option<Finding> {
+        let (at, expected) = (self.position(&plain.aligned.pose), self.filter.position());
+        let side = Silence::Towards([expected[0] - at[0], expected[1] - at[1]]);
+        let how = (Freedom::Translation, side, PRIOR, &LEVELS[1..]);
+        let found = self.try_at(frame, &self.expected(false), how)?;
+        let taken = found.look.leak < LEAK && self.is_held_back(&found, plain);
+        taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
+    }
+
+    /// Whether a strip along a side is little of the target.
+    fn is_large(&self) -> bool {
+        STRIP / self.side() < DROP
+    }
+
+    /// Whether a large target is not where it is expected. The filter takes turns for granted, and is no judge of fractions of a pixel.
+    fn may_be_held_back(&self, plain: &Finding) -> bool {
+        self.is_large() && self.off(plain) > HELD_BACK
+    }
+
+    /// Whether a large target is rather `elsewhere`, nearer to where it is expected, than where it would be if all of it were seen, `plain`. The edge of what begins to cover a plain target
+    /// stands for its own, and holds it back or makes it shrink at the price of another: the area that is not explained stays the same. A target that has really turned leaves two strips
+    /// that are not, one on either side of the expected place, as long as the target is wide and as wide as it is off.
+    fn is_held_back(&self, elsewhere: &Finding, plain: &Finding) -> bool {
+        let [at, held] = [elsewhere, plain].map(|finding| self.position(&finding.aligned.pose));
+        let apart = (at[0] - held[0]).hypot(at[1] - held[1]);
+        let strip = apart * self.side() / plain.aligned.pose.scale().max(0.1);
+        apart > HELD_BACK && elsewhere.nis < DOUBT && elsewhere.look.mismatch < plain.look.mismatch + strip
+    }
+
+    /// Shorter side, px of the target.
+    fn side(&self) -> f64 {
         let [width, height] = self.target.extent();
-        let strip = STRIP / width.min(height).max(1.0);
-        // Of smaller targets a strip is drop enough.
-        let begun = strip < DROP && plain.is_some_and(|plain| is_where_expected(&found, &plain, strip));
-        let taken = found.look.leak < LEAK && (begun || dropped(&found.look, DROP) && also);
-        taken.then_some(Finding { occluded: true, reason: "something covers the target", ..found })
+        width.min(height).max(1.0)
+    }
+
+    /// Distance from where the target is expected, px.
+    fn off(&self, found: &Finding) -> f64 {
+        let (at, expected) = (self.position(&found.aligned.pose), self.filter.position());
+        (at[0] - expected[0]).hypot(at[1] - expected[1])
     }
 
     /// Whether something that looks like the target touches it: much of it beside the target, on one side. A moment after that was so, what pulls the target out of its way or makes it grow

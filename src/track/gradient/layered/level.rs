@@ -117,6 +117,13 @@ impl<'a> Level<'a> {
             return None;
         }
         let (width, height) = target.a.size();
+        if let Silence::Towards([dx, dy]) = silence {
+            let lies_there = |xi: [f64; 2]| {
+                let [x, y] = pose.turn(xi);
+                x * dx + y * dy > 0.0
+            };
+            return Some(Frame::from_fn(width, height, |i, j| lies_there(target.xi(i, j))));
+        }
         let places = target.places(pose);
         let (mut seen, mut behind) = (Vec::new(), Vec::new());
         self.frame.read(&places, &mut seen);
@@ -128,7 +135,7 @@ impl<'a> Level<'a> {
             }
             let nearer_behind = (seen[at] - behind[at]).abs() < (seen[at] - gain * target.t.get(i, j)).abs();
             match silence {
-                Silence::None => false,
+                Silence::None | Silence::Towards(_) => false,
                 Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
                 Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
                 Silence::Lookalike => !nearer_behind,

@@ -31,6 +31,8 @@ pub(super) struct Look {
     pub leak: f64,
     /// How far those lie on one side, 0 to 1.
     pub one_sided: f64,
+    /// Area in which the support is not the one that the picture alone tells, px of the target squared.
+    pub mismatch: f64,
 }
 
 /// Reads the picture at the nodes.
@@ -59,15 +61,30 @@ fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
     nearer && off < 4.0 * noise + 0.15 * contrast + 6.0
 }
 
+/// By how much the support at a point differs from the one that its brightness alone tells: the share of the target in a mixture with what is behind. Unlike hits, which are whole points,
+/// this tells fractions of a pixel at an edge. Points where the layers are too alike to tell are left out.
+fn mismatch(a: f64, seen: f64, bright: f64, behind: f64, noise: f64) -> f64 {
+    let contrast = bright - behind;
+    if contrast.abs() > 4.0 * noise && !seen.is_nan() {
+        (((seen - behind) / contrast).clamp(0.0, 1.0) - a).abs()
+    } else {
+        0.0
+    }
+}
+
 /// Visibility, and look-alikes beside the target.
 pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look {
     let near = target.near();
     let (mut hit, mut all, mut area) = (0.0, 0.0, 0.0);
     let (mut difference, mut count) = (0.0, 0.0);
     let (mut alike, mut sum, mut lengths) = (0.0, [0.0; 2], 0.0);
+    let mut apart = 0.0;
     for (at, (&a, &t)) in target.a.data().iter().zip(target.t.data()).enumerate() {
         let (seen, behind, bright) = (view.seen[at], view.behind[at], gain * t);
         area += a;
+        if near.data()[at] {
+            apart += mismatch(a, seen, bright, view.guess[at], noise);
+        }
         if a > CORE {
             let contrast = if behind.is_nan() { UNKNOWN } else { (bright - behind).abs() };
             let counts = contrast.min(CONTRAST) * if contrast < 2.5 * noise { 0.1 } else { 1.0 };
@@ -94,5 +111,6 @@ pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look 
         visibility: if all > 0.0 { hit / all } else { 0.0 },
         leak: if area > 0.0 { alike / area } else { 0.0 },
         one_sided: if lengths > 0.0 { sum[0].hypot(sum[1]) / lengths } else { 0.0 },
+        mismatch: apart,
     }
 }

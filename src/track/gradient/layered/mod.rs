@@ -13,6 +13,7 @@ mod look;
 mod nodes;
 mod patch;
 mod pose;
+mod scene;
 mod search;
 mod tell;
 
@@ -22,7 +23,7 @@ use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{DOUBT, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
+use find::{COVERED, DOUBT, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use layers::{Background, Target};
 use look::view;
 use pose::{Increment, Pose};
@@ -33,6 +34,10 @@ const SURE: f64 = 4.0;
 const JUMPED: f64 = 100.0;
 /// Frames after a look-alike touched for which it is reckoned with.
 const WARY: usize = 8;
+/// What is said of a frame with NaN or infinity.
+const UNUSABLE: &str = "the frame cannot be used";
+/// What is said of a frame that has little to do with the one before.
+const WILD: &str = "the frame is nothing like those before";
 /// Least information about the rotation, of all there could be.
 const TOLD: f64 = 0.88;
 /// Least deviation of a measured position, px.
@@ -58,8 +63,10 @@ pub(super) struct Layered {
     noise: f64,
     /// Running mean of the visibility.
     usual: f64,
-    /// Motion of the camera at the last frame.
+    /// Motion of the camera from frame to frame, at last.
     swung: [f64; 2],
+    /// Frames since the previous one that said something.
+    gap: usize,
     previous: Seen,
     /// Memory of the frame before that.
     spare: Vec<f64>,
@@ -110,6 +117,7 @@ impl Layered {
             usual: 1.0,
             before: Some(bounds.centre()),
             swung: [0.0; 2],
+            gap: 0,
             previous: Seen::new(frame),
             spare: Vec::new(),
             missed: 0,
@@ -134,23 +142,18 @@ impl Layered {
     /// The next frame; `None`: it cannot be used.
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
         let was_lost = matches!(state.status, TrackStatus::Lost | TrackStatus::Out);
-        let Some(frame) = frame else {
-            self.filter.predict();
-            self.miss();
-            self.tell(state, None, [0.0; 2]);
-            (state.reason, state.reacquired) = ("the frame cannot be used", false);
-            let size = self.previous.frame.size();
-            self.hold_beyond_the_border(state, size);
-            return;
-        };
+        self.gap += 1;
+        let Some(frame) = frame else { return self.pass_over(state, UNUSABLE) };
         let bounds = self.bounds(&self.pose);
         let light = camera::light(frame, &self.background, bounds);
         let seen = Seen::new(self.in_usual_light(frame, light));
-        let motion = match self.camera {
-            CameraMotion::Auto => camera::camera_motion(&self.previous, &seen, bounds, self.noise, self.swung),
-            CameraMotion::None => [0.0; 2],
-        };
-        self.swung = motion;
+        let motion = self.camera_motion(&seen, bounds);
+        if self.is_wild(&seen.frame, bounds, motion) {
+            self.spare = seen.frame.into_data();
+            return self.pass_over(state, WILD);
+        }
+        self.swung = motion.map(|m| m / self.gap as f64);
+        self.gap = 0;
         self.follow_camera(motion, &seen.frame);
         self.filter.predict();
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
@@ -165,32 +168,14 @@ impl Layered {
         self.spare = std::mem::replace(&mut self.previous, seen).frame.into_data();
     }
 
-    /// The frame, so bright as if the light were what it was at first.
-    fn in_usual_light(&mut self, frame: &Frame<f64>, light: f64) -> Frame<f64> {
-        let mut data = std::mem::take(&mut self.spare);
-        data.clear();
-        if light == 1.0 {
-            data.extend_from_slice(frame.data());
-        } else {
-            data.extend(frame.data().iter().map(|value| value / light));
-        }
-        Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
-    }
-
-    fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
-        if motion == [0.0; 2] {
-            self.noise = learn::learn_noise((self.age > 0).then_some(self.noise), &self.previous.frame, frame);
-            return;
-        }
-        self.background.moved(motion, frame);
-        self.shift(motion);
-    }
-
-    fn shift(&mut self, motion: [f64; 2]) {
-        self.filter.shift(motion);
-        let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
-        self.before = self.before.map(shifted);
-        self.pose.p = shifted(self.pose.p);
+    /// A frame that says nothing.
+    fn pass_over(&mut self, state: &mut TrackState, reason: &'static str) {
+        self.filter.predict();
+        self.miss();
+        self.tell(state, None, [0.0; 2]);
+        (state.reason, state.reacquired) = (reason, false);
+        let size = self.previous.frame.size();
+        self.hold_beyond_the_border(state, size);
     }
 
     /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
@@ -274,6 +259,10 @@ impl Layered {
         (self.missed, self.hidden) = (0, occluded);
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
+        if found.reason == COVERED && look.visibility > self.usual - DROP {
+            // What stays hidden, though it is little, is not covered but gone.
+            self.usual += VISIBILITY_RATE * (look.visibility - self.usual);
+        }
         let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
             self.learn(frame, aligned.gain, look.visibility);

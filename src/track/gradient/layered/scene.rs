@@ -1,0 +1,68 @@
+//! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
+
+use super::camera::{self, Seen};
+use super::{Layered, learn};
+use crate::track::gradient::options::CameraMotion;
+use crate::types::{Frame, TargetBox};
+
+/// Scatter of what changes in the still scene beyond which a frame is wild: so many times the noise, and grey levels.
+const OUTLYING: (f64, f64) = (6.0, 8.0);
+/// Frames in a row that are passed over for that.
+const WILD_FOR: usize = 10;
+
+impl Layered {
+    /// How far the scene moved since the last frame that said something.
+    pub(super) fn camera_motion(&self, seen: &Seen, bounds: TargetBox) -> [f64; 2] {
+        let expected = self.swung.map(|m| m * self.gap as f64);
+        match self.camera {
+            CameraMotion::Auto => camera::camera_motion(&self.previous, seen, bounds, self.noise, expected),
+            CameraMotion::None => [0.0; 2],
+        }
+    }
+
+    /// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt from it, and the next one is compared with the last that was not so; unless there
+    /// are so many of them that this is how the scene looks now.
+    pub(super) fn is_wild(&mut self, frame: &Frame<f64>, bounds: TargetBox, motion: [f64; 2]) -> bool {
+        if self.age == 0 {
+            return false;
+        }
+        let scatter = camera::scatter(&self.previous.frame, frame, bounds, motion);
+        if scatter <= OUTLYING.0 * self.noise + OUTLYING.1 {
+            return false;
+        }
+        let lasts = self.gap > WILD_FOR;
+        if lasts {
+            // Differences have the noise of two frames.
+            self.noise = self.noise.max(scatter / std::f64::consts::SQRT_2);
+        }
+        !lasts
+    }
+
+    /// The frame, so bright as if the light were what it was at first.
+    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: f64) -> Frame<f64> {
+        let mut data = std::mem::take(&mut self.spare);
+        data.clear();
+        if light == 1.0 {
+            data.extend_from_slice(frame.data());
+        } else {
+            data.extend(frame.data().iter().map(|value| value / light));
+        }
+        Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
+    }
+
+    pub(super) fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
+        if motion == [0.0; 2] {
+            self.noise = learn::learn_noise((self.age > 0).then_some(self.noise), &self.previous.frame, frame);
+            return;
+        }
+        self.background.moved(motion, frame);
+        self.shift(motion);
+    }
+
+    pub(super) fn shift(&mut self, motion: [f64; 2]) {
+        self.filter.shift(motion);
+        let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
+        self.before = self.before.map(shifted);
+        self.pose.p = shifted(self.pose.p);
+    }
+}
