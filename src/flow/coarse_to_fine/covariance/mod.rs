@@ -27,10 +27,13 @@ pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
 const FLOW_NOISE: f64 = 1.15;
-/// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.44;
-/// Errors over what bent motion loses, in the flow and in the slopes.
-const BENDING: bending::Shares = bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] };
+/// The same for the slopes; and for those of a triple, whose last linearisation is about the refined motion.
+const SLOPE_NOISE: [f64; 2] = [0.44, 0.35];
+/// Errors over what bent motion loses, in the flow and in the slopes; of pairs and of triples.
+const BENDING: [bending::Shares; 2] = [
+    bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] },
+    bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.60] },
+];
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
 /// Share of its amplitude that is left in the flow whatever the motion is.
@@ -60,13 +63,14 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, ca
     let change = estimate.change.as_ref();
     let change = change
         .map(|evidence| noise::Noise::new(evidence, data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise));
-    let mut places = bending::bending(&estimate.motion, evidence, BENDING);
+    let kind = usize::from(!carried);
+    let mut places = bending::bending(&estimate.motion, evidence, BENDING[kind]);
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
         let motion = bending::motion_at(&estimate.motion, at);
-        add_noise(place, &noise.at(at.0, at.1), 1.0);
+        add_noise(place, &noise.at(at.0, at.1), [FLOW_NOISE, SLOPE_NOISE[kind]]);
         if let Some(change) = &change {
-            add_noise(place, &change.at(at.0, at.1), CHANGE);
+            add_noise(place, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE, CHANGE * SLOPE_NOISE[kind]]);
         }
         extrapolation.add(place, seen.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
         add_locking(place, &motion, &estimate.locking);
@@ -80,10 +84,9 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, ca
     Spread::new(&places, axes, estimate.level)
 }
 
-/// Adds noise of the density times its share in the flow and in the derivatives along x and y.
-fn add_noise(place: &mut Entries, left: &noise::Left, share: f64) {
-    let factors =
-        [FLOW_NOISE * left.flow, SLOPE_NOISE * left.slopes[0], SLOPE_NOISE * left.slopes[1]].map(|f| share * f);
+/// Adds noise of the density times its share in the flow and in the derivatives along x and y; `factors` for the flow and for the slopes.
+fn add_noise(place: &mut Entries, left: &noise::Left, [flow, slopes]: [f64; 2]) {
+    let factors = [flow * left.flow, slopes * left.slopes[0], slopes * left.slopes[1]];
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             place[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];
