@@ -1,7 +1,7 @@
 //! What every estimator of this room is told.
 
 use super::baseline::{HornSchunckOptions, LucasKanadeOptions, Window};
-use super::coarse_to_fine::{CORRELATION_LENGTH, CoarseToFineOptions};
+use super::coarse_to_fine::{CoarseToFineOptions, correlation_length};
 use super::instantaneous::InstantaneousOptions;
 use super::windowed::WindowedOptions;
 use crate::error::{Error, Result};
@@ -165,7 +165,7 @@ impl Method {
     /// standard deviation of everything that an estimate is a weighted sum over.
     pub fn correlation_length(&self) -> f64 {
         match self {
-            Self::CoarseToFine(_) => CORRELATION_LENGTH,
+            Self::CoarseToFine(options) => correlation_length(options.frames),
             Self::Instantaneous(o) => o.neighbourhood.spread(),
             Self::Windowed(o) => {
                 let smoothing = o.presmooth.or(o.already_smoothed).unwrap_or(0.0);

@@ -29,5 +29,8 @@ mod run;
 pub use options::{CoarseToFineOptions, LEAST_SIDE, Preset};
 pub(super) use run::CoarseToFine;
 
-/// How far errors of neighbouring estimates go together, px: that of wide windows, so that means over regions are not told too well.
-pub(super) const CORRELATION_LENGTH: f64 = 8.0;
+/// How far errors of neighbouring estimates from so many frames go together, px: that of wide windows, so that means over regions are not told too well. Those of three frames, whose windows
+/// are chosen once more in what they have made smooth, go together further.
+pub(super) fn correlation_length(frames: usize) -> f64 {
+    if frames == 3 { 12.0 } else { 8.0 }
+}

@@ -26,13 +26,14 @@ pub(super) use noise::Energy;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-const FLOW_NOISE: f64 = 1.15;
-/// The same for the slopes; and for those of a triple, whose last linearisation is about the refined motion.
-const SLOPE_NOISE: [f64; 2] = [0.44, 0.35];
+/// Of pairs, and of triples, whose last linearisation is about the refined motion.
+const FLOW_NOISE: [f64; 2] = [1.15, 1.35];
+/// The same for the slopes.
+const SLOPE_NOISE: f64 = 0.44;
 /// Errors over what bent motion loses, in the flow and in the slopes; of pairs and of triples.
 const BENDING: [bending::Shares; 2] = [
     bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] },
-    bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.60] },
+    bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.46] },
 ];
 /// Share of the corrected peak locking that is left.
 const LOCKING: f64 = 0.33;
@@ -68,9 +69,9 @@ pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, ca
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
         let motion = bending::motion_at(&estimate.motion, at);
-        add_noise(place, &noise.at(at.0, at.1), [FLOW_NOISE, SLOPE_NOISE[kind]]);
+        add_noise(place, &noise.at(at.0, at.1), [FLOW_NOISE[kind], SLOPE_NOISE]);
         if let Some(change) = &change {
-            add_noise(place, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE, CHANGE * SLOPE_NOISE[kind]]);
+            add_noise(place, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
         }
         extrapolation.add(place, seen.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
         add_locking(place, &motion, &estimate.locking);
