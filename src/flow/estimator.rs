@@ -10,6 +10,9 @@ use crate::error::{Error, Result};
 use crate::simd::{SimdReal, same, same_mut};
 use crate::types::{FieldLayout, FlowField, Frame};
 
+/// Largest standard deviation of the noise in single precision, grey levels: squares of larger ones times counts do not fit.
+const MOST_NOISE: f64 = 1e12;
+
 /// A method made ready: options checked, stencils and kernels computed.
 ///
 /// ```
@@ -166,6 +169,11 @@ impl Estimator {
         if let Some(mask) = self.common.mask.as_ref().filter(|m| m.size() != (w, h)) {
             let got = format!("{} x {}", mask.width(), mask.height());
             return Err(Error::argument("mask", format!("the size of the frames, {w} x {h}"), got));
+        }
+        if let Some(noise) = self.common.noise.filter(|noise| *noise > MOST_NOISE && size_of::<T>() == size_of::<f32>())
+        {
+            let expected = format!("at most {MOST_NOISE:e} grey levels in single precision");
+            return Err(Error::argument("noise", expected, noise));
         }
         Ok(())
     }

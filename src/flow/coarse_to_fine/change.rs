@@ -49,7 +49,9 @@ pub(super) fn settle<T: SimdReal>(
     }
     let mut evidence = None;
     if central {
-        acceleration.iter().for_each(|acceleration| add(motion, acceleration, -1.0));
+        if let Some(acceleration) = &acceleration {
+            add(motion, acceleration, -1.0);
+        }
     } else {
         let (change, chosen) = refine(simd, space, &Options::for_changes(), &rest, &data);
         add(motion, &change, 1.0);

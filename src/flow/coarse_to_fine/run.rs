@@ -93,7 +93,9 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
         // About the refined motion the residual is noise; about the coupled one it is also what the windows of the data smooth away.
         evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
         let better = plan.again(workspace, &motion);
-        [motion, found.motion, found.data].into_iter().for_each(|planes| workspace.space.keep(planes));
+        for planes in [motion, found.motion, found.data] {
+            workspace.space.keep(planes);
+        }
         found = better;
         (motion, evidence) = refine(simd, &workspace.space, &Refinement::again(), &found.motion, &found.data);
     }
