@@ -73,5 +73,6 @@ SPEED = [
     Setting("windowed", {"method": "windowed", "covariance": False}),
     Setting("windowed, pair", {"method": "windowed", "covariance": False}, frames=2),
     *(coarse_to_fine(preset, frames=2) for preset in PRESETS),
+    coarse_to_fine("balanced"),
 ]
 """Timed with one thread and with two."""
