@@ -116,6 +116,7 @@ def test_the_deviation_of_a_regions_mean_holds_the_bias_of_clean_frames(name):
         value, std, _ = seen.region_mean("divergence", (16, 16, 64, 64))
         ratios.append((value - truth.value("divergence")[48, 48]) / std)
         assert std < 0.6 * np.nanmedian(seen.std("divergence"))
+    # Deviations of such small frames are told on the wide side, but they are no blank cheque.
     assert 0.05 < np.sqrt(np.mean(np.square(ratios))) < 1.5
 
 
