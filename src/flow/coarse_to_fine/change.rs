@@ -6,6 +6,7 @@
 
 mod steady;
 
+use super::candidates::Comparison;
 use super::data::{MOTION, SEEN};
 use super::descend::{Found, Plan};
 use super::grid::Planes;
@@ -34,7 +35,7 @@ pub(super) fn settle<T: SimdReal>(
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
     let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
-    let Workspace { pyramid, space, .. } = workspace;
+    let Workspace { pyramid, pool, space, .. } = workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
     let mut rest = difference(space, &ahead, &coupled, &data);
@@ -58,9 +59,16 @@ pub(super) fn settle<T: SimdReal>(
         space.keep(change);
         evidence = chosen;
     }
-    for planes in [ahead, coupled, data, rest].into_iter().chain(acceleration) {
-        space.keep(planes);
+    [coupled, rest].into_iter().chain(acceleration).for_each(|planes| space.keep(planes));
+    if !central {
+        // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or turns back does not go on as it came.
+        let (own, chosen) = refine(simd, space, &Options::default(), &ahead, &data);
+        chosen.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
+        let level = &pyramid.levels()[last];
+        Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own);
+        space.keep(own);
     }
+    [ahead, data].into_iter().for_each(|planes| space.keep(planes));
     evidence
 }
 

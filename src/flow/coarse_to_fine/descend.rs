@@ -1,5 +1,6 @@
 //! From level to level: the iterations.
 
+use super::candidates::Comparison;
 use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
 use super::grid::Planes;
@@ -14,6 +15,13 @@ use crate::simd::{Level, SimdReal};
 const LEAST_NOISE: f64 = 1e-3;
 /// The scale of the robust weights is at least this share of the brightness' standard deviation.
 const LEAST_SCALE: f64 = 4e-3;
+
+/// A site that an iteration moves further than this is on its way, px of the level.
+const FAR: f64 = 0.1;
+/// So many of those may be an object that is too small to be felt in the mean over the frame.
+const OBJECT: usize = 4;
+/// Sites along the edge that do not count: what leaves the frame there may drift for ever.
+const RIM: usize = 2;
 
 /// What all iterations have in common.
 #[derive(Debug, Clone, Copy)]
@@ -47,44 +55,61 @@ impl Plan {
             (0..levels.len()).map(|k| self.effort.on_level(k, levels[k].size, k == coarsest)).collect();
         let mut motion = workspace.space.planes(sites.0, sites.1, MOTION);
         motion.data_mut().fill(T::from_f64(0.0));
-        self.descend(workspace, Compared::All, motion, &limits)
+        self.descend(workspace, Compared::All, motion, (&limits, self.last))
     }
 
     /// Once more about a better `motion`, on the finest level.
     pub fn again<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let start = copy(&workspace.space, motion);
-        self.descend(workspace, Compared::All, start, &vec![self.effort.up_to(1); self.last + 1])
+        self.descend(workspace, Compared::All, start, (&vec![self.effort.up_to(1); self.last + 1], self.last))
     }
 
-    /// The way for the step to the next frame alone, from two levels above the finest down, where it is no other than `motion`.
+    /// The way for the step to the next frame alone, from two levels above the finest down. It begins with what is known of all frames together, the `motion`, but for what the next
+    /// frame alone tells better on the levels above: things may turn back.
     pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
-        let (levels, [finest, others @ ..]) = (workspace.pyramid.levels(), self.effort.ahead);
-        let mut start = copy(&workspace.space, motion);
-        let mut limits = vec![self.effort.up_to(finest); self.last + 1];
-        for (level, most) in levels[self.last + 1..].iter().zip(others) {
-            limits.push(self.effort.up_to(most));
-            let mut next = workspace.space.planes(0, 0, MOTION);
-            coarser(&start, sites(level.size), &mut next);
-            workspace.space.keep(std::mem::replace(&mut start, next));
+        let coarsest = workspace.pyramid.levels().len() - 1;
+        let first = coarsest.min(self.last + self.effort.ahead.len() - 1);
+        let mut start = raised(workspace, motion, self.last..=first);
+        if first < coarsest {
+            self.take_own(workspace, first, &mut start);
         }
-        self.descend(workspace, Compared::Ahead, start, &limits)
+        let most = |k: usize| self.effort.ahead[k.saturating_sub(self.last)];
+        let limits: Vec<_> = (0..=first).map(|k| self.effort.up_to(most(k))).collect();
+        self.descend(workspace, Compared::Ahead, start, (&limits, self.last))
     }
 
-    /// From the coarsest of the levels that `limits` names, on which `motion` is.
+    /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one above, tells better.
+    fn take_own<T: SimdReal>(&self, workspace: &mut Workspace<T>, level: usize, motion: &mut Planes<T>) {
+        let levels = workspace.pyramid.levels();
+        let coarsest = levels.len() - 1;
+        let limits: Vec<_> = (0..=coarsest).map(|k| self.effort.on_level(k, levels[k].size, k == coarsest)).collect();
+        let start = raised(workspace, motion, level..=coarsest);
+        let Found { motion: above, data, scale } =
+            self.descend(workspace, Compared::Ahead, start, (&limits, level + 1));
+        let Workspace { pyramid, pool, space, .. } = workspace;
+        let level = &pyramid.levels()[level];
+        let mut own = space.planes(0, 0, MOTION);
+        finer(self.simd, &above, level.size, &mut own);
+        let comparison = Comparison { simd: self.simd, level, compared: Compared::Ahead, scale, pool, space };
+        comparison.take_better(motion, &own);
+        [above, data, own].into_iter().for_each(|planes| space.keep(planes));
+    }
+
+    /// From the coarsest of the levels that `limits` names, on which `motion` is, down to the level `to`.
     fn descend<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,
         compared: Compared,
         mut motion: Planes<T>,
-        limits: &[Limits],
+        (limits, to): (&[Limits], usize),
     ) -> Found<T> {
         let Workspace { pyramid, pool, scratch, space } = workspace;
-        let (width, height) = sites(pyramid.levels()[self.last].size);
+        let (width, height) = sites(pyramid.levels()[to].size);
         let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
         let mut step = Step { plan: self, compared, term, data: &mut data, scratch, scale: None };
         let mut old = space.planes(0, 0, MOTION);
-        for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(self.last).rev() {
+        for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(to).rev() {
             if k + 1 < limits.len() {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
@@ -92,7 +117,10 @@ impl Plan {
             for _ in 0..limit.most {
                 std::mem::swap(&mut motion, &mut old);
                 rederive(&old, &mut motion);
-                if step.iterate(level, &limit.coupling, &mut motion) <= limit.settled {
+                let change = step.iterate(level, &limit.coupling, &mut motion);
+                // On the finest level what is left to do is for the coarser ones to have done.
+                let is_calm = || k == self.last || moving(&old, &motion) < OBJECT;
+                if change <= limit.settled && is_calm() {
                     break;
                 }
             }
@@ -103,6 +131,33 @@ impl Plan {
         space.keep_small(data);
         Found { motion, data: summary, scale }
     }
+}
+
+/// How many sites, but for those of the rim, an iteration moved by more than [`FAR`].
+fn moving<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> usize {
+    let inner = |len: usize| RIM.min(len)..len.saturating_sub(RIM).max(RIM.min(len));
+    let far = T::from_f64(FAR * FAR);
+    let in_row = |y: usize| {
+        let [u, v, u0, v0] = [to.line(0, y), to.line(1, y), from.line(0, y), from.line(1, y)];
+        inner(to.width).filter(|&x| (u[x] - u0[x]) * (u[x] - u0[x]) + (v[x] - v0[x]) * (v[x] - v0[x]) > far).count()
+    };
+    inner(to.height).map(in_row).sum()
+}
+
+/// The motion on the last of some levels from that on the first.
+fn raised<T: SimdReal>(
+    workspace: &Workspace<T>,
+    motion: &Planes<T>,
+    levels: std::ops::RangeInclusive<usize>,
+) -> Planes<T> {
+    let space = &workspace.space;
+    let mut out = copy(space, motion);
+    for level in levels.skip(1) {
+        let mut next = space.planes(0, 0, MOTION);
+        coarser(&out, sites(workspace.pyramid.levels()[level].size), &mut next);
+        space.keep(std::mem::replace(&mut out, next));
+    }
+    out
 }
 
 /// The motion in planes of its own; there may be more planes in what it comes from.
@@ -150,5 +205,25 @@ impl<T: SimdReal> Step<'_, T> {
         residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
         let least = (LEAST_SCALE * self.plan.range.contrast).max(f64::from(f32::MIN_POSITIVE));
         Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_sites_on_their_way_are_seen_but_not_along_the_edge() {
+        let (from, mut to) = (Planes::<f32>::new(9, 7, MOTION), Planes::<f32>::new(9, 7, MOTION));
+        to.data_mut().fill(0.09);
+        assert_eq!(moving(&from, &to), 5 * 3, "the diagonal is far: 0.127 px");
+        to.data_mut().fill(0.07);
+        assert_eq!(moving(&from, &to), 0);
+        for (x, y, u) in [(4, 3, 2.0), (5, 3, -0.2), (1, 3, 2.0), (4, 0, 2.0)] {
+            to.line_mut(0, y)[x] = u;
+        }
+        assert_eq!(moving(&from, &to), 2);
+        let tiny = Planes::<f32>::new(3, 1, MOTION);
+        assert_eq!(moving(&tiny, &tiny), 0);
     }
 }

@@ -8,6 +8,7 @@
 //! Fine random texture that moves by more than its own grain on every level of the pyramid may not be found. The covariance
 //! does not know of motions that were not found, nor of what happens at motion boundaries.
 
+mod candidates;
 mod change;
 mod couple;
 mod covariance;

@@ -1,0 +1,72 @@
+"""Objects with ways of their own: three frames must not tell them worse than two because they stop, start or turn back."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+import jacoflow
+
+SIZE = 200
+
+
+def texture(rng):
+    smooth = gaussian_filter(rng.standard_normal((SIZE, SIZE)), 1.5, mode="wrap")
+    return 128 + 40 * smooth / smooth.std()
+
+
+def square(side, before, after, *, background=(0, 0), seed=0):
+    """Three frames of a square before a background: it comes by `before` px and goes on by `after`, whole px (x, y), and all have noise of 1 grey level."""
+    rng = np.random.default_rng(seed)
+    behind, thing = texture(rng), texture(rng)
+    y, x = np.indices((SIZE, SIZE))
+    frames = []
+    for time, (dx, dy) in ((-1, [-s for s in before]), (0, (0, 0)), (1, after)):
+        inside = np.maximum(abs(x - SIZE // 2 - dx), abs(y - SIZE // 2 - dy)) < side / 2
+        still = np.roll(behind, (time * background[1], time * background[0]), (0, 1))
+        frame = np.where(inside, np.roll(thing, (dy, dx), (0, 1)), still)
+        frames.append((frame + rng.standard_normal(frame.shape)).astype(np.float32))
+    return frames
+
+
+def error(frames, side, after, **options):
+    """Mean end-point error, px, of the square, 4 px within its edge."""
+    field = jacoflow.estimate(frames, covariance=False, **options)
+    middle = slice(SIZE // 2 - side // 2 + 4, SIZE // 2 + side // 2 - 3)
+    return float(np.hypot(field.u - after[0], field.v - after[1])[middle, middle].mean())
+
+
+WAYS = {
+    "turns back": ((6, 0), (-6, 0)),
+    "stops": ((6, 0), (0, 0)),
+    "starts": ((0, 0), (6, 0)),
+    "turns aside": ((6, 0), (0, 6)),
+    "goes on": ((6, 0), (6, 0)),
+    "speeds up": ((2, 0), (3, 0)),
+}
+
+
+@pytest.mark.parametrize("background", [(0, 0), (2, 1)], ids=["still", "moving"])
+@pytest.mark.parametrize("way", WAYS)
+def test_three_frames_tell_objects_as_two_do(way, background):
+    before, after = WAYS[way]
+    errors = []
+    for seed in range(2):
+        frames = square(60, before, after, background=background, seed=seed)
+        errors.append([error(frames[n:], 60, after) for n in (1, 0)])
+    pair, triple = np.mean(errors, axis=0)
+    print(f"{way}: {pair:.3f} px from two frames, {triple:.3f} from three")
+    assert triple < 2 * pair + 0.03
+    assert triple < 0.3
+
+
+@pytest.mark.parametrize("speed", [2, 3])
+def test_small_objects_that_turn_back_are_found(speed):
+    way = (speed, 0), (-speed, 0)
+    assert error(square(30, *way), 30, way[1]) < 0.3
+
+
+def test_small_objects_are_found_where_all_else_stands_still():
+    """They are a fiftieth of the frame: what they still have to move is nothing in the mean over the frame."""
+    for seed in range(4):
+        slow, fast = (square(30, (speed, 0), (speed, 0), seed=seed) for speed in (3, 4))
+        assert error(slow[1:], 30, (3, 0)) < 0.3 and error(fast, 30, (4, 0)) < 0.5, seed
