@@ -46,7 +46,7 @@ impl<T: SimdReal> Comparison<'_, T> {
 
     /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is seen.
     fn left(&self, motion: &Planes<T>) -> Vec<f64> {
-        let mut data = self.space.planes(0, 0, COUNT);
+        let mut data = self.space.planes(motion.width, motion.height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), self.pool);
         term.linearise(self.level.size, &self.level.views(self.compared), motion, self.scale, &mut data);
         let energy = |(error, seen): (&T, &T)| {

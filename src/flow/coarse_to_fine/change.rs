@@ -35,7 +35,7 @@ pub(super) fn settle<T: SimdReal>(
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
     let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
-    let Workspace { pyramid, pool, space, .. } = workspace;
+    let Workspace { pyramid, pool, space, .. } = &*workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);
     let mut rest = difference(space, &ahead, &coupled, &data);
@@ -62,8 +62,10 @@ pub(super) fn settle<T: SimdReal>(
     [coupled, rest].into_iter().chain(acceleration).for_each(|planes| space.keep(planes));
     if !central {
         // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or turns back does not go on as it came.
+        workspace.clear_large();
         let (own, chosen) = refine(simd, space, &Options::default(), &ahead, &data);
         chosen.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
+        workspace.clear_large();
         let level = &pyramid.levels()[last];
         Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own);
         space.keep(own);

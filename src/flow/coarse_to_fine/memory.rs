@@ -62,6 +62,13 @@ impl<T: SimdReal> Workspace<T> {
         self.bytes() > LIMIT
     }
 
+    /// Lets go of what is free if there is so much memory that it matters more than the time to get it again.
+    pub fn clear_large(&self) {
+        if self.is_large() {
+            self.clear();
+        }
+    }
+
     /// Lets go of what is free.
     pub fn clear(&self) {
         lock(&self.space.free).clear();

@@ -66,13 +66,11 @@ fn spread<T: SimdReal>(
     (frames, common): (&[&Frame<T>], &Common),
     field: &FlowField<T>,
 ) -> Option<Spread<T>> {
-    let is_large = workspace.is_large();
     if field.covariance.is_none() {
-        if is_large {
-            workspace.clear();
-        }
+        workspace.clear_large();
         return None;
     }
+    let is_large = workspace.is_large();
     if is_large {
         workspace.give_back(estimate.planes_mut());
     }
