@@ -200,8 +200,6 @@ class StereoTracker:
         Least score of an arc that continues a track ("paper"), 0 to 2.
     reseed_below : float
         Components with fewer pixels begin anew where the mixture explains least ("improved").
-    predicted_windows : bool
-        Search templates within 2 cells of the last motion only ("improved"): faster, a little less sure.
     recognition : bool
         Whether lost tracks are waited for; default yes ("paper": no). A component that covers less than `least_overlap` of its moved self loses its track, which is waited for `patience` steps and given to a new component within
         `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity).
@@ -252,7 +250,6 @@ class StereoTracker:
         luminance_levels: int = 64,
         arc_threshold: float = 0.4,
         reseed_below: float = 20.0,
-        predicted_windows: bool = False,
         recognition: bool | None = None,
         least_overlap: float = 0.2,
         patience: int = 10,

@@ -41,7 +41,6 @@ struct Given {
     luminance_levels: usize,
     arc_threshold: f64,
     reseed_below: f64,
-    predicted_windows: bool,
     recognition: Option<bool>,
     least_overlap: f64,
     patience: usize,
@@ -104,7 +103,6 @@ impl Given {
         options.luminance_levels = self.luminance_levels;
         options.arc_threshold = self.arc_threshold;
         options.reseed_below = self.reseed_below;
-        options.predicted_windows = self.predicted_windows;
         options.recognition = self.recognition.unwrap_or(options.recognition.is_some()).then_some(Recognition {
             least_overlap: self.least_overlap,
             patience: self.patience,

@@ -169,8 +169,6 @@ pub struct StereoTrackerOptions {
     pub arc_threshold: f64,
     /// Components with fewer pixels after moving are seeded anew (`improved`); default 20.
     pub reseed_below: f64,
-    /// Templates are searched within 2 cells of the last motion instead of everywhere (`improved`); default no.
-    pub predicted_windows: bool,
     /// Whether lost tracks are waited for (`improved`).
     pub recognition: Option<Recognition>,
     /// Whether clusters that move alike are put together (`improved`).
@@ -213,7 +211,6 @@ impl StereoTrackerOptions {
             luminance_levels: 64,
             arc_threshold: 0.4,
             reseed_below: 20.0,
-            predicted_windows: false,
             recognition: improved.then(Recognition::default),
             grouping: improved.then(Grouping::default),
             camera: None,
