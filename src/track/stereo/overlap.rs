@@ -99,6 +99,15 @@ mod tests {
     }
 
     #[test]
+    fn voxels_count_whatever_they_hold() {
+        // Of two voxels one holds nine pixels; who meets it alone meets half.
+        let before = made_up(&[vec![([10, 10, 30], 0); 9], vec![([11, 10, 30], 0)]].concat(), 1);
+        let after = made_up(&[([10, 10, 30], 0), ([11, 10, 30], 1)], 2);
+        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8).overlaps, [0.5, 0.5]);
+        assert_eq!(moved_overlaps(&before, 0, &after, |i| before.points.at(i)), [0.5, 0.5]);
+    }
+
+    #[test]
     fn whom_nobody_meets_stays_and_overlaps_nothing() {
         let before = made_up(&block([10, 10, 30], 0), 1);
         let after = made_up(&block([60, 40, 5], 0), 1);
