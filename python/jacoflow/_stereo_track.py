@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
+from ._stereo_options import checked
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -164,6 +164,7 @@ class StereoTracker:
 
     Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x, y, disparity), clustered by
     a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic, whatever the number of threads.
+    It holds the last views smoothed and cannot be pickled; its steps, its graph and its tracks can.
 
     Parameters
     ----------
@@ -171,7 +172,7 @@ class StereoTracker:
         "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped.
         "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
     n_components : int
-        Components of the mixture; default 16 ("paper": 12).
+        Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.
     weight_concentration_prior, mean_precision_prior, degrees_of_freedom_prior, covariance_prior : float
         alpha_0, beta_0, nu_0 of (8) and (9), no unit, and the diagonal of W_0^-1, cells^2.
     max_iter, warm_max_iter : int
@@ -200,8 +201,6 @@ class StereoTracker:
         Least score of an arc that continues a track ("paper"), 0 to 2.
     reseed_below : float
         Components with fewer pixels begin anew where the mixture explains least ("improved").
-    predicted_windows : bool
-        Search templates within 2 cells of the last motion only ("improved"): faster, a little less sure.
     recognition : bool
         Whether lost tracks are waited for; default yes ("paper": no). A component that covers less than `least_overlap` of its moved self loses its track, which is waited for `patience` steps and given to a new component within
         `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity).
@@ -252,7 +251,6 @@ class StereoTracker:
         luminance_levels: int = 64,
         arc_threshold: float = 0.4,
         reseed_below: float = 20.0,
-        predicted_windows: bool = False,
         recognition: bool | None = None,
         least_overlap: float = 0.2,
         patience: int = 10,
@@ -268,7 +266,7 @@ class StereoTracker:
         threads: int | None = None,
     ) -> None:
         options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        self._tracker = _StereoTracker(_checked(options))
+        self._tracker = _StereoTracker(checked(options))
 
     def update(self, left: ArrayLike, right: ArrayLike) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
@@ -303,30 +301,8 @@ class StereoTracker:
         """Tracks by id; lengths in px."""
         return {track: StereoTrack(*parts) for track, parts in self._tracker.tracks().items()}
 
-
-COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
-"""Options that are counts."""
-
-
-def _checked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options as the compiled part takes them; what has the wrong length or sign is refused by name."""
-    out = dict(options)
-    for name in COUNTS:
-        if out[name] is not None:
-            try:
-                out[name] = operator.index(out[name])
-            except TypeError:
-                raise TypeError(f"{name}: expected an integer, got {out[name]!r}") from None
-            if out[name] < 0:
-                raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
-    lengths = {"disparity_range": 2, "row_range": 2, "grid": 3, "tolerance": 3, "tolerance_per_step": 3, "jump": 2, "group_limits": 3}
-    for name, length in lengths.items():
-        out[name] = tuple(out[name])
-        if len(out[name]) != length:
-            raise ValueError(f"{name}: expected {length} numbers, got {len(out[name])}")
-    if any(side is not None and operator.index(side) < 0 for side in out["grid"]):
-        raise ValueError(f"grid: expected numbers of cells, got {out['grid']}")
-    return out
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("StereoTracker: expected its graph, its tracks or its steps to be kept, got a tracker to pickle; it holds the last views smoothed at three levels")
 
 
 def _view(view: ArrayLike) -> NDArray[Any]:

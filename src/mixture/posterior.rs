@@ -60,7 +60,7 @@ impl Posterior {
     }
 
     /// Only the components for which `keep` holds.
-    pub(super) fn retain(&mut self, keep: &[bool]) {
+    pub fn retain(&mut self, keep: &[bool]) {
         let d = self.dimensions;
         let single = [&mut self.weight_concentration, &mut self.mean_precision, &mut self.degrees_of_freedom];
         for values in single {

@@ -41,7 +41,6 @@ struct Given {
     luminance_levels: usize,
     arc_threshold: f64,
     reseed_below: f64,
-    predicted_windows: bool,
     recognition: Option<bool>,
     least_overlap: f64,
     patience: usize,
@@ -104,7 +103,6 @@ impl Given {
         options.luminance_levels = self.luminance_levels;
         options.arc_threshold = self.arc_threshold;
         options.reseed_below = self.reseed_below;
-        options.predicted_windows = self.predicted_windows;
         options.recognition = self.recognition.unwrap_or(options.recognition.is_some()).then_some(Recognition {
             least_overlap: self.least_overlap,
             patience: self.patience,
@@ -150,10 +148,16 @@ impl PyStereoTracker {
 }
 
 impl Tracking {
-    /// A view in grey levels; the scale of floats is that of the first left view.
-    fn grey(&mut self, view: &AnyFrame) -> Frame<f32> {
-        let levels = *self.levels.get_or_insert_with(|| GreyLevels::decide(view));
-        in_levels(view, levels.gain(view))
+    /// A step from views, the left one first, in grey levels: the scale of floats is that of the first left view with which a step could be taken.
+    fn step<const N: usize>(
+        &mut self,
+        views: &[AnyFrame; N],
+        take: impl FnOnce(&mut StereoTracker, [Frame<f32>; N]) -> crate::error::Result<Step>,
+    ) -> crate::error::Result<Step> {
+        let levels = self.levels.unwrap_or_else(|| GreyLevels::decide(&views[0]));
+        let step = take(&mut self.tracker, views.each_ref().map(|view| in_levels(view, levels.gain(view))))?;
+        self.levels = Some(levels);
+        Ok(step)
     }
 }
 
@@ -172,11 +176,7 @@ impl PyStereoTracker {
             arrays::frame("left", left, ColourRule::Luminance)?,
             arrays::frame("right", right, ColourRule::Luminance)?,
         ];
-        let step = py.detach(|| {
-            let mut tracking = self.lock();
-            let [left, right] = views.each_ref().map(|view| tracking.grey(view));
-            tracking.tracker.update(&left, &right)
-        })?;
+        let step = py.detach(|| self.lock().step(&views, |tracker, [left, right]| tracker.update(&left, &right)))?;
         told(py, step)
     }
 
@@ -200,11 +200,8 @@ impl PyStereoTracker {
             let expected = format!("the left view's shape {}", told(left.size()));
             return Err(Error::argument("disparity", expected, told(disparity.size())).into());
         }
-        let step = py.detach(|| {
-            let mut tracking = self.lock();
-            let left = tracking.grey(&left);
-            tracking.tracker.update_edges(&left, EdgePoints::from_map(&disparity))
-        })?;
+        let points = EdgePoints::from_map(&disparity);
+        let step = py.detach(|| self.lock().step(&[left], |tracker, [left]| tracker.update_edges(&left, points)))?;
         told(py, step)
     }
 

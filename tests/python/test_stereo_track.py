@@ -12,6 +12,7 @@ from jacoflow.track import StereoTracker, TrackGraph
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from stereo_scenes import crossing, small
 from stereo_tracking import follow
+from stereo_tracking_scores import gross
 
 SMALL = {"disparity_range": (-8, 8), "grid": (30, 40, None), "row_offset": 0.0}
 
@@ -84,6 +85,9 @@ def test_who_was_hidden_is_recognised():
     scores = scored(crossing(), "improved")
     assert scores.recognised(2)
     assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.index_kept(label) for label in (1, 2, 3)]
+    # Of the wall much is being covered, or has just come to light.
+    errors = scores.motion_errors()
+    assert gross(errors[0]) <= 0.011 and len(errors[0]) > 100 and gross(errors[3]) == 0
 
 
 def test_every_edge_pixel_has_its_cluster():
@@ -147,6 +151,35 @@ def test_known_cameras_give_depth_and_speed():
         StereoTracker(focal=100.0)
     with pytest.raises(ValueError, match="focal"):
         StereoTracker(focal=-1.0, baseline=1.0)
+
+
+def leaving(steps=9):
+    """A board of 56 px that moves 16 px/step to the right before a wall that rests, and is gone at step 7."""
+    wall, board = np.tile(cells(columns=25), 2)[:, :400], cells(2)[:48, :56]
+    for t in range(steps):
+        left, right = wall.copy(), np.roll(wall, 4, axis=1)
+        x = 180 + 16 * t
+        left[36:84, x : x + 56] = board
+        right[36:84, x - 5 : x + 51] = board
+        yield tuple(np.rint(view[:, 120:280]).astype(np.uint8) for view in (left, right))
+
+
+@pytest.mark.parametrize("mode", ["improved", "paper"])
+def test_what_leaves_the_picture_is_measured_while_half_of_it_is_left(mode):
+    tracker = StereoTracker(mode, n_components=6, **SMALL)
+    for t, (left, right) in enumerate(leaving()):
+        step = tracker.update(left, right)
+        boards = [c for c in step.clusters if abs(c.mean[2] - 5) < 1.5]
+        if 1 <= t <= 5:
+            board = max(boards, key=lambda c: c.n_pixels)
+            assert np.allclose(board.velocity, [16, 0, 0], atol=0.1) and not board.coasting
+        # At step 5 there are 20 px of it, at step 6 only 4: nothing can be measured between them.
+        if t == 6:
+            assert all(np.isnan(c.velocity).all() or c.coasting for c in boards)
+        if t >= 7:
+            assert boards == []
+    ids = {cluster.track_id for (t, _), cluster in tracker.graph.nodes.items() if t in (0, 5) and abs(cluster.mean[2] - 5) < 1.5}
+    assert len(ids) == 1
 
 
 @pytest.mark.parametrize("mode", ["improved", "paper"])
@@ -243,8 +276,59 @@ def test_views_that_do_not_fit_are_refused_with_both_shapes():
         ("group_limits", (float("nan"), 1.0, 0.15)),
         ("tolerance", (3.0, -4.0, 1.0)),
         ("jump", (float("nan"), 1.5)),
+        ("mode", None),
+        ("matching", 3),
+        ("least_overlap", 1.5),
+        ("patience", -1),
+        ("random_state", -1),
+        ("disparity_range", (1,)),
     ],
 )
 def test_options_out_of_range_are_named(option, value):
-    with pytest.raises(ValueError, match=option):
+    with pytest.raises(ValueError, match=f"{option}: "):
         StereoTracker(**{option: value})
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("search", 1.5),
+        ("random_state", None),
+        ("row_offset", "high"),
+        ("covariance_prior", None),
+        ("tol", [1.0]),
+        ("tolerance", 3),
+        ("tolerance", (None, 1.0, 1.0)),
+        ("grid", 5),
+        ("grid", (60.5, 80, None)),
+        ("grid", (None, 80, None)),
+        ("disparity_range", "ab"),
+        ("threads", 1.5),
+        ("recognition", "yes"),
+        ("grouping", 2),
+    ],
+)
+def test_options_of_another_kind_are_named(option, value):
+    with pytest.raises(TypeError, match=f"{option}: "):
+        StereoTracker(**{option: value})
+
+
+def test_a_step_that_failed_changes_nothing():
+    good, other = StereoTracker(n_components=6, **SMALL), StereoTracker(n_components=6, **SMALL)
+    left, right = next(film())
+    dark = np.full((120, 160), 0.5, np.float32)
+    with pytest.raises(ValueError, match="right"):
+        other.update(dark, dark[1:])
+    for view in film():
+        good.update(*(each.astype(np.float32) for each in view))
+        other.update(*(each.astype(np.float32) for each in view))
+        with pytest.raises(ValueError, match="left"):
+            other.update(left[:60], right[:60])
+        with pytest.raises(ValueError, match="disparity"):
+            other.update_disparity(left, dark[:60])
+    assert good.graph == other.graph
+
+
+def test_a_tracker_says_what_to_keep_of_it():
+    with pytest.raises(TypeError, match="StereoTracker: "):
+        pickle.dumps(StereoTracker())

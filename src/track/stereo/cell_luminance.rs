@@ -23,13 +23,6 @@ pub(super) struct Match {
     pub difference: f64,
 }
 
-/// Where a template is looked for: shifts up to `reach` cells about `centre` along x and y.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Window {
-    pub centre: [i32; 2],
-    pub reach: i32,
-}
-
 impl CellLuminance {
     /// Averages grey levels (0 to 255) over cells: `floor(Y levels / 256)`. Pixels that are not finite are left out.
     pub fn new(frame: &Frame<f32>, lattice: &Lattice, levels: usize) -> Self {
@@ -63,9 +56,9 @@ impl CellLuminance {
         Some(self.levels[(y * self.columns + x) as usize]).filter(|&level| level != NONE)
     }
 
-    /// Moves the template, cells of `self`, over `next`: the shift with the least mean absolute difference over what stays in the picture, at least half of it (29).
+    /// Moves the template, cells of `self`, over `next`, up to `reach` cells along x and y: the shift with the least mean absolute difference over what stays in the picture, at least half of it (29).
     /// The shorter one of equals; `None` where no shift keeps half.
-    pub fn find(&self, template: &[[u16; 2]], next: &Self, window: Window) -> Option<Match> {
+    pub fn find(&self, template: &[[u16; 2]], next: &Self, reach: i32) -> Option<Match> {
         let cells: Vec<(i32, i32, i32)> = template
             .iter()
             .filter_map(|&[x, y]| {
@@ -74,8 +67,8 @@ impl CellLuminance {
             .collect();
         let mut best: Option<Match> = None;
         let length = |[x, y]: [i32; 2]| x * x + y * y;
-        for dy in window.centre[1] - window.reach..=window.centre[1] + window.reach {
-            for dx in window.centre[0] - window.reach..=window.centre[0] + window.reach {
+        for dy in -reach..=reach {
+            for dx in -reach..=reach {
                 let (mut sum, mut count) = (0, 0);
                 for &(x, y, level) in &cells {
                     if let Some(other) = next.level(x + dx, y + dy) {
@@ -119,32 +112,31 @@ mod tests {
         CellLuminance::new(&Frame::from_fn(160, 120, value), &lattice(), 64)
     }
 
-    const ALL: Window = Window { centre: [0, 0], reach: 8 };
-
     #[test]
     fn a_moved_picture_is_found_again() {
         let template: Vec<_> = (5..9).flat_map(|y| (6..11).map(move |x| [x, y])).collect();
         for (dx, dy) in [(0, 0), (3, -2), (-6, 5)] {
-            let found = picture(0, 0).find(&template, &picture(dx, dy), ALL).unwrap();
+            let found = picture(0, 0).find(&template, &picture(dx, dy), 8).unwrap();
             assert_eq!(found, Match { shift: [dx, dy], difference: 0.0 });
         }
-        let near = Window { centre: [2, -2], reach: 2 };
-        assert_eq!(picture(0, 0).find(&template, &picture(3, -2), near).unwrap().shift, [3, -2]);
+        assert_ne!(picture(0, 0).find(&template, &picture(3, -2), 2).unwrap().shift, [3, -2]);
     }
 
     #[test]
     fn of_equal_shifts_the_shortest_is_taken() {
         let flat = CellLuminance::new(&Frame::filled(160, 120, 90.0), &lattice(), 64);
-        assert_eq!(flat.find(&[[10, 7]], &flat, ALL).unwrap(), Match { shift: [0, 0], difference: 0.0 });
+        assert_eq!(flat.find(&[[10, 7]], &flat, 8).unwrap(), Match { shift: [0, 0], difference: 0.0 });
     }
 
     #[test]
     fn half_of_the_template_must_stay_in_the_picture() {
         let template: Vec<_> = (0..4).map(|x| [x, 7]).collect();
-        let left = Window { centre: [-3, 0], reach: 0 };
-        assert_eq!(picture(0, 0).find(&template, &picture(0, 0), left), None);
-        let two = Window { centre: [-2, 0], reach: 0 };
-        assert!(picture(0, 0).find(&template, &picture(0, 0), two).is_some());
+        // Moved by two cells, two of four are left; by three, the right place is out of the question.
+        let found = |dx| picture(0, 0).find(&template, &picture(dx, 0), 8).unwrap();
+        assert_eq!(found(-2), Match { shift: [-2, 0], difference: 0.0 });
+        assert_ne!(found(-3).shift, [-3, 0]);
+        let dark = CellLuminance::new(&Frame::filled(160, 120, f32::NAN), &lattice(), 64);
+        assert_eq!(picture(0, 0).find(&template, &dark, 8), None);
     }
 
     #[test]

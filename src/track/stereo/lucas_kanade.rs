@@ -1,5 +1,9 @@
 //! Affine motion of a cluster on its edge pixels (B. Lucas and T. Kanade, 1981), coarse to fine, robustly weighted; section 6.4 of the stereo tracker's design.
 
+mod visible;
+
+pub(super) use visible::visible_motion;
+
 use crate::image::GaussianSmoother;
 use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
@@ -20,6 +24,8 @@ const MAD: f64 = 1.4826;
 const PRIOR: [f64; 2] = [16.0, 0.15];
 /// Pixels that an affine map needs.
 const AFFINE_PIXELS: usize = 40;
+/// The finest level.
+const FINE: usize = SIGMAS.len() - 1;
 /// Where residuals are truncated for comparison, grey levels.
 const TRUNCATED: f64 = 30.0;
 
@@ -47,6 +53,8 @@ pub(super) struct PlaneMotion {
     pub centre: [f64; 2],
     /// Truncated mean absolute difference left, grey levels.
     pub residual: f64,
+    /// Deviation of the difference left, from its median, grey levels.
+    pub deviation: f64,
 }
 
 impl PlaneMotion {
@@ -78,19 +86,11 @@ pub(super) fn affine_motion(
     pixels: &[[f64; 2]],
     starts: &[[f64; 2]],
 ) -> Option<PlaneMotion> {
-    if pixels.len() < 3 {
-        return None;
-    }
-    let n = pixels.len() as f64;
-    let centre = middle(pixels);
-    let spread = pixels.iter().map(|p| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2)).sum::<f64>() / n;
-    let radius = spread.sqrt().max(1.0);
-    let task = Task { before, after, pixels, centre, radius };
-    let fine = SIGMAS.len() - 1;
+    let task = Task::new(before, after, pixels)?;
     let mut best: Option<([f64; 6], f64)> = None;
     for start in starts {
         let mut map = [start[0], start[1], 0.0, 0.0, 0.0, 0.0];
-        let Some(residual) = (0..fine).try_fold(f64::INFINITY, |_, level| task.descend(level, &mut map, start)) else {
+        let Some(residual) = (0..FINE).try_fold(f64::INFINITY, |_, level| task.descend(level, &mut map, start)) else {
             continue;
         };
         if best.is_none_or(|(_, least)| residual < least) {
@@ -99,10 +99,8 @@ pub(super) fn affine_motion(
     }
     let (mut map, _) = best?;
     let start = [map[0], map[1]];
-    let residual = task.descend(fine, &mut map, &start)?;
-    let [u, v, u_x, v_x, u_y, v_y] = map;
-    let flow = AffineFlow { u, v, u_x: u_x / radius, v_x: v_x / radius, u_y: u_y / radius, v_y: v_y / radius };
-    Some(PlaneMotion { flow, centre, residual })
+    task.descend(FINE, &mut map, &start)?;
+    task.told(&map)
 }
 
 /// Medians of the pixels along x and y: unlike their mean, stray pixels hardly move them.
@@ -114,6 +112,16 @@ pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
     })
 }
 
+/// Mean size of residuals, each no more than [`TRUNCATED`]; NaN outside of the picture is left out.
+fn truncated_mean(residuals: &[f32]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for residual in residuals.iter().filter(|residual| residual.is_finite()) {
+        sum += f64::from(residual.abs()).min(TRUNCATED);
+        count += 1.0;
+    }
+    sum / count
+}
+
 /// What all levels share. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.
 struct Task<'a> {
     before: &'a SmoothedLevels,
@@ -123,7 +131,69 @@ struct Task<'a> {
     radius: f64,
 }
 
-impl Task<'_> {
+impl<'a> Task<'a> {
+    /// `None` for fewer than three pixels.
+    fn new(before: &'a SmoothedLevels, after: &'a SmoothedLevels, pixels: &'a [[f64; 2]]) -> Option<Self> {
+        if pixels.len() < 3 {
+            return None;
+        }
+        let n = pixels.len() as f64;
+        let centre = middle(pixels);
+        let spread = pixels.iter().map(|p| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2)).sum::<f64>() / n;
+        Some(Self { before, after, pixels, centre, radius: spread.sqrt().max(1.0) })
+    }
+
+    /// A map as a motion, with what it leaves at the finest level.
+    fn told(&self, map: &[f64; 6]) -> Option<PlaneMotion> {
+        let voters = self.voters(FINE);
+        let mut residuals = Vec::with_capacity(voters.len());
+        let deviation = self.residuals(&voters, &self.after.0[FINE], map, &mut residuals)?;
+        let [u, v, u_x, v_x, u_y, v_y] = *map;
+        let r = self.radius;
+        let flow = AffineFlow { u, v, u_x: u_x / r, v_x: v_x / r, u_y: u_y / r, v_y: v_y / r };
+        Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
+    }
+
+    /// A step of the translation from residuals of some deviation; its length, px.
+    fn translate(
+        &self,
+        voters: &[Voter],
+        (residuals, deviation): (&[f32], f64),
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+    ) -> Option<f64> {
+        let (mut matrix, mut right) = self.normal::<2>(voters, residuals, deviation);
+        for k in 0..2 {
+            let prior = (deviation / PRIOR[0]).powi(2);
+            matrix[(k, k)] += prior;
+            right[k] -= prior * (map[k] - start[k]);
+        }
+        let step = matrix.cholesky()?.solve(&right);
+        map[0] += step[0];
+        map[1] += step[1];
+        Some(step.norm())
+    }
+
+    /// A step of the affine map from residuals of some deviation; its length, px.
+    fn deform(
+        &self,
+        voters: &[Voter],
+        (residuals, deviation): (&[f32], f64),
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+    ) -> Option<f64> {
+        let (mut matrix, mut right) = self.normal::<6>(voters, residuals, deviation);
+        for k in 0..6 {
+            let (scale, from) = if k < 2 { (PRIOR[0], start[k]) } else { (PRIOR[1] * self.radius, 0.0) };
+            let prior = (deviation / scale).powi(2);
+            matrix[(k, k)] += prior;
+            right[k] -= prior * (map[k] - from);
+        }
+        let step = matrix.cholesky()?.solve(&right);
+        map.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
+        Some(step.norm())
+    }
+
     /// Steps at one level; the truncated residual at its end.
     fn descend(&self, level: usize, map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
         let voters = self.voters(level);
@@ -133,41 +203,18 @@ impl Task<'_> {
         let affine = if voters.len() < AFFINE_PIXELS { 0 } else { affine };
         for _ in 0..translations {
             let deviation = self.residuals(&voters, after, map, &mut residuals)?;
-            let (mut matrix, mut right) = self.normal::<2>(&voters, &residuals, deviation);
-            for k in 0..2 {
-                let prior = (deviation / PRIOR[0]).powi(2);
-                matrix[(k, k)] += prior;
-                right[k] -= prior * (map[k] - start[k]);
-            }
-            let step = matrix.cholesky()?.solve(&right);
-            map[0] += step[0];
-            map[1] += step[1];
-            if step.norm() < SETTLED {
+            if self.translate(&voters, (&residuals, deviation), map, start)? < SETTLED {
                 break;
             }
         }
         for _ in 0..affine {
             let deviation = self.residuals(&voters, after, map, &mut residuals)?;
-            let (mut matrix, mut right) = self.normal::<6>(&voters, &residuals, deviation);
-            for k in 0..6 {
-                let (scale, from) = if k < 2 { (PRIOR[0], start[k]) } else { (PRIOR[1] * self.radius, 0.0) };
-                let prior = (deviation / scale).powi(2);
-                matrix[(k, k)] += prior;
-                right[k] -= prior * (map[k] - from);
-            }
-            let step = matrix.cholesky()?.solve(&right);
-            map.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
-            if step.norm() < SETTLED {
+            if self.deform(&voters, (&residuals, deviation), map, start)? < SETTLED {
                 break;
             }
         }
         self.residuals(&voters, after, map, &mut residuals)?;
-        let (mut sum, mut count) = (0.0, 0.0);
-        for residual in residuals.iter().filter(|residual| residual.is_finite()) {
-            sum += f64::from(residual.abs()).min(TRUNCATED);
-            count += 1.0;
-        }
-        map.iter().all(|value| value.is_finite()).then_some(sum / count)
+        map.iter().all(|value| value.is_finite()).then(|| truncated_mean(&residuals))
     }
 
     /// Pixels that vote at a level, evenly drawn, those beside the border or anything that is not finite left out.
@@ -251,16 +298,16 @@ impl Task<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Smooth waves, as they are at a place of the first frame.
-    fn waves(x: f64, y: f64) -> f64 {
+    pub fn waves(x: f64, y: f64) -> f64 {
         128.0 + 40.0 * (0.31 * x + 0.11 * y).sin() + 35.0 * (0.23 * y - 0.13 * x).cos()
     }
 
     /// Frames whose second shows the first one moved: `x' = x + u + A (x - c)`.
-    fn pair(translation: [f64; 2], a: [f64; 4]) -> (SmoothedLevels, SmoothedLevels) {
+    pub fn pair(translation: [f64; 2], a: [f64; 4]) -> (SmoothedLevels, SmoothedLevels) {
         let first = Frame::from_fn(120, 100, |x, y| waves(x as f64, y as f64) as f32);
         let [p, q, r, s] = [1.0 + a[0], a[1], a[2], 1.0 + a[3]];
         let determinant = p * s - q * r;
@@ -271,7 +318,7 @@ mod tests {
         (SmoothedLevels::new(&first), SmoothedLevels::new(&second))
     }
 
-    fn pixels() -> Vec<[f64; 2]> {
+    pub fn pixels() -> Vec<[f64; 2]> {
         (0..31).flat_map(|j| (0..41).map(move |i| [40.0 + f64::from(i), 35.0 + f64::from(j)])).collect()
     }
 

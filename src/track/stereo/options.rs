@@ -169,8 +169,6 @@ pub struct StereoTrackerOptions {
     pub arc_threshold: f64,
     /// Components with fewer pixels after moving are seeded anew (`improved`); default 20.
     pub reseed_below: f64,
-    /// Templates are searched within 2 cells of the last motion instead of everywhere (`improved`); default no.
-    pub predicted_windows: bool,
     /// Whether lost tracks are waited for (`improved`).
     pub recognition: Option<Recognition>,
     /// Whether clusters that move alike are put together (`improved`).
@@ -213,7 +211,6 @@ impl StereoTrackerOptions {
             luminance_levels: 64,
             arc_threshold: 0.4,
             reseed_below: 20.0,
-            predicted_windows: false,
             recognition: improved.then(Recognition::default),
             grouping: improved.then(Grouping::default),
             camera: None,
@@ -266,8 +263,10 @@ impl StereoTrackerOptions {
         }
         if let Some(limits) = &self.recognition {
             let lengths = limits.tolerance.iter().chain(&limits.tolerance_per_step);
-            let each =
-                [("least_overlap", limits.least_overlap), ("jump", limits.jump), ("jump", limits.jump_disparity)];
+            if !(0.0..=1.0).contains(&limits.least_overlap) {
+                return Err(Error::argument("least_overlap", "a share, 0 to 1", limits.least_overlap));
+            }
+            let each = [("jump", limits.jump), ("jump", limits.jump_disparity)];
             not_negative(each.into_iter().chain(lengths.map(|length| ("tolerance", *length))))?;
         }
         if let Some(Grouping { reach, motion, depth_motion }) = self.grouping {
@@ -322,6 +321,9 @@ mod tests {
         let limits = Recognition { tolerance: [3.0, -4.0, 1.0], ..Recognition::default() };
         let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
         assert!(options.check().unwrap_err().to_string().starts_with("tolerance: "));
+        let limits = Recognition { least_overlap: 1.1, ..Recognition::default() };
+        let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
+        assert!(options.check().unwrap_err().to_string().starts_with("least_overlap: "));
         assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
         assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
         assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));

@@ -25,18 +25,17 @@ fn occupied(clusters: &Clusters, cluster: usize, other: &Clusters, by: [i32; 3])
     counts
 }
 
-/// Looks for the shift in depth, up to `reach` layers about `centre`, at which one cluster of `other` occupies most voxels (31), the smaller shift of equals;
+/// Looks for the shift in depth, up to `reach` layers, at which one cluster of `other` occupies most voxels (31), the smaller shift of equals;
 /// the overlaps are those with all clusters there (32). Both counts are of voxels, so that they stay between 0 and 1.
 pub(super) fn depth_motion(
     clusters: &Clusters,
     cluster: usize,
     other: &Clusters,
     plane: [i32; 2],
-    centre: i32,
     reach: i32,
 ) -> Depth {
     let mut best: Option<(u32, i32, Vec<u32>)> = None;
-    for shift in centre - reach..=centre + reach {
+    for shift in -reach..=reach {
         let counts = occupied(clusters, cluster, other, [plane[0], plane[1], shift]);
         let most = counts.iter().copied().max().unwrap_or(0);
         let better = best
@@ -46,7 +45,7 @@ pub(super) fn depth_motion(
             best = Some((most, shift, counts));
         }
     }
-    let (_, shift, counts) = best.unwrap_or((0, centre, vec![0; other.components()]));
+    let (_, shift, counts) = best.unwrap_or((0, 0, vec![0; other.components()]));
     let all = clusters.members[cluster].len().max(1) as f64;
     Depth { shift, overlaps: counts.into_iter().map(|n| f64::from(n) / all).collect() }
 }
@@ -92,18 +91,27 @@ mod tests {
     fn the_shift_in_depth_is_where_most_voxels_meet() {
         let before = made_up(&[block([10, 10, 30], 0), block([40, 10, 30], 1)].concat(), 2);
         let after = made_up(&[block([12, 9, 33], 1), block([40, 10, 30], 0)].concat(), 2);
-        let depth = depth_motion(&before, 0, &after, [2, -1], 0, 8);
+        let depth = depth_motion(&before, 0, &after, [2, -1], 8);
         assert_eq!(depth, Depth { shift: 3, overlaps: vec![0.0, 1.0] });
         // Half of it is beyond: still 3, with half of the overlap.
         let half = made_up(&block([14, 9, 33], 1), 2);
-        assert_eq!(depth_motion(&before, 0, &half, [2, -1], 0, 8).overlaps, [0.0, 0.5]);
+        assert_eq!(depth_motion(&before, 0, &half, [2, -1], 8).overlaps, [0.0, 0.5]);
+    }
+
+    #[test]
+    fn voxels_count_whatever_they_hold() {
+        // Of two voxels one holds nine pixels; who meets it alone meets half.
+        let before = made_up(&[vec![([10, 10, 30], 0); 9], vec![([11, 10, 30], 0)]].concat(), 1);
+        let after = made_up(&[([10, 10, 30], 0), ([11, 10, 30], 1)], 2);
+        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8).overlaps, [0.5, 0.5]);
+        assert_eq!(moved_overlaps(&before, 0, &after, |i| before.points.at(i)), [0.5, 0.5]);
     }
 
     #[test]
     fn whom_nobody_meets_stays_and_overlaps_nothing() {
         let before = made_up(&block([10, 10, 30], 0), 1);
         let after = made_up(&block([60, 40, 5], 0), 1);
-        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 0, 8), Depth { shift: 0, overlaps: vec![0.0] });
+        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8), Depth { shift: 0, overlaps: vec![0.0] });
     }
 
     #[test]

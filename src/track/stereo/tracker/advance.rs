@@ -17,7 +17,7 @@ use super::StereoTracker;
 use super::cluster::Clustered;
 use super::record::{Arrival, Departure};
 use crate::error::Result;
-use crate::mixture::Posterior;
+use crate::mixture::{Points, Posterior};
 use crate::types::Frame;
 
 impl StereoTracker {
@@ -138,7 +138,7 @@ impl StereoTracker {
         Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
     }
 
-    /// What the motion of each component may be: its last one, or that of the nearest component whose last one is known. A cluster that has just been seeded has few pixels, often along one edge,
+    /// What the motion of each component may be: its last one, or that of the component which explains it best after itself. A cluster that has just been seeded has few pixels, often along one edge,
     /// which agree with many motions; what it probably belongs to is the better guess than a template of a few cells.
     fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Guess> {
         let known: Vec<(usize, [f64; 3])> = (0..components)
@@ -147,18 +147,28 @@ impl StereoTracker {
                 Some((k, std::array::from_fn(|i| velocity[i] * cell[i])))
             })
             .collect();
-        let mean = |k: usize| self.posterior.as_ref().and_then(|posterior| posterior.means.get(3 * k..3 * k + 3));
-        let apart = |a: usize, b: usize| match (mean(a), mean(b)) {
-            (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum(),
-            _ => f64::INFINITY,
-        };
         (0..components)
             .map(|k| {
-                let nearest = known.iter().min_by(|(a, _), (b, _)| apart(k, *a).total_cmp(&apart(k, *b)));
                 let last = known.iter().find(|(other, _)| *other == k).map(|(_, velocity)| *velocity);
-                Guess { last, beside: nearest.map(|(_, velocity)| *velocity) }
+                Guess { last, beside: self.beside(k, &known) }
             })
             .collect()
+    }
+
+    /// The motion of that component, of those whose motion is known, which explains the middle of component `k` best after itself.
+    fn beside(&self, k: usize, known: &[(usize, [f64; 3])]) -> Option<[f64; 3]> {
+        let posterior = self.posterior.as_ref()?;
+        let others: Vec<(usize, [f64; 3])> = known.iter().copied().filter(|(other, _)| *other != k).collect();
+        if others.is_empty() {
+            return None;
+        }
+        let kept: Vec<bool> =
+            (0..posterior.components()).map(|j| others.iter().any(|(other, _)| *other == j)).collect();
+        let mut rest = posterior.clone();
+        rest.retain(&kept);
+        let middle = Points { dimensions: 3, values: posterior.means.get(3 * k..3 * k + 3)?, weights: None };
+        let nearest = rest.labels(&middle).ok()?[0];
+        Some(others[nearest as usize].1)
     }
 
     /// How each cluster of the last step gets to the next view.
