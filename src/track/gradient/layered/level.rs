@@ -190,7 +190,7 @@ fn nodes(task: &Task<'_>, near: &Frame<bool>, sigma: f64) -> Vec<Node> {
 }
 
 /// Everything within `reach` points along both axes.
-fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
+pub(super) fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
     let (width, height) = mask.size();
     let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, reach, width)].contains(&true));
     Frame::from_fn(width, height, |i, j| wide(j, reach, height).any(|k| along.get(i, k)))

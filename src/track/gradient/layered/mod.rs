@@ -11,11 +11,14 @@ mod learn;
 mod level;
 mod look;
 mod nodes;
+mod outset;
 mod patch;
 mod pose;
 mod scene;
 mod search;
+mod segment;
 mod tell;
+mod uncover;
 
 use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
@@ -26,6 +29,7 @@ use camera::Seen;
 use find::{COVERED, DOUBT, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use layers::{Background, Target};
 use look::view;
+use outset::Outset;
 use pose::{Increment, Pose};
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
@@ -84,6 +88,8 @@ pub(super) struct Layered {
     with_camera: bool,
     /// Frames measured.
     age: usize,
+    /// What the first box held, until that is told.
+    outset: Option<Outset>,
 }
 
 /// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
@@ -102,13 +108,15 @@ fn begun(at: [f64; 2]) -> GaussMarkovFilter {
 
 impl Layered {
     pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+        let target = Target::new(&frame, bounds, learn::PRIOR);
         Self {
+            outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
                 Shape::Similarity => Freedom::Similarity,
                 Shape::Affine => Freedom::Affine,
             },
             camera: options.camera,
-            target: Target::new(&frame, bounds, learn::PRIOR),
+            target,
             background: Background::new(&frame, bounds),
             pose: Pose::at(bounds.centre()),
             filter: begun(bounds.centre()),
@@ -156,6 +164,7 @@ impl Layered {
         self.gap = 0;
         self.follow_camera(motion, &seen.frame);
         self.filter.predict();
+        self.look_back(&seen.frame, motion);
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
         match &finding {
             Some(found) => self.take(found, &seen.frame),
@@ -170,6 +179,7 @@ impl Layered {
 
     /// A frame that says nothing.
     fn pass_over(&mut self, state: &mut TrackState, reason: &'static str) {
+        self.outset.iter_mut().for_each(Outset::skip);
         self.filter.predict();
         self.miss();
         self.tell(state, None, [0.0; 2]);
@@ -266,6 +276,9 @@ impl Layered {
         let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
             self.learn(frame, aligned.gain, look.visibility);
+        } else if self.target.fresh.is_some() {
+            let view = view(frame, &self.target, &self.background, &self.pose);
+            learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
         }
     }
 
