@@ -112,7 +112,7 @@ impl<'a> Level<'a> {
 
     /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the target its support ends without the target ending.
     pub fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
-        let Task { frame, target, silence, .. } = self.task;
+        let Task { frame, target, silence, front, .. } = self.task;
         if silence == Silence::None {
             return None;
         }
@@ -137,6 +137,9 @@ impl<'a> Level<'a> {
             match silence {
                 Silence::None | Silence::Towards(_) => false,
                 Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
+                Silence::Front => {
+                    target.a.get(i, j) > SOLID && nearer_behind && front.is_some_and(|front| front.is_at(places.get(at)))
+                }
                 Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
                 Silence::Lookalike => !nearer_behind,
             }

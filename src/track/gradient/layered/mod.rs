@@ -6,6 +6,7 @@
 mod align;
 mod camera;
 mod find;
+mod front;
 mod layers;
 mod learn;
 mod level;
@@ -26,6 +27,7 @@ use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
+use front::Front;
 use find::{COVERED, DOUBT, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use layers::{Background, Target};
 use look::view;
@@ -90,6 +92,10 @@ pub(super) struct Layered {
     age: usize,
     /// What the first box held, until that is told.
     outset: Option<Outset>,
+    /// What hid part of it then, as long as it does.
+    front: Option<Front>,
+    /// How far the displacement since the first frame may be from what is said, until that is told, px.
+    doubt: [f64; 2],
 }
 
 /// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
@@ -110,6 +116,8 @@ impl Layered {
     pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
         let target = Target::new(&frame, bounds, learn::PRIOR);
         Self {
+            front: None,
+            doubt: [0.0; 2],
             outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
                 Shape::Similarity => Freedom::Similarity,
@@ -141,10 +149,9 @@ impl Layered {
 
     /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
     pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
-        self.filter.covariance().map(|mut axis| {
-            axis[0][0] += OUTLINE * OUTLINE;
-            axis
-        })
+        let mut covariance = self.filter.covariance();
+        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += OUTLINE * OUTLINE + doubt * doubt);
+        covariance
     }
 
     /// The next frame; `None`: it cannot be used.
@@ -170,6 +177,7 @@ impl Layered {
             Some(found) => self.take(found, &seen.frame),
             None => self.miss(),
         }
+        self.look_at_the_whole_way();
         self.tell(state, finding.as_ref(), motion);
         state.gain = self.gain * light;
         state.reacquired = was_lost && finding.is_some();
@@ -266,6 +274,7 @@ impl Layered {
             }
         }
         self.before = (!occluded).then_some(at);
+        self.front = self.front.take().filter(|front| occluded && !front.is_past(&self.target, &self.pose));
         (self.missed, self.hidden) = (0, occluded);
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;

@@ -87,6 +87,11 @@ impl Outset {
         hidden.map(|hidden| Uncovered { moved: moved.map(|m| m as f64), frames: self.frames, hidden })
     }
 
+    /// How far the target moved since the first frame, as far as is known, px.
+    pub fn moved(&self) -> [f64; 2] {
+        self.moved.map(|moved| moved as f64)
+    }
+
     /// Shorter side of the box, px.
     pub fn side(&self) -> f64 {
         self.bounds.width.min(self.bounds.height)

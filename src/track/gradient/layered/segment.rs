@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 
 /// Change over what noise makes that is beyond doubt.
 const CLEAR: f64 = 2.0;
-/// Pairs of pixels on either side of the still edge, over the shorter side of the box times the displacement.
+/// Pairs of pixels on either side of the still edge, over the shorter side of the box times the displacement but for a pixel.
 const EDGE: f64 = 0.4;
 /// Fewest of them.
 const FEWEST: usize = 12;
@@ -21,6 +21,8 @@ const WIDTH: (f64, f64) = (0.25, 2.0);
 const ALIKE: (f64, f64) = (3.0, 6.0);
 /// Share of the box that may be hidden.
 const HIDDEN: [f64; 2] = [0.05, 0.9];
+/// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half a side apart, those of a target that changes its shape are near each other.
+const APART: f64 = 0.3;
 /// Around the box, what is behind the target is told from, px.
 const AROUND: usize = 3;
 /// Longest way between pixels, as one counts that differ only by noise.
@@ -33,7 +35,7 @@ const FAR: f64 = 1e6;
 pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let evidence = Evidence::of(changes, moved);
     let look = TargetLook::of(changes, &evidence.moving)?;
-    let fewest = (EDGE * changes.outset.side() * (moved[0] as f64).hypot(moved[1] as f64)).max(FEWEST as f64);
+    let fewest = EDGE * changes.outset.side() * ((moved[0] as f64).hypot(moved[1] as f64) - 1.0);
     let first = &changes.outset.first.frame;
     let (mut still, mut agreed) = (Vec::new(), 0);
     for &(from, to) in &evidence.edge {
@@ -44,13 +46,35 @@ pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<b
             still.push(if came { from } else { to });
         }
     }
-    if (agreed as f64) < fewest.max(AGREED * evidence.edge.len() as f64) {
+    if (agreed as f64) < fewest.max(FEWEST as f64).max(AGREED * evidence.edge.len() as f64) {
         return None;
     }
+    if std::env::var("DBG").is_ok() { eprintln!("moved {moved:?} moving {} edge {} agreed {agreed} fewest {fewest} scatter {} behind {}", evidence.moving.len(), evidence.edge.len(), look.scatter, look.behind); }
     let hidden = spread(changes, &evidence.moving, &still);
-    let area = changes.inside(1).count() as f64;
-    let share = hidden.data().iter().filter(|hidden| **hidden).count() as f64 / area;
-    (HIDDEN[0]..HIDDEN[1]).contains(&share).then_some(hidden)
+    let parts = Parts::of(changes, &hidden);
+    let alone = (HIDDEN[0]..HIDDEN[1]).contains(&parts.share) && parts.apart > APART * changes.outset.side();
+    alone.then_some(hidden)
+}
+
+/// The two parts of the box.
+struct Parts {
+    /// Share that is hidden.
+    share: f64,
+    /// Distance of their middles, px.
+    apart: f64,
+}
+
+impl Parts {
+    fn of(changes: &Changes<'_>, hidden: &Frame<bool>) -> Self {
+        let mut sums = [[0.0; 3]; 2];
+        for [x, y] in changes.inside(1) {
+            let sum = &mut sums[usize::from(hidden.get(x, y))];
+            *sum = [sum[0] + 1.0, sum[1] + x as f64, sum[2] + y as f64];
+        }
+        let middle = |[count, x, y]: [f64; 3]| [x / count, y / count];
+        let [seen, not] = sums.map(middle);
+        Self { share: sums[1][0] / (sums[0][0] + sums[1][0]), apart: (seen[0] - not[0]).hypot(seen[1] - not[1]) }
+    }
 }
 
 /// What a displacement tells of single pixels.
@@ -71,12 +95,26 @@ impl Evidence {
             let stays = here <= changes.bar || there <= changes.bar && changes.outset.inside.get(to[0], to[1]);
             if along <= changes.bar && here.max(there) > clear {
                 moving.push(from);
-            } else if along > clear && stays {
+            } else if stays && unlike_all_around(changes, from, to) > clear {
                 edge.push((from, to));
             }
         }
         Self { moving, edge }
     }
+}
+
+/// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel, and targets turn and grow.
+fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
+    let first = &changes.outset.first.frame;
+    let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for row in around(y, first.height()) {
+        for value in &first.row(row)[around(x, first.width())] {
+            (low, high) = (low.min(*value), high.max(*value));
+        }
+    }
+    let now = changes.now.get(i, j);
+    (low - now).max(now - high)
 }
 
 /// How the target looks, from what is known to move.

@@ -1,6 +1,7 @@
 //! Beginning anew where something still hid part of the target in the first frame: that part is the target's all the same, but is not known yet, and what hides it is known.
 
 use super::find::YOUNG;
+use super::front::Front;
 use super::layers::{Background, UNSEEN, grown, holds};
 use super::learn::{CONTINUED, SOLID};
 use super::outset::{Outset, Uncovered};
@@ -11,12 +12,17 @@ use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is told in whole pixels, px^2.
 const WHOLE_PIXELS: f64 = 0.5;
+/// Least difference of displacements, of which one is told in whole pixels, px.
+const WHOLE: f64 = 1.0;
 /// Change in still places that noise does not make, over the noise.
 const STILL: f64 = 4.0;
 
 impl Layered {
     /// Looks whether the frame tells what the first box held.
     pub(super) fn look_back(&mut self, frame: &Frame<f64>, motion: [f64; 2]) {
+        if motion != [0.0; 2] {
+            self.front = None;
+        }
         let Some(mut outset) = self.outset.take().filter(|_| motion == [0.0; 2]) else { return };
         match outset.tell(frame, self.noise) {
             Some(found) => self.begin_anew(&outset, &found, frame),
@@ -47,6 +53,17 @@ impl Layered {
         (self.rate, self.before, self.usual) = ([0.0; 6], None, 1.0);
         (self.missed, self.hidden, self.age) = (0, true, YOUNG);
         (self.turned, self.wary) = (0.0, 0);
+        self.front = Front::of(outset, &found.hidden);
+    }
+
+    /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
+    pub(super) fn look_at_the_whole_way(&mut self) {
+        let Some(outset) = &self.outset else { return self.doubt = [0.0; 2] };
+        let (at, first) = (self.filter.position(), outset.bounds.centre());
+        self.doubt = [0, 1].map(|k| {
+            let apart = (at[k] - first[k] - outset.moved()[k]).abs();
+            if apart > WHOLE { apart } else { 0.0 }
+        });
     }
 }
 
