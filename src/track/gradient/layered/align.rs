@@ -166,7 +166,9 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
                 break;
             }
         }
-        gain = level.gain(&pose, gain);
+        // What stands before much of the target would be taken for its light.
+        let heard = silent.as_ref().filter(|_| task.silence == Silence::Front);
+        gain = level.gain(&pose, gain, heard);
     }
     let (inverse, s, round) = last?;
     if !pose.p.iter().chain(pose.a.as_flattened()).all(|value| value.is_finite()) {

@@ -54,8 +54,9 @@ pub(super) fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f6
     let (width, height) = fresh.size();
     let covered = Frame::from_fn(width, height, |i, j| {
         let at = j * width + i;
-        let behind = (view.seen[at] - view.behind[at]).abs();
-        view.seen[at].is_nan() || behind < least && behind < (view.seen[at] - gain * target.t.get(i, j)).abs()
+        let behind = (view.seen[at] - view.guess[at]).abs();
+        let alike = view.behind[at].is_nan() || behind < least;
+        view.seen[at].is_nan() || alike && behind < (view.seen[at] - gain * target.t.get(i, j)).abs()
     });
     let covered = dilated(&covered, 1);
     for at in 0..width * height {

@@ -147,12 +147,13 @@ impl<'a> Level<'a> {
         Some(dilated(&silent, 1 + self.sigma.ceil() as usize))
     }
 
-    /// Ratio of what is seen to the template.
-    pub fn gain(&mut self, pose: &Pose, before: f64) -> f64 {
+    /// Ratio of what is seen to the template, but for points that are `silent`.
+    pub fn gain(&mut self, pose: &Pose, before: f64, silent: Option<&Frame<bool>>) -> f64 {
         self.read(pose);
         let Task { frame, target, .. } = self.task;
         let Readings { places, seen, behind } = &self.readings;
-        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0;
+        let heard = |[i, j]: [usize; 2]| !silent.is_some_and(|silent| silent.get(i, j));
+        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0 && heard(node.at);
         let nodes = self.nodes.iter().enumerate();
         let mut ratios: Vec<f64> = nodes
             .filter(|(k, node)| solid(node) && is_inside(places.get(*k), frame))

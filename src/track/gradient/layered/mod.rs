@@ -289,6 +289,10 @@ impl Layered {
             let view = view(frame, &self.target, &self.background, &self.pose);
             learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
         }
+        if self.front.is_some() {
+            let bounds = self.bounds(&self.pose);
+            learn::learn_background(&mut self.background, frame, bounds, self.noise);
+        }
     }
 
     fn turn_to(&mut self, pose: &Pose) {

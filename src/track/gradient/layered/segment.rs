@@ -23,6 +23,8 @@ const ALIKE: (f64, f64) = (3.0, 6.0);
 const HIDDEN: [f64; 2] = [0.05, 0.9];
 /// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half a side apart, those of a target that changes its shape are near each other.
 const APART: f64 = 0.3;
+/// Share of either part that may not do as it should.
+const STRAY: f64 = 0.02;
 /// Around the box, what is behind the target is told from, px.
 const AROUND: usize = 3;
 /// Longest way between pixels, as one counts that differ only by noise.
@@ -49,11 +51,28 @@ pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<b
     if (agreed as f64) < fewest.max(FEWEST as f64).max(AGREED * evidence.edge.len() as f64) {
         return None;
     }
-    if std::env::var("DBG").is_ok() { eprintln!("moved {moved:?} moving {} edge {} agreed {agreed} fewest {fewest} scatter {} behind {}", evidence.moving.len(), evidence.edge.len(), look.scatter, look.behind); }
     let hidden = spread(changes, &evidence.moving, &still);
     let parts = Parts::of(changes, &hidden);
-    let alone = (HIDDEN[0]..HIDDEN[1]).contains(&parts.share) && parts.apart > APART * changes.outset.side();
-    alone.then_some(hidden)
+    let cut = (HIDDEN[0]..HIDDEN[1]).contains(&parts.share) && parts.apart > APART * changes.outset.side();
+    (cut && is_so(changes, &hidden, moved)).then_some(hidden)
+}
+
+/// Whether the two parts do as they should: what hides the target is as it was, and the target is as it was, moved along, but where it is hidden now.
+fn is_so(changes: &Changes<'_>, hidden: &Frame<bool>, moved: [isize; 2]) -> bool {
+    let (mut strays, mut counts) = ([0.0; 2], [0.0; 2]);
+    let clear = CLEAR * changes.bar;
+    for from in changes.inside(1) {
+        let is_hidden = hidden.get(from[0], from[1]);
+        let off = if is_hidden {
+            changes.at_rest(from) > clear
+        } else {
+            let to = changes.on(from, moved).filter(|to| !hidden.get(to[0], to[1]));
+            to.is_some_and(|to| unlike_all_around(changes, from, to) > clear)
+        };
+        counts[usize::from(is_hidden)] += 1.0;
+        strays[usize::from(is_hidden)] += f64::from(u8::from(off));
+    }
+    (0..2).all(|k| strays[k] <= STRAY * counts[k])
 }
 
 /// The two parts of the box.
