@@ -7,6 +7,7 @@
 
 mod detect;
 mod equations;
+mod extent;
 mod gauss_markov;
 mod kernels;
 mod layered;

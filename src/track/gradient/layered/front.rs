@@ -33,7 +33,8 @@ impl Front {
     /// Whether it is at a place of the picture, px.
     pub fn is_at(&self, place: [f64; 2]) -> bool {
         let (width, height) = self.there.size();
-        let pixel = |k: usize, length: usize| (place[k] - self.corner[k] + 0.5).clamp(0.0, length as f64 - 0.5) as usize;
+        let pixel =
+            |k: usize, length: usize| (place[k] - self.corner[k] + 0.5).clamp(0.0, length as f64 - 0.5) as usize;
         self.there.get(pixel(0, width), pixel(1, height))
     }
 

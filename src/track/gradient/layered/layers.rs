@@ -53,7 +53,15 @@ impl Target {
         let t = Frame::from_fn(shape[0], shape[1], |i, j| {
             cubic_at(frame, centre[0] + along(i, 0), centre[1] + along(j, 1))
         });
-        Self { a: prior.clone(), t, n: prior.map(|a| prior_weight * a), d: prior.map(|_| prior_weight), prior, fresh: None, size }
+        Self {
+            a: prior.clone(),
+            t,
+            n: prior.map(|a| prior_weight * a),
+            d: prior.map(|_| prior_weight),
+            prior,
+            fresh: None,
+            size,
+        }
     }
 
     /// Target coordinates of a node.

@@ -138,7 +138,9 @@ impl<'a> Level<'a> {
                 Silence::None | Silence::Towards(_) => false,
                 Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
                 Silence::Front => {
-                    target.a.get(i, j) > SOLID && nearer_behind && front.is_some_and(|front| front.is_at(places.get(at)))
+                    target.a.get(i, j) > SOLID
+                        && nearer_behind
+                        && front.is_some_and(|front| front.is_at(places.get(at)))
                 }
                 Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
                 Silence::Lookalike => !nearer_behind,

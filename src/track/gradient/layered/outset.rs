@@ -143,7 +143,8 @@ impl Changes<'_> {
     fn displacement(&self) -> Option<[isize; 2]> {
         let Outset { inside, frames, moved, .. } = self.outset;
         let (now, before) = (*frames as isize, *frames as isize - 1);
-        let (middle, reach) = if before == 0 { ([0; 2], REACH[0]) } else { (moved.map(|m| m * now / before), REACH[1]) };
+        let (middle, reach) =
+            if before == 0 { ([0; 2], REACH[0]) } else { (moved.map(|m| m * now / before), REACH[1]) };
         let beside = self.beside();
         let area = inside.data().iter().filter(|inside| **inside).count();
         let every = (area as f64 / VOTES).sqrt().ceil().max(1.0) as usize;

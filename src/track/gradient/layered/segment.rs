@@ -152,7 +152,11 @@ impl TargetLook {
         let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
         let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
         let scatter = MAD * median(&mut off);
-        (moving.len() >= FEWEST).then(|| Self { mean, scatter: scatter.max(changes.bar / 4.0), behind: behind(changes) })
+        (moving.len() >= FEWEST).then(|| Self {
+            mean,
+            scatter: scatter.max(changes.bar / 4.0),
+            behind: behind(changes),
+        })
     }
 
     /// Whether a brightness is the target's at a pixel.

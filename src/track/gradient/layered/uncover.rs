@@ -74,8 +74,7 @@ impl super::layers::Target {
         let hidden = Frame::from_fn(width, height, |i, j| hidden(self.xi(i, j)));
         let hidden = super::level::dilated(&hidden, 1);
         let known = |i, j| self.a.get(i, j) > SOLID && !hidden.get(i, j);
-        let mut t =
-            Frame::from_fn(width, height, |i, j| if known(i, j) { self.t.get(i, j) } else { f64::NAN });
+        let mut t = Frame::from_fn(width, height, |i, j| if known(i, j) { self.t.get(i, j) } else { f64::NAN });
         let mut reach = CONTINUED;
         while t.data().iter().any(|t| t.is_nan()) && reach < 2.0 * width.max(height) as f64 {
             let smooth = smooth_known(&t, reach);
