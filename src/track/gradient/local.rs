@@ -9,13 +9,10 @@ use super::gauss_markov::{GaussMarkovFilter, Measurement};
 use super::local_flow::{LocalFlow, MAD, MeanFlow, median};
 use super::options::{Control, GradientOptions};
 use super::rules::Rules;
+use super::window::{side, whole_pixels};
 use crate::image::Interpolation;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
-/// Side of the window of small targets, px.
-const FOV: usize = 51;
-/// Side of the window over that of a large target.
-const ROOM: f64 = 1.6;
 /// Pixels around the window that masks need.
 const MARGIN: usize = 6;
 /// Fewest moving pixels that a target is.
@@ -74,7 +71,7 @@ impl LocalLoop {
         let rules = Rules::of(options);
         let centre = bounds.centre();
         let mut this = Self {
-            fov: window(options.fov, bounds, frame.size()),
+            fov: side(options.fov, bounds, frame.size()),
             control: options.control,
             eps: options.eps,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
@@ -313,28 +310,4 @@ impl LocalLoop {
         (state.line_of_sight, state.fov) = (self.line_of_sight(), self.fov());
         state.flow_count = count;
     }
-}
-
-/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a window has a middle.
-fn window(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
-    let needed = (ROOM * bounds.width.max(bounds.height)) as usize;
-    wanted.unwrap_or(needed.max(FOV)).min(2 * width.max(height)) | 1
-}
-
-/// A square of the frame from a corner on; NaN outside.
-fn whole_pixels(frame: &Frame<f64>, corner: [isize; 2], side: usize) -> Frame<f64> {
-    // Columns or rows of the square that are in the frame.
-    let within = |corner: isize, length: usize| {
-        let first = (-corner).clamp(0, side as isize);
-        let end = (length as isize - corner).clamp(first, side as isize);
-        first as usize..end as usize
-    };
-    let columns = within(corner[0], frame.width());
-    let mut out = Frame::filled(side, side, f64::NAN);
-    for y in within(corner[1], frame.height()).filter(|_| !columns.is_empty()) {
-        let from = (corner[0] + columns.start as isize) as usize;
-        let row = &frame.row((corner[1] + y as isize) as usize)[from..from + columns.len()];
-        out.row_mut(y)[columns.clone()].copy_from_slice(row);
-    }
-    out
 }

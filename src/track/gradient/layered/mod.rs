@@ -27,7 +27,7 @@ use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{COVERED, DOUBT, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
+use find::{COVERED, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use front::Front;
 use layers::{Background, Target};
 use look::view;
@@ -194,28 +194,6 @@ impl Layered {
         (state.reason, state.reacquired) = (reason, false);
         let size = self.previous.frame.size();
         self.hold_beyond_the_border(state, size);
-    }
-
-    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
-    fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
-        let against = motion.map(|m| -m);
-        if motion != [0.0; 2] && self.with_camera {
-            self.shift(against);
-        }
-        let first = self.find(frame);
-        let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
-        if motion == [0.0; 2] || nis(&first) < SURE {
-            return first;
-        }
-        let (there, back) = if self.with_camera { (motion, against) } else { (against, motion) };
-        self.shift(there);
-        let second = self.find(frame);
-        if nis(&second) < nis(&first) {
-            self.with_camera = !self.with_camera;
-            return second;
-        }
-        self.shift(back);
-        first
     }
 
     /// Where the filter expects the target.

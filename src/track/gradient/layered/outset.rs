@@ -188,3 +188,68 @@ impl Changes<'_> {
         if count > 0.0 { sum / count } else { CAP }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    const SIDE: usize = 20;
+
+    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before texture.
+    fn scene(moved: [usize; 2], hidden_to: usize, seed: u64) -> Frame<f64> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(110, 80, |x, y| {
+            let target = (40 + moved[0]..40 + moved[0] + SIDE).contains(&x)
+                && (30 + moved[1]..30 + moved[1] + SIDE).contains(&y);
+            let behind = 90.0 + 20.0 * (0.3 * x as f64).sin() * (0.2 * y as f64).cos();
+            let brightness = match (x < hidden_to, target) {
+                (true, _) => 130.0,
+                (_, true) => 200.0,
+                _ => behind,
+            };
+            brightness + 1.5 * rng.normal((110 * y + x) as u64)
+        })
+    }
+
+    /// What is told when the square has moved once.
+    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<Uncovered> {
+        let first = scene([0; 2], hidden_to, 1);
+        let mut outset = Outset::new(&first, bounds, Target::new(&first, bounds, 144.0));
+        outset.tell(&scene(moved, hidden_to, 2), 1.5)
+    }
+
+    fn exact() -> TargetBox {
+        TargetBox { x: 39.5, y: 29.5, width: SIDE as f64, height: SIDE as f64 }
+    }
+
+    #[test]
+    fn what_hides_part_of_the_box_is_told_to_the_pixel() {
+        for hidden_to in [44, 50, 54] {
+            let found = told(exact(), [4, 1], hidden_to).unwrap();
+            assert_eq!((found.moved, found.frames), ([4.0, 1.0], 1));
+            let count = found.hidden.data().iter().filter(|hidden| **hidden).count();
+            assert_eq!(count, (hidden_to - 40) * SIDE, "{hidden_to}");
+        }
+    }
+
+    #[test]
+    fn a_target_that_nothing_hides_is_left_alone_whether_its_box_is_right_or_not() {
+        assert!(told(exact(), [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
+        // What does not move tells nothing.
+        assert!(told(exact(), [0, 0], 50).is_none());
+    }
+
+    #[test]
+    fn waiting_ends() {
+        let first = scene([0; 2], 50, 1);
+        let mut outset = Outset::new(&first, exact(), Target::new(&first, exact(), 144.0));
+        for _ in 0..FRAMES {
+            assert!(!outset.is_over());
+            outset.skip();
+        }
+        assert!(outset.is_over());
+    }
+}
