@@ -92,7 +92,7 @@ impl Layered {
     /// The target in the frame, if it is seen well enough to be measured.
     pub(super) fn find(&self, frame: &Frame<f64>) -> Option<Finding> {
         if self.front.is_some() {
-            return self.behind_the_front(frame);
+            return self.behind_the_front(frame).or_else(|| self.searched(frame));
         }
         let interrupted = self.hidden || self.missed > 0;
         let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };

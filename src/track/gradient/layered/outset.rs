@@ -41,6 +41,8 @@ pub(super) struct Outset {
     pub inside: Frame<bool>,
     frames: usize,
     moved: [isize; 2],
+    /// Frames at which that was told.
+    told: usize,
 }
 
 /// Part of the first box is something still before the target.
@@ -62,7 +64,7 @@ impl Outset {
         let ((width, height), [x0, y0]) = (first.frame.size(), first.corner);
         let inside = Frame::from_fn(width, height, |x, y| holds(&bounds, x + x0, y + y0));
         let between = half_a_pixel_around(&first.frame);
-        Self { bounds, target, first, cut, between, inside, frames: 0, moved: [0; 2] }
+        Self { bounds, target, first, cut, between, inside, frames: 0, moved: [0; 2], told: 0 }
     }
 
     /// Whether nothing more is waited for.
@@ -83,13 +85,13 @@ impl Outset {
         let moved = changes.displacement()?;
         let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
         let hidden = if told { segment::hidden(&changes, moved) } else { None };
-        self.moved = moved;
+        (self.moved, self.told) = (moved, self.frames);
         hidden.map(|hidden| Uncovered { moved: moved.map(|m| m as f64), frames: self.frames, hidden })
     }
 
-    /// How far the target moved since the first frame, as far as is known, px.
-    pub fn moved(&self) -> [f64; 2] {
-        self.moved.map(|moved| moved as f64)
+    /// How far all that moved did since the first frame, px; `None` where the last frame does not tell it.
+    pub fn moved(&self) -> Option<[f64; 2]> {
+        (self.told == self.frames && self.frames > 0).then(|| self.moved.map(|moved| moved as f64))
     }
 
     /// Shorter side of the box, px.

@@ -12,8 +12,8 @@ use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is told in whole pixels, px^2.
 const WHOLE_PIXELS: f64 = 0.5;
-/// Least difference of displacements, of which one is told in whole pixels, px.
-const WHOLE: f64 = 1.0;
+/// Difference of displacements that whole pixels, and what is behind the target, may make, px.
+const WHOLE: f64 = 2.0;
 /// Change in still places that noise does not make, over the noise.
 const STILL: f64 = 4.0;
 
@@ -58,11 +58,14 @@ impl Layered {
 
     /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
     pub(super) fn look_at_the_whole_way(&mut self) {
-        let Some(outset) = &self.outset else { return self.doubt = [0.0; 2] };
-        let (at, first) = (self.filter.position(), outset.bounds.centre());
+        let told = self.outset.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
+        let Some((moved, first)) = told else { return self.doubt = [0.0; 2] };
+        let (at, size) = (self.filter.position(), self.target.size);
+        // The sides of what grows move otherwise than its middle.
+        let grown = (self.pose.scale() - 1.0).abs();
         self.doubt = [0, 1].map(|k| {
-            let apart = (at[k] - first[k] - outset.moved()[k]).abs();
-            if apart > WHOLE { apart } else { 0.0 }
+            let apart = (at[k] - first[k] - moved[k]).abs();
+            if apart > WHOLE + 0.5 * grown * size[k] { apart } else { 0.0 }
         });
     }
 }
