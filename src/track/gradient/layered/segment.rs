@@ -148,7 +148,9 @@ impl TargetLook {
         let first = &changes.outset.first.frame;
         let (width, height) = first.size();
         let mut known = Frame::filled(width, height, f64::NAN);
-        moving.iter().for_each(|[x, y]| known.row_mut(*y)[*x] = first.get(*x, *y));
+        for [x, y] in moving {
+            known.row_mut(*y)[*x] = first.get(*x, *y);
+        }
         let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
         let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
         let scatter = MAD * median(&mut off);
