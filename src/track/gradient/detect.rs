@@ -179,7 +179,7 @@ fn displacement(
 }
 
 /// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels, objects do not move by those.
-fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
+pub(super) fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
     let (width, height) = frame.size();
     Frame::from_fn(width, height, |x, y| {
         let own = frame.get(x, y);

@@ -4,17 +4,15 @@
 //! gate for innovations, and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
 use super::detect::detect_moving_target;
+use super::extent::{Ends, Extent, ends};
 use super::gauss_markov::{GaussMarkovFilter, Measurement};
 use super::local_flow::{LocalFlow, MAD, MeanFlow, median};
 use super::options::{Control, GradientOptions};
 use super::rules::Rules;
+use super::window::{side, whole_pixels};
 use crate::image::Interpolation;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
-/// Side of the window of small targets, px.
-const FOV: usize = 51;
-/// Side of the window over that of a large target.
-const ROOM: f64 = 1.6;
 /// Pixels around the window that masks need.
 const MARGIN: usize = 6;
 /// Fewest moving pixels that a target is.
@@ -37,6 +35,8 @@ const SLIP: f64 = 2.0;
 const LEAST_SPEED: f64 = 1.0;
 /// Share of the usual count below which what is left of a target is about to be hidden, and not to stop.
 const HIDDEN: f64 = 0.6;
+/// Share of the usual count that is missing where what is left tells nothing of the target's ends.
+const HARDLY: f64 = 0.6;
 /// Frames without motion after which the target counts as lost.
 const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
@@ -57,6 +57,9 @@ pub(super) struct LocalLoop {
     before: Frame<f64>,
     /// How many pixels of the target move where none is hidden; 0: not known yet.
     usual: f64,
+    extent: Extent,
+    /// Sides of the picture, px.
+    lengths: [f64; 2],
     /// Share of these that moved in the last frame in which any did.
     seen: f64,
     refused: usize,
@@ -68,7 +71,7 @@ impl LocalLoop {
         let rules = Rules::of(options);
         let centre = bounds.centre();
         let mut this = Self {
-            fov: window(options.fov, bounds, frame.size()),
+            fov: side(options.fov, bounds, frame.size()),
             control: options.control,
             eps: options.eps,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
@@ -76,6 +79,8 @@ impl LocalLoop {
             sight: centre,
             before: Frame::default(),
             usual: 0.0,
+            extent: Extent::new([bounds.width, bounds.height].map(|side| side + 0.5 * rules.flow.window as f64)),
+            lengths: [frame.width() as f64, frame.height() as f64],
             seen: 1.0,
             refused: 0,
             missed: 0,
@@ -98,16 +103,17 @@ impl LocalLoop {
     /// The next frame; `None`: it cannot be used.
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
         let second = frame.map(|frame| self.cut(frame));
-        let found = second.as_ref().map(|second| self.measure(second));
+        let told = second.as_ref().map(|second| self.measure(second));
+        let (found, ends) = (told.map(|told| told.0), told.and_then(|told| told.1));
         let was_lost = self.missed >= LOST_AFTER;
         self.filter.predict();
         let (mut innovation, mut measured) = (f64::NAN, false);
         match &found {
             Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
-                let place = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
-                let [r_pos, r_vel] = self.rules.variances;
                 let missing = if self.rules.careful { 1.0 - self.share(mean.count) } else { 0.0 };
-                let [lean, slip] = self.hidden(missing);
+                let (place, lean) = self.place(mean, ends.as_ref(), missing);
+                let slip = self.slip(missing);
+                let [r_pos, r_vel] = self.rules.variances;
                 let mut z = Measurement {
                     position: Some((place, lean.map(|lean| r_pos + lean * lean))),
                     velocity: Some((mean.velocity, slip.map(|slip| r_vel + slip * slip))),
@@ -120,6 +126,9 @@ impl LocalLoop {
                     self.filter.update(&z);
                     (self.refused, measured) = (0, true);
                     self.count(mean.count);
+                    if let Some(ends) = ends.filter(|_| self.seen >= 1.0) {
+                        self.extent.learn(&ends);
+                    }
                 } else {
                     self.refused += 1;
                 }
@@ -141,12 +150,21 @@ impl LocalLoop {
         self.tell(state, found, (innovation, measured, was_lost));
     }
 
-    /// Deviations of the middle of what moves from the target's, px, and of its mean flow from the target's, px/frame, along x and y, where a share of it is `missing`:
-    /// outlines are what moves, so that a side that is hidden takes its quarter of them from far out.
-    fn hidden(&self, missing: f64) -> [[f64; 2]; 2] {
-        let speed = self.filter.speed();
-        let slip = speed.map(|speed| SLIP * missing * speed.abs().max(LEAST_SPEED));
-        [self.size.map(|length| missing * length), slip]
+    /// Where the target is by what moves, and the deviations of that along x and y beyond what noise makes, px, where a share of what usually moves is `missing`: the middle between its ends, or the mean
+    /// where these are not the target's alone. Outlines are what moves, so that a side that is hidden takes its quarter of the mean from far out.
+    fn place(&self, mean: &MeanFlow, ends: Option<&Ends>, missing: f64) -> ([f64; 2], [f64; 2]) {
+        let of_mean = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
+        let Some(ends) = ends else { return (of_mean, self.size.map(|length| missing * length)) };
+        let between = self.extent.middle(ends, self.filter.position(), self.lengths);
+        // Of what hardly shows the ends are anything's.
+        let hardly = if missing > HARDLY { missing } else { 0.0 };
+        let lean = |k: usize| self.size[k] * between[k].map_or(missing, |middle| middle.missing.max(hardly));
+        ([0, 1].map(|k| between[k].map_or(of_mean[k], |middle| middle.at)), [0, 1].map(lean))
+    }
+
+    /// Deviations of the mean flow from the target's along x and y, px/frame, where a share of what usually moves is `missing`.
+    fn slip(&self, missing: f64) -> [f64; 2] {
+        self.filter.speed().map(|speed| SLIP * missing * speed.abs().max(LEAST_SPEED))
     }
 
     /// Share of the target that moves, by the usual count.
@@ -178,7 +196,7 @@ impl LocalLoop {
     }
 
     /// What moves in the window between the last frame and the `second`, which is that of this one.
-    fn measure(&self, second: &Frame<f64>) -> MeanFlow {
+    fn measure(&self, second: &Frame<f64>) -> (MeanFlow, Option<Ends>) {
         let first = &self.before;
         let velocity = self.filter.speed();
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
@@ -188,7 +206,10 @@ impl LocalLoop {
         let mut mean = flow.mean(eps);
         let corner = self.corner();
         mean.centroid = [mean.centroid[0] + corner[0], mean.centroid[1] + corner[1]];
-        mean
+        // What is farther than a step of local flow moves where it was and where it is.
+        let near = mean.velocity[0].hypot(mean.velocity[1]) < self.rules.flow.step_max;
+        let ends = ends(&flow, eps).filter(|_| self.rules.careful && near);
+        (mean, ends.map(|ends| [0, 1].map(|k| ends[k].map(|end| end + corner[k] + mean.velocity[k]))))
     }
 
     /// Centre of the window that is cut.
@@ -289,28 +310,4 @@ impl LocalLoop {
         (state.line_of_sight, state.fov) = (self.line_of_sight(), self.fov());
         state.flow_count = count;
     }
-}
-
-/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a window has a middle.
-fn window(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
-    let needed = (ROOM * bounds.width.max(bounds.height)) as usize;
-    wanted.unwrap_or(needed.max(FOV)).min(2 * width.max(height)) | 1
-}
-
-/// A square of the frame from a corner on; NaN outside.
-fn whole_pixels(frame: &Frame<f64>, corner: [isize; 2], side: usize) -> Frame<f64> {
-    // Columns or rows of the square that are in the frame.
-    let within = |corner: isize, length: usize| {
-        let first = (-corner).clamp(0, side as isize);
-        let end = (length as isize - corner).clamp(first, side as isize);
-        first as usize..end as usize
-    };
-    let columns = within(corner[0], frame.width());
-    let mut out = Frame::filled(side, side, f64::NAN);
-    for y in within(corner[1], frame.height()).filter(|_| !columns.is_empty()) {
-        let from = (corner[0] + columns.start as isize) as usize;
-        let row = &frame.row((corner[1] + y as isize) as usize)[from..from + columns.len()];
-        out.row_mut(y)[columns.clone()].copy_from_slice(row);
-    }
-    out
 }

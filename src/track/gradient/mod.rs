@@ -7,6 +7,7 @@
 
 mod detect;
 mod equations;
+mod extent;
 mod gauss_markov;
 mod kernels;
 mod layered;
@@ -15,6 +16,7 @@ mod local_flow;
 mod options;
 mod refine;
 mod rules;
+mod window;
 
 pub use detect::{MovingTarget, detect_moving_target};
 pub use gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};

@@ -1,5 +1,6 @@
 //! The gradient step over the whole target: equation (5) of the paper with the unknowns of an affine map.
 
+use super::front::Front;
 use super::layers::{Background, Target};
 use super::level::{Level, STEP_MAX, Vote};
 use super::pose::{Increment, Pose};
@@ -69,6 +70,8 @@ pub(super) enum Silence {
     Covered,
     /// Nor those beside it that look like it: a look-alike touches.
     Lookalike,
+    /// Not those of the target where what stands in front of it is what is seen.
+    Front,
     /// Not those of the half that lies in a direction, in the picture.
     Towards([f64; 2]),
 }
@@ -79,6 +82,7 @@ pub(super) struct Task<'a> {
     pub frame: &'a Frame<f64>,
     pub target: &'a Target,
     pub background: &'a Background,
+    pub front: Option<&'a Front>,
     pub noise: f64,
     pub freedom: Freedom,
     pub silence: Silence,
@@ -162,7 +166,9 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
                 break;
             }
         }
-        gain = level.gain(&pose, gain);
+        // What stands before much of the target would be taken for its light.
+        let heard = silent.as_ref().filter(|_| task.silence == Silence::Front);
+        gain = level.gain(&pose, gain, heard);
     }
     let (inverse, s, round) = last?;
     if !pose.p.iter().chain(pose.a.as_flattened()).all(|value| value.is_finite()) {

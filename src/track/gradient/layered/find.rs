@@ -21,6 +21,8 @@ const BADLY: f64 = 0.6;
 pub(super) const LEAST: [f64; 2] = [0.35, 0.5];
 /// Innovation squared from which on a measurement is doubted.
 pub(super) const DOUBT: f64 = 12.0;
+/// Least visibility of a target that is known to be hidden in part.
+const FEWEST: f64 = 0.1;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const YOUNG: usize = 6;
 /// Least difference of the target from what is behind it, over the noise.
@@ -74,6 +76,7 @@ impl Layered {
             frame,
             target: &self.target,
             background: &self.background,
+            front: self.front.as_ref(),
             noise: self.noise,
             freedom,
             silence,
@@ -88,6 +91,9 @@ impl Layered {
 
     /// The target in the frame, if it is seen well enough to be measured.
     pub(super) fn find(&self, frame: &Frame<f64>) -> Option<Finding> {
+        if self.front.is_some() {
+            return self.behind_the_front(frame).or_else(|| self.searched(frame));
+        }
         let interrupted = self.hidden || self.missed > 0;
         let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
@@ -107,6 +113,16 @@ impl Layered {
         }
         let least = LEAST[usize::from(self.missed > 0)];
         best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
+    }
+
+    /// The target comes out from what hid part of it in the first frame, or goes behind it: its size is that of the first box.
+    fn behind_the_front(&self, frame: &Frame<f64>) -> Option<Finding> {
+        let how = (Freedom::Translation, Silence::Front, PRIOR, &LEVELS[1..]);
+        let found = self.try_at(frame, &self.expected(false), how)?;
+        let whole = found.look.visibility > 1.0 - if self.is_large() { SLIGHT } else { DROP };
+        let seen = found.look.visibility >= FEWEST && found.look.contrast >= VISIBLE * self.noise;
+        let reason = if whole { "" } else { COVERED };
+        seen.then_some(Finding { occluded: !whole, reason, ..found })
     }
 
     /// Something known covers the target: only its position is looked for, where it is not covered.

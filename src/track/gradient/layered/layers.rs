@@ -33,6 +33,8 @@ pub(super) struct Target {
     pub n: Frame<f64>,
     /// As above.
     pub d: Frame<f64>,
+    /// How much of what is seen next of a point becomes its brightness, where that was hidden at first; 0 where it was seen.
+    pub fresh: Option<Frame<f64>>,
     /// Sides at first, px.
     pub size: [f64; 2],
 }
@@ -51,7 +53,15 @@ impl Target {
         let t = Frame::from_fn(shape[0], shape[1], |i, j| {
             cubic_at(frame, centre[0] + along(i, 0), centre[1] + along(j, 1))
         });
-        Self { a: prior.clone(), t, n: prior.map(|a| prior_weight * a), d: prior.map(|_| prior_weight), prior, size }
+        Self {
+            a: prior.clone(),
+            t,
+            n: prior.map(|a| prior_weight * a),
+            d: prior.map(|_| prior_weight),
+            prior,
+            fresh: None,
+            size,
+        }
     }
 
     /// Target coordinates of a node.
@@ -147,7 +157,7 @@ impl Background {
     }
 
     /// Unknown pixels get the mean of the known ones around the box.
-    fn guess(&mut self, hidden: &TargetBox) {
+    pub fn guess(&mut self, hidden: &TargetBox) {
         let around = grown(*hidden, (0.0, 3.0));
         let pixels = || (0..self.known.height()).flat_map(|y| (0..self.known.width()).map(move |x| (x, y)));
         let known: Vec<f64> = pixels()

@@ -1,6 +1,7 @@
 //! What is learnt from a frame in which the target was seen well.
 
 use super::layers::{Background, Target, UNSEEN, grown, holds};
+use super::level::dilated;
 use super::look::View;
 use super::patch::smooth_known;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
@@ -18,9 +19,9 @@ const BACKGROUND_RATE: f64 = 0.3;
 /// Longest step of the background where it changes suddenly, grey levels.
 const SUDDEN_STEP: f64 = 1.5;
 /// Support from which on the template is learnt; outside it goes on as it is there.
-const SOLID: f64 = 0.9;
+pub(super) const SOLID: f64 = 0.9;
 /// Width of that continuation, px of the target.
-const CONTINUED: f64 = 2.0;
+pub(super) const CONTINUED: f64 = 2.0;
 /// Least noise, grey levels.
 pub(super) const LEAST_NOISE: f64 = 1.5;
 /// How much of the noise's last measurement is taken.
@@ -30,6 +31,7 @@ const SAMPLES: usize = 4096;
 
 /// Support and brightness of the target.
 pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f64) {
+    learn_fresh(target, view, gain, noise);
     for at in 0..view.seen.len() {
         let (seen, behind) = (view.seen[at], view.behind[at]);
         let (bright, a) = (gain * target.t.data()[at], target.a.data()[at]);
@@ -43,6 +45,29 @@ pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f
         target.t.data_mut()[at] = (target.t.data()[at] + step / gain.max(0.1)) * gain;
     }
     continue_template(target);
+}
+
+/// Brightness of points that were hidden at first: the mean of what is seen of them, and not of what hides them, until they are known as well as others.
+pub(super) fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f64) {
+    let Some(mut fresh) = target.fresh.take() else { return };
+    let least = 4.0 * noise + 6.0;
+    let (width, height) = fresh.size();
+    let covered = Frame::from_fn(width, height, |i, j| {
+        let at = j * width + i;
+        let behind = (view.seen[at] - view.guess[at]).abs();
+        let alike = view.behind[at].is_nan() || behind < least;
+        view.seen[at].is_nan() || alike && behind < (view.seen[at] - gain * target.t.get(i, j)).abs()
+    });
+    let covered = dilated(&covered, 1);
+    for at in 0..width * height {
+        let rate = fresh.data()[at];
+        if rate > TEMPLATE_RATE && !covered.data()[at] {
+            target.t.data_mut()[at] += rate * (view.seen[at] / gain.max(0.1) - target.t.data()[at]);
+            fresh.data_mut()[at] = rate / (1.0 + rate);
+        }
+    }
+    let unknown = fresh.data().iter().any(|rate| *rate > TEMPLATE_RATE);
+    target.fresh = unknown.then_some(fresh);
 }
 
 /// `a` that explains the frames so far in the sense of least squares, beginning with the box.

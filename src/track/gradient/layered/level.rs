@@ -112,7 +112,7 @@ impl<'a> Level<'a> {
 
     /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the target its support ends without the target ending.
     pub fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
-        let Task { frame, target, silence, .. } = self.task;
+        let Task { frame, target, silence, front, .. } = self.task;
         if silence == Silence::None {
             return None;
         }
@@ -137,6 +137,11 @@ impl<'a> Level<'a> {
             match silence {
                 Silence::None | Silence::Towards(_) => false,
                 Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
+                Silence::Front => {
+                    target.a.get(i, j) > SOLID
+                        && nearer_behind
+                        && front.is_some_and(|front| front.is_at(places.get(at)))
+                }
                 Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
                 Silence::Lookalike => !nearer_behind,
             }
@@ -144,12 +149,13 @@ impl<'a> Level<'a> {
         Some(dilated(&silent, 1 + self.sigma.ceil() as usize))
     }
 
-    /// Ratio of what is seen to the template.
-    pub fn gain(&mut self, pose: &Pose, before: f64) -> f64 {
+    /// Ratio of what is seen to the template, but for points that are `silent`.
+    pub fn gain(&mut self, pose: &Pose, before: f64, silent: Option<&Frame<bool>>) -> f64 {
         self.read(pose);
         let Task { frame, target, .. } = self.task;
         let Readings { places, seen, behind } = &self.readings;
-        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0;
+        let heard = |[i, j]: [usize; 2]| !silent.is_some_and(|silent| silent.get(i, j));
+        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0 && heard(node.at);
         let nodes = self.nodes.iter().enumerate();
         let mut ratios: Vec<f64> = nodes
             .filter(|(k, node)| solid(node) && is_inside(places.get(*k), frame))
@@ -190,7 +196,7 @@ fn nodes(task: &Task<'_>, near: &Frame<bool>, sigma: f64) -> Vec<Node> {
 }
 
 /// Everything within `reach` points along both axes.
-fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
+pub(super) fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
     let (width, height) = mask.size();
     let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, reach, width)].contains(&true));
     Frame::from_fn(width, height, |i, j| wide(j, reach, height).any(|k| along.get(i, k)))

@@ -6,16 +6,20 @@
 mod align;
 mod camera;
 mod find;
+mod front;
 mod layers;
 mod learn;
 mod level;
 mod look;
 mod nodes;
+mod outset;
 mod patch;
 mod pose;
 mod scene;
 mod search;
+mod segment;
 mod tell;
+mod uncover;
 
 use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
@@ -23,9 +27,11 @@ use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{COVERED, DOUBT, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
+use find::{COVERED, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
+use front::Front;
 use layers::{Background, Target};
 use look::view;
+use outset::Outset;
 use pose::{Increment, Pose};
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
@@ -84,6 +90,12 @@ pub(super) struct Layered {
     with_camera: bool,
     /// Frames measured.
     age: usize,
+    /// What the first box held, until that is told.
+    outset: Option<Outset>,
+    /// What hid part of it then, as long as it does.
+    front: Option<Front>,
+    /// How far the displacement since the first frame may be from what is said, until that is told, px.
+    doubt: [f64; 2],
 }
 
 /// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
@@ -102,13 +114,17 @@ fn begun(at: [f64; 2]) -> GaussMarkovFilter {
 
 impl Layered {
     pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+        let target = Target::new(&frame, bounds, learn::PRIOR);
         Self {
+            front: None,
+            doubt: [0.0; 2],
+            outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
                 Shape::Similarity => Freedom::Similarity,
                 Shape::Affine => Freedom::Affine,
             },
             camera: options.camera,
-            target: Target::new(&frame, bounds, learn::PRIOR),
+            target,
             background: Background::new(&frame, bounds),
             pose: Pose::at(bounds.centre()),
             filter: begun(bounds.centre()),
@@ -133,10 +149,9 @@ impl Layered {
 
     /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
     pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
-        self.filter.covariance().map(|mut axis| {
-            axis[0][0] += OUTLINE * OUTLINE;
-            axis
-        })
+        let mut covariance = self.filter.covariance();
+        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += OUTLINE * OUTLINE + doubt * doubt);
+        covariance
     }
 
     /// The next frame; `None`: it cannot be used.
@@ -156,11 +171,13 @@ impl Layered {
         self.gap = 0;
         self.follow_camera(motion, &seen.frame);
         self.filter.predict();
+        self.look_back(&seen.frame, motion);
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
         match &finding {
             Some(found) => self.take(found, &seen.frame),
             None => self.miss(),
         }
+        self.look_at_the_whole_way();
         self.tell(state, finding.as_ref(), motion);
         state.gain = self.gain * light;
         state.reacquired = was_lost && finding.is_some();
@@ -170,34 +187,13 @@ impl Layered {
 
     /// A frame that says nothing.
     fn pass_over(&mut self, state: &mut TrackState, reason: &'static str) {
+        self.outset.iter_mut().for_each(Outset::skip);
         self.filter.predict();
         self.miss();
         self.tell(state, None, [0.0; 2]);
         (state.reason, state.reacquired) = (reason, false);
         let size = self.previous.frame.size();
         self.hold_beyond_the_border(state, size);
-    }
-
-    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
-    fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
-        let against = motion.map(|m| -m);
-        if motion != [0.0; 2] && self.with_camera {
-            self.shift(against);
-        }
-        let first = self.find(frame);
-        let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
-        if motion == [0.0; 2] || nis(&first) < SURE {
-            return first;
-        }
-        let (there, back) = if self.with_camera { (motion, against) } else { (against, motion) };
-        self.shift(there);
-        let second = self.find(frame);
-        if nis(&second) < nis(&first) {
-            self.with_camera = !self.with_camera;
-            return second;
-        }
-        self.shift(back);
-        first
     }
 
     /// Where the filter expects the target.
@@ -256,6 +252,7 @@ impl Layered {
             }
         }
         self.before = (!occluded).then_some(at);
+        self.front = self.front.take().filter(|front| occluded && !front.is_past(&self.target, &self.pose));
         (self.missed, self.hidden) = (0, occluded);
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
@@ -266,6 +263,13 @@ impl Layered {
         let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
             self.learn(frame, aligned.gain, look.visibility);
+        } else if self.target.fresh.is_some() {
+            let view = view(frame, &self.target, &self.background, &self.pose);
+            learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
+        }
+        if self.front.is_some() {
+            let bounds = self.bounds(&self.pose);
+            learn::learn_background(&mut self.background, frame, bounds, self.noise);
         }
     }
 

@@ -1,7 +1,8 @@
 //! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
 
 use super::camera::{self, Seen};
-use super::{Layered, learn};
+use super::find::{DOUBT, Finding};
+use super::{Layered, SURE, learn};
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
@@ -59,7 +60,29 @@ impl Layered {
         self.shift(motion);
     }
 
-    pub(super) fn shift(&mut self, motion: [f64; 2]) {
+    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
+    pub(super) fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
+        let against = motion.map(|m| -m);
+        if motion != [0.0; 2] && self.with_camera {
+            self.shift(against);
+        }
+        let first = self.find(frame);
+        let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
+        if motion == [0.0; 2] || nis(&first) < SURE {
+            return first;
+        }
+        let (there, back) = if self.with_camera { (motion, against) } else { (against, motion) };
+        self.shift(there);
+        let second = self.find(frame);
+        if nis(&second) < nis(&first) {
+            self.with_camera = !self.with_camera;
+            return second;
+        }
+        self.shift(back);
+        first
+    }
+
+    fn shift(&mut self, motion: [f64; 2]) {
         self.filter.shift(motion);
         let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
         self.before = self.before.map(shifted);

@@ -1,0 +1,257 @@
+//! What the first box held besides the target: something still before it. In the first frames that move, what moves is told from what does not.
+//!
+//! A box that holds half a target and half of what hides it makes a template of both, and the still edge between them holds the target back. The first frame is therefore kept for a while, and
+//! that displacement since then is looked for that explains what changed: what lies in the displaced box shows the first box moved along, or the scene as it was.
+
+use super::layers::{Target, holds};
+use super::patch::{Bounds, Patch, bounds_about};
+use super::segment;
+use crate::track::gradient::detect::half_a_pixel_around;
+use crate::types::{Frame, TargetBox};
+
+/// Frames that are waited for the target to move.
+const FRAMES: usize = 12;
+/// Farthest displacement from the first frame, px.
+const FARTHEST: isize = 20;
+/// Farthest displacement from where it is expected, px: in the first step, and later.
+const REACH: [isize; 2] = [10, 5];
+/// Displacement, px squared, beyond which what moves is told from what does not.
+const LEAST: isize = 2;
+/// Change over the deviation of a difference that noise does not make.
+const CHANGE: f64 = 3.0;
+/// Difference that all larger ones count as, grey levels.
+const CAP: f64 = 40.0;
+/// Of the displacements that explain the frames nearly as well as the best the smallest is taken: worse by this share, or by this share of a strip a pixel wide along the shorter side.
+const NEARLY: [f64; 2] = [0.05, 0.25];
+/// Share of the change that may be left.
+const LEFT: f64 = 0.5;
+/// Pixels that judge a displacement, about.
+const VOTES: f64 = 1024.0;
+
+/// The first frame about the box.
+#[derive(Debug)]
+pub(super) struct Outset {
+    pub bounds: TargetBox,
+    pub target: Target,
+    pub first: Patch,
+    cut: Bounds,
+    /// Least and greatest brightness within half a pixel.
+    between: Frame<[f64; 2]>,
+    /// Pixels in the box.
+    pub inside: Frame<bool>,
+    frames: usize,
+    moved: [isize; 2],
+    /// Frames at which that was told.
+    told: usize,
+}
+
+/// Part of the first box is something still before the target.
+#[derive(Debug)]
+pub(super) struct Uncovered {
+    /// How far the target moved since the first frame, px.
+    pub moved: [f64; 2],
+    /// Frames since then.
+    pub frames: usize,
+    /// Pixels of the patch that are in the box and not the target's.
+    pub hidden: Frame<bool>,
+}
+
+impl Outset {
+    pub fn new(frame: &Frame<f64>, bounds: TargetBox, target: Target) -> Self {
+        let reach = [bounds.width, bounds.height].map(|side| side / 2.0 + FARTHEST as f64 + 2.0);
+        let cut = bounds_about(bounds.centre(), reach, frame.size());
+        let first = Patch::cut(frame, cut);
+        let ((width, height), [x0, y0]) = (first.frame.size(), first.corner);
+        let inside = Frame::from_fn(width, height, |x, y| holds(&bounds, x + x0, y + y0));
+        let between = half_a_pixel_around(&first.frame);
+        Self { bounds, target, first, cut, between, inside, frames: 0, moved: [0; 2], told: 0 }
+    }
+
+    /// Whether nothing more is waited for.
+    pub fn is_over(&self) -> bool {
+        self.frames >= FRAMES || self.moved.iter().any(|moved| moved.abs() >= FARTHEST)
+    }
+
+    /// A frame that is not looked at.
+    pub fn skip(&mut self) {
+        self.frames += 1;
+    }
+
+    /// What the next frame tells of the first box.
+    pub fn tell(&mut self, frame: &Frame<f64>, noise: f64) -> Option<Uncovered> {
+        self.frames += 1;
+        let now = Patch::cut(frame, self.cut).frame;
+        let changes = Changes { outset: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 };
+        let moved = changes.displacement()?;
+        let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
+        let hidden = if told { segment::hidden(&changes, moved) } else { None };
+        (self.moved, self.told) = (moved, self.frames);
+        hidden.map(|hidden| Uncovered { moved: moved.map(|m| m as f64), frames: self.frames, hidden })
+    }
+
+    /// How far all that moved did since the first frame, px; `None` where the last frame does not tell it.
+    pub fn moved(&self) -> Option<[f64; 2]> {
+        (self.told == self.frames && self.frames > 0).then(|| self.moved.map(|moved| moved as f64))
+    }
+
+    /// Shorter side of the box, px.
+    pub fn side(&self) -> f64 {
+        self.bounds.width.min(self.bounds.height)
+    }
+}
+
+/// A later frame beside the first.
+pub(super) struct Changes<'a> {
+    pub outset: &'a Outset,
+    pub now: Frame<f64>,
+    /// Largest change that noise makes, grey levels.
+    pub bar: f64,
+}
+
+impl Changes<'_> {
+    /// Pixels in the box, every so many along both axes.
+    pub fn inside(&self, every: usize) -> impl Iterator<Item = [usize; 2]> {
+        let (width, height) = self.now.size();
+        let all = (0..height).step_by(every).flat_map(move |y| (0..width).step_by(every).map(move |x| [x, y]));
+        all.filter(|[x, y]| self.outset.inside.get(*x, *y))
+    }
+
+    /// A pixel of the patch moved on; `None` beyond the patch.
+    pub fn on(&self, [x, y]: [usize; 2], [dx, dy]: [isize; 2]) -> Option<[usize; 2]> {
+        let (i, j) = (x as isize + dx, y as isize + dy);
+        let (width, height) = self.now.size();
+        let inside = i >= 0 && j >= 0 && i < width as isize && j < height as isize;
+        inside.then_some([i as usize, j as usize])
+    }
+
+    /// Change at a pixel, grey levels.
+    pub fn at_rest(&self, [x, y]: [usize; 2]) -> f64 {
+        (self.now.get(x, y) - self.outset.first.frame.get(x, y)).abs()
+    }
+
+    /// Change from what was at one pixel to what is at another, but for what fractions of a pixel make, grey levels.
+    pub fn along(&self, from: [usize; 2], to: [usize; 2]) -> f64 {
+        let [low, high] = self.outset.between.get(from[0], from[1]);
+        let now = self.now.get(to[0], to[1]);
+        (low - now).max(now - high).max(0.0)
+    }
+
+    /// What noise does not make of a change.
+    fn excess(&self, change: f64) -> f64 {
+        (change - self.bar).clamp(0.0, CAP)
+    }
+
+    /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves, or not as a whole.
+    fn displacement(&self) -> Option<[isize; 2]> {
+        let Outset { inside, frames, moved, .. } = self.outset;
+        let (now, before) = (*frames as isize, *frames as isize - 1);
+        let (middle, reach) =
+            if before == 0 { ([0; 2], REACH[0]) } else { (moved.map(|m| m * now / before), REACH[1]) };
+        let beside = self.beside();
+        let area = inside.data().iter().filter(|inside| **inside).count();
+        let every = (area as f64 / VOTES).sqrt().ceil().max(1.0) as usize;
+        let cost = |d: [isize; 2]| beside + (every * every) as f64 * self.within(d, every);
+        let rest = cost([0; 2]);
+        let all: Vec<_> = (-reach..=reach)
+            .flat_map(|dy| (-reach..=reach).map(move |dx| [middle[0] + dx, middle[1] + dy]))
+            .map(|d| (cost(d), d))
+            .collect();
+        let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
+        let bar = best + NEARLY[0] * best + NEARLY[1] * self.contrast() * self.outset.side();
+        if rest <= bar || best > LEFT * rest {
+            return None;
+        }
+        let nearly = all.into_iter().filter(|(cost, _)| *cost <= bar);
+        nearly.min_by_key(|(_, d)| d[0] * d[0] + d[1] * d[1]).map(|(_, d)| d)
+    }
+
+    /// Change beside the box, grey levels.
+    fn beside(&self) -> f64 {
+        let pixels = self.now.data().iter().zip(self.outset.first.frame.data()).zip(self.outset.inside.data());
+        pixels.filter(|(_, inside)| !**inside).map(|((now, first), _)| self.excess((now - first).abs())).sum()
+    }
+
+    /// What is left of it, and of what changed in the box, where the box moved on.
+    fn within(&self, d: [isize; 2], every: usize) -> f64 {
+        let left = |from: [usize; 2]| {
+            let Some(to) = self.on(from, d) else { return 0.0 };
+            let rest = self.excess(self.at_rest(to));
+            let moved = self.excess(self.along(from, to));
+            rest.min(moved) - if self.outset.inside.get(to[0], to[1]) { 0.0 } else { rest }
+        };
+        self.inside(every).map(left).sum()
+    }
+
+    /// Mean of the changes that noise does not make, grey levels.
+    fn contrast(&self) -> f64 {
+        let pixels = self.now.data().iter().zip(self.outset.first.frame.data());
+        let changes = pixels.map(|(now, first)| self.excess((now - first).abs())).filter(|change| *change > 0.0);
+        let (sum, count) = changes.fold((0.0, 0.0), |(sum, count), change| (sum + change, count + 1.0));
+        if count > 0.0 { sum / count } else { CAP }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    const SIDE: usize = 20;
+
+    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before texture.
+    fn scene(moved: [usize; 2], hidden_to: usize, seed: u64) -> Frame<f64> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(110, 80, |x, y| {
+            let target = (40 + moved[0]..40 + moved[0] + SIDE).contains(&x)
+                && (30 + moved[1]..30 + moved[1] + SIDE).contains(&y);
+            let behind = 90.0 + 20.0 * (0.3 * x as f64).sin() * (0.2 * y as f64).cos();
+            let brightness = match (x < hidden_to, target) {
+                (true, _) => 130.0,
+                (_, true) => 200.0,
+                _ => behind,
+            };
+            brightness + 1.5 * rng.normal((110 * y + x) as u64)
+        })
+    }
+
+    /// What is told when the square has moved once.
+    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<Uncovered> {
+        let first = scene([0; 2], hidden_to, 1);
+        let mut outset = Outset::new(&first, bounds, Target::new(&first, bounds, 144.0));
+        outset.tell(&scene(moved, hidden_to, 2), 1.5)
+    }
+
+    fn exact() -> TargetBox {
+        TargetBox { x: 39.5, y: 29.5, width: SIDE as f64, height: SIDE as f64 }
+    }
+
+    #[test]
+    fn what_hides_part_of_the_box_is_told_to_the_pixel() {
+        for hidden_to in [44, 50, 54] {
+            let found = told(exact(), [4, 1], hidden_to).unwrap();
+            assert_eq!((found.moved, found.frames), ([4.0, 1.0], 1));
+            let count = found.hidden.data().iter().filter(|hidden| **hidden).count();
+            assert_eq!(count, (hidden_to - 40) * SIDE, "{hidden_to}");
+        }
+    }
+
+    #[test]
+    fn a_target_that_nothing_hides_is_left_alone_whether_its_box_is_right_or_not() {
+        assert!(told(exact(), [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
+        // What does not move tells nothing.
+        assert!(told(exact(), [0, 0], 50).is_none());
+    }
+
+    #[test]
+    fn waiting_ends() {
+        let first = scene([0; 2], 50, 1);
+        let mut outset = Outset::new(&first, exact(), Target::new(&first, exact(), 144.0));
+        for _ in 0..FRAMES {
+            assert!(!outset.is_over());
+            outset.skip();
+        }
+        assert!(outset.is_over());
+    }
+}

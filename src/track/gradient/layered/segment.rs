@@ -1,0 +1,220 @@
+//! Which pixels of the first box are the target's, and which are of something still before it.
+
+use super::outset::Changes;
+use super::patch::smooth_known;
+use crate::track::gradient::local_flow::{MAD, median};
+use crate::types::Frame;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Change over what noise makes that is beyond doubt.
+const CLEAR: f64 = 2.0;
+/// Pairs of pixels on either side of the still edge, over the shorter side of the box times the displacement but for a pixel.
+const EDGE: f64 = 0.4;
+/// Fewest of them.
+const FEWEST: usize = 12;
+/// Share of them that look as they should.
+const AGREED: f64 = 0.6;
+/// Width of the mean of what is known to move, share of the shorter side, and least, px.
+const WIDTH: (f64, f64) = (0.25, 2.0);
+/// Difference from it, over its scatter, of what looks like the target; and grey levels.
+const ALIKE: (f64, f64) = (3.0, 6.0);
+/// Share of the box that may be hidden.
+const HIDDEN: [f64; 2] = [0.05, 0.9];
+/// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half a side apart, those of a target that changes its shape are near each other.
+const APART: f64 = 0.3;
+/// Share of either part that may not do as it should.
+const STRAY: f64 = 0.02;
+/// Around the box, what is behind the target is told from, px.
+const AROUND: usize = 3;
+/// Longest way between pixels, as one counts that differ only by noise.
+const FAR: f64 = 1e6;
+
+/// Pixels of the box that something still hides the target at; `None` without evidence for such a thing.
+///
+/// Wherever the target slides along a still edge, what was there in the first frame is neither followed by it nor changed. What is on the target's side of that edge looks like what is known to move, on the
+/// other side it does not. A margin that is behind the target differs: there the target leaves what does not look like it.
+pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
+    let evidence = Evidence::of(changes, moved);
+    let look = TargetLook::of(changes, &evidence.moving)?;
+    let fewest = EDGE * changes.outset.side() * ((moved[0] as f64).hypot(moved[1] as f64) - 1.0);
+    let first = &changes.outset.first.frame;
+    let (mut still, mut agreed) = (Vec::new(), 0);
+    for &(from, to) in &evidence.edge {
+        let came = look.holds(changes.now.get(to[0], to[1]), to);
+        let was = look.holds(first.get(from[0], from[1]), from);
+        if came != was {
+            agreed += 1;
+            still.push(if came { from } else { to });
+        }
+    }
+    if (agreed as f64) < fewest.max(FEWEST as f64).max(AGREED * evidence.edge.len() as f64) {
+        return None;
+    }
+    let hidden = spread(changes, &evidence.moving, &still);
+    let parts = Parts::of(changes, &hidden);
+    let cut = (HIDDEN[0]..HIDDEN[1]).contains(&parts.share) && parts.apart > APART * changes.outset.side();
+    (cut && is_so(changes, &hidden, moved)).then_some(hidden)
+}
+
+/// Whether the two parts do as they should: what hides the target is as it was, and the target is as it was, moved along, but where it is hidden now.
+fn is_so(changes: &Changes<'_>, hidden: &Frame<bool>, moved: [isize; 2]) -> bool {
+    let (mut strays, mut counts) = ([0.0; 2], [0.0; 2]);
+    let clear = CLEAR * changes.bar;
+    for from in changes.inside(1) {
+        let is_hidden = hidden.get(from[0], from[1]);
+        let off = if is_hidden {
+            changes.at_rest(from) > clear
+        } else {
+            let to = changes.on(from, moved).filter(|to| !hidden.get(to[0], to[1]));
+            to.is_some_and(|to| unlike_all_around(changes, from, to) > clear)
+        };
+        counts[usize::from(is_hidden)] += 1.0;
+        strays[usize::from(is_hidden)] += f64::from(u8::from(off));
+    }
+    (0..2).all(|k| strays[k] <= STRAY * counts[k])
+}
+
+/// The two parts of the box.
+struct Parts {
+    /// Share that is hidden.
+    share: f64,
+    /// Distance of their middles, px.
+    apart: f64,
+}
+
+impl Parts {
+    fn of(changes: &Changes<'_>, hidden: &Frame<bool>) -> Self {
+        let mut sums = [[0.0; 3]; 2];
+        for [x, y] in changes.inside(1) {
+            let sum = &mut sums[usize::from(hidden.get(x, y))];
+            *sum = [sum[0] + 1.0, sum[1] + x as f64, sum[2] + y as f64];
+        }
+        let middle = |[count, x, y]: [f64; 3]| [x / count, y / count];
+        let [seen, not] = sums.map(middle);
+        Self { share: sums[1][0] / (sums[0][0] + sums[1][0]), apart: (seen[0] - not[0]).hypot(seen[1] - not[1]) }
+    }
+}
+
+/// What a displacement tells of single pixels.
+struct Evidence {
+    /// Pixels of the first box that were followed by the displacement, and not by rest.
+    moving: Vec<[usize; 2]>,
+    /// Pixels of it with those that they would be at now, where the displacement does not hold and nothing changed at the first or at the second.
+    edge: Vec<([usize; 2], [usize; 2])>,
+}
+
+impl Evidence {
+    fn of(changes: &Changes<'_>, moved: [isize; 2]) -> Self {
+        let (mut moving, mut edge) = (Vec::new(), Vec::new());
+        let clear = CLEAR * changes.bar;
+        for from in changes.inside(1) {
+            let Some(to) = changes.on(from, moved) else { continue };
+            let (along, here, there) = (changes.along(from, to), changes.at_rest(from), changes.at_rest(to));
+            let stays = here <= changes.bar || there <= changes.bar && changes.outset.inside.get(to[0], to[1]);
+            if along <= changes.bar && here.max(there) > clear {
+                moving.push(from);
+            } else if stays && unlike_all_around(changes, from, to) > clear {
+                edge.push((from, to));
+            }
+        }
+        Self { moving, edge }
+    }
+}
+
+/// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel, and targets turn and grow.
+fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
+    let first = &changes.outset.first.frame;
+    let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for row in around(y, first.height()) {
+        for value in &first.row(row)[around(x, first.width())] {
+            (low, high) = (low.min(*value), high.max(*value));
+        }
+    }
+    let now = changes.now.get(i, j);
+    (low - now).max(now - high)
+}
+
+/// How the target looks, from what is known to move.
+struct TargetLook {
+    mean: Frame<f64>,
+    scatter: f64,
+    behind: f64,
+}
+
+impl TargetLook {
+    fn of(changes: &Changes<'_>, moving: &[[usize; 2]]) -> Option<Self> {
+        let first = &changes.outset.first.frame;
+        let (width, height) = first.size();
+        let mut known = Frame::filled(width, height, f64::NAN);
+        for [x, y] in moving {
+            known.row_mut(*y)[*x] = first.get(*x, *y);
+        }
+        let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
+        let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
+        let scatter = MAD * median(&mut off);
+        (moving.len() >= FEWEST).then(|| Self {
+            mean,
+            scatter: scatter.max(changes.bar / 4.0),
+            behind: behind(changes),
+        })
+    }
+
+    /// Whether a brightness is the target's at a pixel.
+    fn holds(&self, value: f64, [x, y]: [usize; 2]) -> bool {
+        let off = (value - self.mean.get(x, y)).abs();
+        // Far from all that moves nothing is known, and nothing holds.
+        off < ALIKE.0 * self.scatter + ALIKE.1 && off < (value - self.behind).abs()
+    }
+}
+
+/// Mean brightness around the box in the first frame, grey levels.
+fn behind(changes: &Changes<'_>) -> f64 {
+    let inside = &changes.outset.inside;
+    let (width, height) = inside.size();
+    let near = |at: usize, length: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(length);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in 0..height {
+        for x in (0..width).filter(|x| !inside.get(*x, y)) {
+            if near(y, height).any(|j| inside.row(j)[near(x, width)].contains(&true)) {
+                sum += changes.outset.first.frame.get(x, y);
+                count += 1.0;
+            }
+        }
+    }
+    if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+/// Every pixel of the box belongs to the nearer of what moves and of what is still, by ways that avoid steps of brightness.
+fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) -> Frame<bool> {
+    let first = &changes.outset.first.frame;
+    let (width, height) = first.size();
+    let mut hidden = Frame::filled(width, height, false);
+    let mut reached = Frame::filled(width, height, u64::MAX);
+    let mut next = BinaryHeap::new();
+    for (seeds, label) in [(moving, false), (still, true)] {
+        for &[x, y] in seeds {
+            reached.row_mut(y)[x] = 0;
+            next.push(Reverse((0, y, x, label)));
+        }
+    }
+    while let Some(Reverse((way, y, x, label))) = next.pop() {
+        if way > reached.get(x, y) {
+            continue;
+        }
+        hidden.row_mut(y)[x] = label;
+        for (i, j) in [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)] {
+            if i >= width || j >= height || !changes.outset.inside.get(i, j) {
+                continue;
+            }
+            let step = (first.get(i, j) - first.get(x, y)) / changes.bar;
+            let longer = way + (1.0 + (3.0 * step).powi(2)).min(FAR) as u64;
+            if longer < reached.get(i, j) {
+                reached.row_mut(j)[i] = longer;
+                next.push(Reverse((longer, j, i, label)));
+            }
+        }
+    }
+    hidden
+}
