@@ -8,8 +8,8 @@ use crate::simd::{Level, SimdReal};
 
 /// A motion must leave so many times less of the frames than the one that it replaces, what is usually left added to both: less is chance.
 const ADVANTAGE: f64 = 1.1;
-/// Where less of a window than this is seen, what a motion leaves there tells nothing.
-const LEAST_SEEN: f64 = 0.5;
+/// Where less of a window than this is seen, less than in a corner of the frame, what a motion leaves there tells nothing.
+const LEAST_SEEN: f64 = 0.1;
 
 /// What motions are compared by.
 pub(super) struct Comparison<'a, T> {

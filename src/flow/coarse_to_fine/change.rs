@@ -62,10 +62,10 @@ pub(super) fn settle<T: SimdReal>(
     [coupled, rest].into_iter().chain(acceleration).for_each(|planes| space.keep(planes));
     if !central {
         // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or turns back does not go on as it came.
-        workspace.clear_large();
+        workspace.give_back_large();
         let (own, chosen) = refine(simd, space, &Options::default(), &ahead, &data);
         chosen.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
-        workspace.clear_large();
+        workspace.give_back_large();
         let level = &pyramid.levels()[last];
         Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own);
         space.keep(own);

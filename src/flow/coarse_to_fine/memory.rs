@@ -74,6 +74,14 @@ impl<T: SimdReal> Workspace<T> {
         lock(&self.space.free).clear();
     }
 
+    /// Gives what is free back to the system if there is so much memory that it matters more than the time to get it again: blocks of other sizes would not fit into it.
+    pub fn give_back_large(&self) {
+        if self.is_large() {
+            self.clear();
+            give_back();
+        }
+    }
+
     /// Gives all but what is `needed` back to the system. That takes time, since the next estimate has to ask for it again.
     pub fn give_back<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
         *self = Self::default();
