@@ -70,7 +70,9 @@ pub(super) fn settle<T: SimdReal>(
         Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own);
         space.keep(own);
     }
-    [ahead, data].into_iter().for_each(|planes| space.keep(planes));
+    for planes in [ahead, data] {
+        space.keep(planes);
+    }
     evidence
 }
 

@@ -92,7 +92,9 @@ impl Plan {
         finer(self.simd, &above, level.size, &mut own);
         let comparison = Comparison { simd: self.simd, level, compared: Compared::Ahead, scale, pool, space };
         comparison.take_better(motion, &own);
-        [above, data, own].into_iter().for_each(|planes| space.keep(planes));
+        for planes in [above, data, own] {
+            space.keep(planes);
+        }
     }
 
     /// From the coarsest of the levels that `limits` names, on which `motion` is, down to the level `to`.
