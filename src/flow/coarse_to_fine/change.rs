@@ -34,6 +34,7 @@ pub(super) fn settle<T: SimdReal>(
     central: bool,
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
+    workspace.give_back_large();
     let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
     let Workspace { pyramid, pool, space, .. } = &*workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
@@ -48,19 +49,22 @@ pub(super) fn settle<T: SimdReal>(
         let left = difference(space, &ahead, &coupled, &data);
         space.keep(std::mem::replace(&mut rest, left));
     }
-    let mut evidence = None;
-    if central {
-        if let Some(acceleration) = &acceleration {
-            add(motion, acceleration, -1.0);
+    space.keep(coupled);
+    if let Some(acceleration) = acceleration {
+        if central {
+            add(motion, &acceleration, -1.0);
         }
-    } else {
+        space.keep(acceleration);
+    }
+    let mut evidence = None;
+    if !central {
+        workspace.give_back_large();
         let (change, chosen) = refine(simd, space, &Options::for_changes(), &rest, &data);
         add(motion, &change, 1.0);
-        space.keep(change);
+        for planes in [change, rest] {
+            space.keep(planes);
+        }
         evidence = chosen;
-    }
-    [coupled, rest].into_iter().chain(acceleration).for_each(|planes| space.keep(planes));
-    if !central {
         // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or turns back does not go on as it came.
         workspace.give_back_large();
         let (own, chosen) = refine(simd, space, &Options::default(), &ahead, &data);

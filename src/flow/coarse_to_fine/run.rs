@@ -90,6 +90,8 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
     if is_triple {
         // About the refined motion the residual is noise; about the coupled one it is also what the windows of the data smooth away.
         evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
+        // The data term and what refinement leaves would be the most memory there ever is.
+        workspace.give_back_large();
         let better = plan.again(workspace, &motion);
         for planes in [motion, found.motion, found.data] {
             workspace.space.keep(planes);
