@@ -43,6 +43,12 @@ use std::sync::{Mutex, PoisonError};
 /// Most site rows of a band: the halo above and below costs a sixth of 32 rows, a tenth of 48; more would leave threads without work.
 const BAND: usize = 48;
 
+/// Rows of each band: all alike, and as many bands as two threads can share. The split depends on the size alone.
+fn band_rows(height: usize) -> usize {
+    let bands = height.div_ceil(BAND);
+    height.div_ceil(if bands > 1 { bands.next_multiple_of(2) } else { bands })
+}
+
 /// Planes of the motion that comes in: `u, v, u_x, v_x, u_y, v_y`.
 pub(super) const MOTION: usize = 6;
 
@@ -150,8 +156,7 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
                 .map_or(T::from_f64(0.0), |s| T::from_f64(1.0 / (self.options.robust * s.to_f64()).max(1e-15))),
             stride: out.stride(),
         };
-        // Bands of equal height: the split depends on the size alone.
-        let rows = height.div_ceil(height.div_ceil(BAND));
+        let rows = band_rows(height);
         let len = out.row_len();
         let residuals: Vec<Vec<T>> = out
             .data_mut()

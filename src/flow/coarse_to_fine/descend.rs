@@ -8,6 +8,7 @@ use super::levels::{Compared, PyramidLevel};
 use super::memory::{Space, Workspace};
 use super::options::{Effort, Limits};
 use super::range::Range;
+use super::refine::PITCH;
 use super::resample::{coarser, finer, rederive};
 use crate::simd::{Level, SimdReal};
 
@@ -18,8 +19,10 @@ const LEAST_SCALE: f64 = 4e-3;
 
 /// A site that an iteration moves further than this is on its way, px of the level.
 const FAR: f64 = 0.1;
-/// So many of those may be an object that is too small to be felt in the mean over the frame.
-const OBJECT: usize = 4;
+/// Side of an object that is too small to be felt in the mean over the frame, but is waited for, px of the frame.
+const OBJECT: f64 = 20.0;
+/// So many sites are no chance, on whatever level.
+const FEW: usize = 4;
 /// Sites along the edge that do not count: what leaves the frame there may drift for ever.
 const RIM: usize = 2;
 
@@ -61,7 +64,7 @@ impl Plan {
     /// Once more about a better `motion`, on the finest level.
     pub fn again<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let start = copy(&workspace.space, motion);
-        self.descend(workspace, Compared::All, start, (&vec![self.effort.up_to(1); self.last + 1], self.last))
+        self.descend(workspace, Compared::All, start, (&vec![self.effort.up_to(self.last, 1); self.last + 1], self.last))
     }
 
     /// The way for the step to the next frame alone, from two levels above the finest down. It begins with what is known of all frames together, the `motion`, but for what the next
@@ -74,7 +77,7 @@ impl Plan {
             self.take_own(workspace, first, &mut start);
         }
         let most = |k: usize| self.effort.ahead[k.saturating_sub(self.last)];
-        let limits: Vec<_> = (0..=first).map(|k| self.effort.up_to(most(k))).collect();
+        let limits: Vec<_> = (0..=first).map(|k| self.effort.up_to(k, most(k))).collect();
         self.descend(workspace, Compared::Ahead, start, (&limits, self.last))
     }
 
@@ -121,7 +124,7 @@ impl Plan {
                 rederive(&old, &mut motion);
                 let change = step.iterate(level, &limit.coupling, &mut motion);
                 // On the finest level what is left to do is for the coarser ones to have done.
-                let is_calm = || k == self.last || moving(&old, &motion) < OBJECT;
+                let is_calm = || k == self.last || moving(&old, &motion) < object(k);
                 if change <= limit.settled && is_calm() {
                     break;
                 }
@@ -133,6 +136,12 @@ impl Plan {
         space.keep_small(data);
         Found { motion, data: summary, scale }
     }
+}
+
+/// Sites that the smallest object that is waited for has on level `k` of the pyramid.
+fn object(k: usize) -> usize {
+    let side = OBJECT / PITCH / (1_usize << k) as f64;
+    FEW.max((side * side) as usize)
 }
 
 /// How many sites, but for those of the rim, an iteration moved by more than [`FAR`].

@@ -144,7 +144,9 @@ fn scale<T: SimdReal>(from: &Frame<T>, range: Range, to: &mut Frame<T>) {
 
 /// The usable pixels, if some are not.
 fn holes<T: SimdReal>(frame: &Frame<T>, range: Range, mask: Option<&Mask>) -> Option<Mask> {
-    if mask.is_none() && frame.data().iter().all(|value| range.holds(value.to_f64())) {
+    // Without a short circuit within a task, so that the compiler may use lanes.
+    let all_hold = |part: &[T]| part.iter().fold(true, |so_far, value| so_far & range.holds(value.to_f64()));
+    if mask.is_none() && frame.data().par_chunks(CHUNK).all(all_hold) {
         return None;
     }
     let usable = Frame::from_fn(frame.width(), frame.height(), |x, y| {

@@ -47,21 +47,21 @@ impl Preset {
                 last: 1,
                 iterations: [3, 4, 4],
                 ahead: [2, 5, 5],
-                settled: 0.02,
+                settled: [0.02; 2],
                 coupling: Coupling { sweeps: 4, ..coupling },
             },
             Self::Balanced => Effort {
                 last: 0,
                 iterations: [3, 5, 5],
                 ahead: [2, 5, 5],
-                settled: 0.023,
+                settled: [0.03, 0.023],
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
             },
             Self::Accurate => Effort {
                 last: 0,
                 iterations: [4, 6, 6],
                 ahead: [4, 6, 6],
-                settled: 0.003,
+                settled: [0.003; 2],
                 coupling: Coupling { break_at: 0.2, ..coupling },
             },
         }
@@ -77,8 +77,8 @@ pub(super) struct Effort {
     pub iterations: [usize; 3],
     /// The same for what a triple's next frame alone says, which begins on the third of these levels.
     pub ahead: [usize; 3],
-    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root mean square).
-    pub settled: f64,
+    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root mean square): that level, and every coarser one.
+    pub settled: [f64; 2],
     /// After each iteration.
     pub coupling: Coupling,
 }
@@ -104,19 +104,21 @@ impl Effort {
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> Limits {
         if is_coarsest || size.0 * size.1 <= SMALL {
             let coupling = Coupling { sweeps: COARSE.1, ..self.coupling };
-            return Limits { most: COARSE.0, settled: self.settled, coupling };
+            return Limits { coupling, ..self.up_to(k, COARSE.0) };
         }
         let [finest, second, others] = self.iterations;
-        self.up_to(match k.saturating_sub(self.last) {
+        let most = match k.saturating_sub(self.last) {
             0 => finest,
             1 => second,
             _ => others,
-        })
+        };
+        self.up_to(k, most)
     }
 
-    /// So many iterations at most.
-    pub fn up_to(&self, most: usize) -> Limits {
-        Limits { most, settled: self.settled, coupling: self.coupling }
+    /// So many iterations at most on level `k`.
+    pub fn up_to(&self, k: usize, most: usize) -> Limits {
+        let [finest, others] = self.settled;
+        Limits { most, settled: if k <= self.last { finest } else { others }, coupling: self.coupling }
     }
 }
 

@@ -86,7 +86,7 @@ fn at_full_resolution<T: SimdReal>(
     let mut motion: Option<Planes<T>> = None;
     for level in (0..level).rev() {
         let size = (0..level).fold(size, |size, _| halved_size(size));
-        let mut next = space.planes(0, 0, MOTION);
+        let mut next = space.planes(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
         finer(simd, motion.as_ref().unwrap_or(found), size, &mut next);
         motion.replace(next).into_iter().for_each(|planes| space.keep(planes));
     }

@@ -33,6 +33,7 @@ use field::Field;
 use fit::{FIT, FLOW};
 use ladder::Ladder;
 pub(super) use ladder::TERMS;
+use rayon::prelude::*;
 use region::Fitted;
 
 /// Distance of the sites, px.
@@ -135,8 +136,9 @@ pub(super) fn refine<T: SimdReal>(
     let ladder = Ladder::new(options.ladder, PITCH);
     let base = mean_motion(motion);
     let grids = grids(simd, space, &ladder, motion, &base);
-    let mut fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
-    let samples = ladder.scales.iter().zip(&fits);
+    let scales = ladder.scales.par_iter();
+    let mut fits: Vec<_> = scales.clone().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
+    let samples = scales.zip(&fits);
     let samples = samples.map(|(s, f)| fit::samples(simd, space, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
     let fitted = Fitted { fits: &fits, samples };
     let means = region::regional_means(simd, space, options, &ladder, &fitted, data);

@@ -5,6 +5,12 @@ use super::super::grid::Planes;
 use super::super::run::Estimate;
 use crate::simd::SimdReal;
 use crate::types::Mask;
+use rayon::prelude::*;
+
+/// Sites that the usual energy is taken from, about.
+const MOST_SAMPLES: usize = 20_000;
+/// Rows of a task, at least.
+const ROWS: usize = 16;
 
 /// Residual energy, over that of the usual textured site, from which on frames contradict the motion.
 const CONTRADICTION: f64 = 10.0;
@@ -27,17 +33,20 @@ pub(super) struct Consistency {
 impl Consistency {
     pub fn of<T: SimdReal>(estimate: &Estimate<T>) -> Self {
         let (data, contrast) = (&estimate.data, estimate.range.contrast);
-        let information = |x: usize, y: usize| data.at(UU, x, y).to_f64() + data.at(VV, x, y).to_f64();
-        let energy = |x: usize, y: usize| data.at(ENERGY, x, y).to_f64();
-        let usual = usual(data, &information, &energy).max((LEAST * contrast).powi(2));
+        let usual = usual(data).max((LEAST * contrast).powi(2));
         let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
         let least = rows * (UNRELATED.1 * contrast).powi(2);
-        let contradicted = Mask::from_fn(data.width, data.height, |x, y| {
-            let (energy, information) = (energy(x, y), information(x, y));
-            let stands_out = energy > CONTRADICTION * usual && energy > EXPLAINED * information;
-            stands_out || (energy > UNRELATED.0 * information && energy > least)
+        let is_contradicted = |[information, energy]: [f64; 2]| {
+            let stands_out = (energy > CONTRADICTION * usual) & (energy > EXPLAINED * information);
+            stands_out | ((energy > UNRELATED.0 * information) & (energy > least))
+        };
+        let mut contradicted = Mask::filled(data.width, data.height, false);
+        let rows = contradicted.data_mut().par_chunks_mut(data.width.max(1)).enumerate().with_min_len(ROWS);
+        let rows = rows.map(|(y, row)| {
+            row.iter_mut().zip(sites(data, y)).for_each(|(out, site)| *out = is_contradicted(site));
+            row.contains(&true)
         });
-        let rows = (0..data.height).map(|y| contradicted.row(y).contains(&true)).collect();
+        let rows = rows.collect();
         Self { contradicted, rows }
     }
 
@@ -52,14 +61,16 @@ impl Consistency {
     }
 }
 
+/// Information, grey^2 px^-2, and residual energy, grey^2, of the sites of a row.
+fn sites<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item = [f64; 2]> {
+    let [uu, vv, energy] = [UU, VV, ENERGY].map(|k| data.line(k, y));
+    uu.iter().zip(vv).zip(energy).map(|((uu, vv), energy)| [uu.to_f64() + vv.to_f64(), energy.to_f64()])
+}
+
 /// Median of the energies of that half of the sites which has most information: untextured ones show no residual whatever the motion is.
-fn usual<T: SimdReal>(
-    data: &Planes<T>,
-    information: &impl Fn(usize, usize) -> f64,
-    energy: &impl Fn(usize, usize) -> f64,
-) -> f64 {
-    let sites = (0..data.height).flat_map(|y| (0..data.width).map(move |x| (x, y)));
-    let mut known: Vec<[f64; 2]> = sites.map(|(x, y)| [information(x, y), energy(x, y)]).collect();
+fn usual<T: SimdReal>(data: &Planes<T>) -> f64 {
+    let every = (data.width * data.height / MOST_SAMPLES).max(1);
+    let mut known: Vec<_> = (0..data.height).flat_map(|y| sites(data, y)).step_by(every).collect();
     if known.is_empty() {
         return 0.0;
     }
