@@ -64,7 +64,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let whole = whole.min_by_key(|(_, both)| both.len());
     let (found, object) = whole.unwrap_or_else(|| (explain(&object), object));
     let displacement = found?.1;
-    let bounds = bounds(&object, displacement);
+    let bounds = bounds(extent(&object), displacement);
     (bounds.width >= LEAST_SIDE && bounds.height >= LEAST_SIDE)
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
 }
@@ -84,7 +84,7 @@ pub(super) fn much_changes(first: &Frame<f64>, second: &Frame<f64>) -> bool {
 
 /// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along x or along y.
 fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
-    let (a, b) = (bounds(a, [0, 0]), bounds(b, [0, 0]));
+    let [a, b] = [a, b].map(|object| bounds(extent(object), [0, 0]));
     let alike = |a: [f64; 2], b: [f64; 2]| {
         let common = (a[0] + a[1]).min(b[0] + b[1]) - a[0].max(b[0]);
         common >= SAME_EXTENT * a[1].max(b[1])
@@ -154,8 +154,9 @@ fn displacement(
     object: &[(usize, usize)],
     noise: f64,
 ) -> Option<(f64, [isize; 2])> {
+    let extent = extent(object);
     let cost = |dx: isize, dy: isize| {
-        let TargetBox { x, y, width, height } = bounds(object, [dx, dy]);
+        let TargetBox { x, y, width, height } = bounds(extent, [dx, dy]);
         let inside = |from: f64, length: f64| (from + 0.5) as isize..(from + length + 0.5) as isize;
         let step = ((width * height / VOTES).sqrt().ceil() as usize).max(1);
         let pixels = inside(y, height).step_by(step).flat_map(|j| inside(x, width).step_by(step).map(move |i| (i, j)));
@@ -197,15 +198,21 @@ fn read<T: Copy>(frame: &Frame<T>, x: isize, y: isize) -> Option<T> {
     inside.then(|| frame.get(x as usize, y as usize))
 }
 
-/// Extent of the changed pixels in the second frame.
-fn bounds(object: &[(usize, usize)], displacement: [isize; 2]) -> TargetBox {
-    let along = |value: fn(&(usize, usize)) -> usize, moved: isize| {
-        let (low, high) = object.iter().map(value).fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
-        // The object was at one end of the changed pixels and is at the other.
+/// Least and greatest column and row of the changed pixels.
+fn extent(object: &[(usize, usize)]) -> [[usize; 2]; 2] {
+    let none = [usize::MAX, 0];
+    object.iter().fold([none; 2], |[[left, right], [top, bottom]], &(x, y)| {
+        [[left.min(x), right.max(x)], [top.min(y), bottom.max(y)]]
+    })
+}
+
+/// What of the changed pixels' extent is the object in the second frame: it was at one end of them and is at the other.
+fn bounds([columns, rows]: [[usize; 2]; 2], displacement: [isize; 2]) -> TargetBox {
+    let along = |[low, high]: [usize; 2], moved: isize| {
         let (low, high) = (low as f64 - 0.5, high as f64 + 0.5);
         if moved > 0 { (low + moved as f64, high) } else { (low, high + moved as f64) }
     };
-    let ((x0, x1), (y0, y1)) = (along(|p| p.0, displacement[0]), along(|p| p.1, displacement[1]));
+    let ((x0, x1), (y0, y1)) = (along(columns, displacement[0]), along(rows, displacement[1]));
     TargetBox { x: x0, y: y0, width: x1 - x0, height: y1 - y0 }
 }
 
