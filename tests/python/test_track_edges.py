@@ -328,3 +328,17 @@ def test_a_scene_that_stays_another_one_is_taken_as_it_is():
     found = track.track(frames, (29.5, 57.5, 13, 13))
     assert set(found.status[20:28]) == {"coasting"} and found.status[-1] == "tracking"
     assert np.linalg.norm(found.position[-1] - (36 + 59, 64)) < 1.0
+
+
+@pytest.mark.parametrize(("step", "noise"), [(2, 8), (1, 4)])
+def test_what_counts_as_motion_is_told_from_the_background_and_not_from_the_target(step, noise):
+    ground, side, rng = textured(200, 256, sigma=4.0, deviation=20.0), 13, np.random.default_rng(5)
+    frames, centres = [], []
+    for t in range(40):
+        picture, left, top = ground.copy(), 54 + step * t, 89 + round(8 * np.sin(t / 9))
+        picture[top : top + side, left : left + side] = 200.0
+        frames.append(np.clip(np.rint(picture + noise * rng.standard_normal(picture.shape)), 0, 255).astype(np.uint8))
+        centres.append((left + side // 2, top + side // 2))
+    found = track.track(frames, (53.5, 88.5, side, side), method="local", eps="auto")
+    errors = np.linalg.norm(found.position - centres, axis=1)
+    assert np.mean(errors < 3.0) > 0.9, errors

@@ -8,7 +8,6 @@ use super::levels::{Compared, PyramidLevel};
 use super::memory::{Space, Workspace};
 use super::options::{Effort, Limits};
 use super::range::Range;
-use super::refine::PITCH;
 use super::resample::{coarser, finer, rederive};
 use crate::simd::{Level, SimdReal};
 
@@ -19,10 +18,8 @@ const LEAST_SCALE: f64 = 4e-3;
 
 /// A site that an iteration moves further than this is on its way, px of the level.
 const FAR: f64 = 0.1;
-/// Side of an object that is too small to be felt in the mean over the frame, but is waited for, px of the frame.
-const OBJECT: f64 = 20.0;
-/// So many sites are no chance, on whatever level.
-const FEW: usize = 4;
+/// So many of those may be an object that is too small to be felt in the mean over the frame.
+const OBJECT: usize = 4;
 /// Sites along the edge that do not count: what leaves the frame there may drift for ever.
 const RIM: usize = 2;
 
@@ -64,7 +61,12 @@ impl Plan {
     /// Once more about a better `motion`, on the finest level.
     pub fn again<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let start = copy(&workspace.space, motion);
-        self.descend(workspace, Compared::All, start, (&vec![self.effort.up_to(self.last, 1); self.last + 1], self.last))
+        self.descend(
+            workspace,
+            Compared::All,
+            start,
+            (&vec![self.effort.up_to(self.last, 1); self.last + 1], self.last),
+        )
     }
 
     /// The way for the step to the next frame alone, from two levels above the finest down. It begins with what is known of all frames together, the `motion`, but for what the next
@@ -124,7 +126,7 @@ impl Plan {
                 rederive(&old, &mut motion);
                 let change = step.iterate(level, &limit.coupling, &mut motion);
                 // On the finest level what is left to do is for the coarser ones to have done.
-                let is_calm = || k == self.last || moving(&old, &motion) < object(k);
+                let is_calm = || k == self.last || moving(&old, &motion) < OBJECT;
                 if change <= limit.settled && is_calm() {
                     break;
                 }
@@ -136,12 +138,6 @@ impl Plan {
         space.keep_small(data);
         Found { motion, data: summary, scale }
     }
-}
-
-/// Sites that the smallest object that is waited for has on level `k` of the pyramid.
-fn object(k: usize) -> usize {
-    let side = OBJECT / PITCH / (1_usize << k) as f64;
-    FEW.max((side * side) as usize)
 }
 
 /// How many sites, but for those of the rim, an iteration moved by more than [`FAR`].

@@ -49,6 +49,7 @@ impl Preset {
                 ahead: [2, 5, 5],
                 settled: [0.02; 2],
                 coupling: Coupling { sweeps: 4, ..coupling },
+                finest_sweeps: 4,
             },
             Self::Balanced => Effort {
                 last: 0,
@@ -56,6 +57,7 @@ impl Preset {
                 ahead: [2, 5, 5],
                 settled: [0.03, 0.023],
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
+                finest_sweeps: 6,
             },
             Self::Accurate => Effort {
                 last: 0,
@@ -63,6 +65,7 @@ impl Preset {
                 ahead: [4, 6, 6],
                 settled: [0.003; 2],
                 coupling: Coupling { break_at: 0.2, ..coupling },
+                finest_sweeps: coupling.sweeps,
             },
         }
     }
@@ -81,6 +84,8 @@ pub(super) struct Effort {
     pub settled: [f64; 2],
     /// After each iteration.
     pub coupling: Coupling,
+    /// Sweeps of the coupling on the finest level on the way down: they cost a fraction of what a linearisation does, and most of what is left after one is theirs to do.
+    pub finest_sweeps: usize,
 }
 
 /// Pixels of a level on which work costs next to nothing.
@@ -112,7 +117,8 @@ impl Effort {
             1 => second,
             _ => others,
         };
-        self.up_to(k, most)
+        let sweeps = if k <= self.last { self.finest_sweeps } else { self.coupling.sweeps };
+        Limits { coupling: Coupling { sweeps, ..self.coupling }, ..self.up_to(k, most) }
     }
 
     /// So many iterations at most on level `k`.

@@ -17,6 +17,8 @@ const CROWD: usize = 3;
 const CELL: usize = 8;
 /// Share of the longer one's extent that two ends of an object have in common.
 const SAME_EXTENT: f64 = 0.7;
+/// What noise and soft edges add to the thickness of the ends of an object, which is how far it moved, px.
+const SOFT: f64 = 3.0;
 /// Fewest changed pixels of an object.
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
@@ -58,12 +60,19 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let between = half_a_pixel_around(first);
     let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
     // What an even target uncovers and what it covers lie apart, as far as it is long: together they are explained without a rest.
-    let whole = objects.iter().filter(|other| are_ends(&object, other)).map(|other| [&object[..], other].concat());
-    let whole =
-        whole.map(|both| (explain(&both), both)).filter(|(found, _)| found.is_some_and(|f| f.0 <= ALIKE.1 * noise));
-    let whole = whole.min_by_key(|(_, both)| both.len());
-    let (found, object) = whole.unwrap_or_else(|| (explain(&object), object));
-    let displacement = found?.1;
+    let whole = objects.iter().filter(|other| are_ends(&object, other)).filter_map(|other| {
+        let both = [&object[..], other].concat();
+        let (cost, displacement) = explain(&both)?;
+        let explained = cost <= ALIKE.1 * noise && are_as_thick(&object, other, displacement);
+        explained.then_some((displacement, both))
+    });
+    // The nearest: there may be others like it, farther on.
+    let area = |object: &[(usize, usize)]| extent(object).map(|[low, high]| high - low + 1).iter().product::<usize>();
+    let whole = whole.min_by_key(|(_, both)| area(both));
+    let (displacement, object) = match whole {
+        Some(found) => found,
+        None => (explain(&object)?.1, object),
+    };
     let bounds = bounds(extent(&object), displacement);
     (bounds.width >= LEAST_SIDE && bounds.height >= LEAST_SIDE)
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
@@ -90,6 +99,15 @@ fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
         common >= SAME_EXTENT * a[1].max(b[1])
     };
     alike([a.x, a.width], [b.x, b.width]) || alike([a.y, a.height], [b.y, b.height])
+}
+
+/// Whether two groups of changed pixels that lie apart along an axis are as thick there as their object moved: two objects that move alike are thicker.
+fn are_as_thick(a: &[(usize, usize)], b: &[(usize, usize)], displacement: [isize; 2]) -> bool {
+    let (a, b) = (extent(a), extent(b));
+    (0..2).filter(|&k| a[k][1] < b[k][0] || b[k][1] < a[k][0]).all(|k| {
+        let most = displacement[k].unsigned_abs() as f64 + SOFT;
+        [a, b].iter().all(|part| (part[k][1] - part[k][0] + 1) as f64 <= most)
+    })
 }
 
 /// Indices next to one, and itself, of `length`.
@@ -238,6 +256,20 @@ mod tests {
             assert_eq!(found.displacement, [f64::from(dx), f64::from(dy)], "{found:?}");
             let truth = TargetBox { x: at[0] as f64 - 0.5, y: at[1] as f64 - 0.5, width: 13.0, height: 9.0 };
             assert!(found.bounds.overlap(&truth) > 0.85, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn of_two_that_move_alike_one_is_found() {
+        let both = |shift: usize, seed: u64| {
+            let (one, two) = (scene([20 + shift, 12], seed), scene([20 + shift, 52], seed + 1));
+            Frame::from_fn(96, 80, |x, y| if y < 40 { one.get(x, y) } else { two.get(x, y) })
+        };
+        let (first, second) = (both(0, 7), both(2, 9));
+        for (near, y) in [([28.0, 16.0], 12.0), ([28.0, 56.0], 52.0)] {
+            let found = detect_moving_target(&first, &second, Some(near)).unwrap();
+            let truth = TargetBox { x: 21.5, y: y - 0.5, width: 13.0, height: 9.0 };
+            assert!(found.bounds.overlap(&truth) > 0.8, "{found:?}");
         }
     }
 

@@ -255,12 +255,13 @@ impl LocalLoop {
         }
     }
 
-    /// Three deviations of the accepted flow outside the target.
+    /// Three deviations of the accepted flow outside the target, as far off that no window of local flow sees any of it.
     fn automatic_eps(&self, flow: &LocalFlow) -> f64 {
-        let (corner, centre) = (self.corner(), self.filter.position());
+        let (corner, centre, speed) = (self.corner(), self.filter.position(), self.filter.speed());
+        let reach = [0, 1].map(|k| self.size[k] / 2.0 + MARGIN as f64 + speed[k].abs());
         let outside = |at: usize| {
             let place = [at % flow.flow.width(), at / flow.flow.width()];
-            (0..2).any(|k| (corner[k] + place[k] as f64 - centre[k]).abs() > self.size[k] / 2.0)
+            (0..2).any(|k| (corner[k] + place[k] as f64 - centre[k]).abs() > reach[k])
         };
         let pixels = flow.flow.data().iter().zip(flow.accepted.data()).enumerate();
         let mut sizes: Vec<f64> = pixels
