@@ -1,10 +1,12 @@
-"""Options of the stereo tracker, checked by name before the compiled part takes them."""
+"""Options of edge disparities and of the stereo tracker, checked by name before the compiled part takes them."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
 from typing import Any
+
+import numpy as np
 
 COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -22,45 +24,101 @@ OPTIONAL = frozenset({"n_components", "threads", "row_offset", "focal", "baselin
 """Names (no unit) of those that may be None."""
 
 
+MOST = {"random_state": 2**64 - 1, "prior_radius": 2**32 - 1, "disparity_range": 2**31 - 1, "row_range": 2**31 - 1}
+"""Greatest values, no unit, that the compiled part can hold, where they are not `MOST_ELSE`."""
+MOST_ELSE = 2**63 - 1
+"""Greatest size of every other integer, no unit."""
+
+
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options, each in the unit it had, as the compiled part takes them; what is of another kind, length or sign is refused by name."""
+    """The stereo tracker's options, each in the unit it had, as the compiled part takes them; what is of another kind, length or sign is refused by name."""
     out = dict(options)
     for name, expected in WORDS.items():
         if not (isinstance(out[name], str) or (out[name] is None and name in OPTIONAL)):
             raise ValueError(f"{name}: expected {expected}, got {out[name]!r}")
     for name in SWITCHES:
-        if out[name] not in (None, True, False):
-            raise TypeError(f"{name}: expected True, False or None, got {out[name]!r}")
-        out[name] = None if out[name] is None else bool(out[name])
+        out[name] = None if out[name] is None else _switch(name, out[name], "True, False or None")
     for name in COUNTS:
-        out[name] = _converted(name, out[name], operator.index, "an integer")
-        if out[name] is not None and out[name] < 0:
-            raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
+        out[name] = _count(name, out[name])
     for name in NUMBERS:
-        out[name] = _converted(name, out[name], float, "a number")
+        out[name] = _number(name, out[name])
     if out["tol"] is not None and not isinstance(out["tol"], str):
         out["tol"] = _converted("tol", out["tol"], float, '"auto", a number or None')
     for name, length in TUPLES.items():
-        numbers = _converted(name, out[name], tuple, f"{length} numbers")
-        if len(numbers) != length:
-            raise ValueError(f"{name}: expected {length} numbers, got {len(numbers)}")
-        whole = name in ("disparity_range", "row_range", "grid")
-        out[name] = tuple(
-            None if number is None and name == "grid" and at == 2 else _converted(name, number, operator.index if whole else float, "an integer" if whole else "a number", optional=False)
-            for at, number in enumerate(numbers)
-        )
+        out[name] = _several(name, out[name], length, whole=name in ("disparity_range", "row_range", "grid"))
     if any(side is not None and side < 0 for side in out["grid"]):
         raise ValueError(f"grid: expected numbers of cells, got {out['grid']}")
     return out
 
 
-def _converted(name: str, value: Any, convert: Callable[[Any], Any], expected: str, *, optional: bool = True) -> Any:
-    """A value converted, or None where an option may be missing."""
-    if value is None and optional and name in OPTIONAL:
+def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of `edge_disparity` and what is like it, of which each may be missing, in the same way."""
+    out = dict(options)
+    for name, value in options.items():
+        if name in ("classes", "window", "prior_radius", "threads"):
+            out[name] = _count(name, value)
+        elif name in ("sigma", "threshold", "min_support", "row_offset"):
+            out[name] = _number(name, value)
+        elif name in ("disparity_range", "row_range"):
+            out[name] = _several(name, value, 2, whole=True)
+        elif name in ("subpixel", "check"):
+            out[name] = _switch(name, value, "True or False")
+        elif name == "method" and not isinstance(value, str):
+            raise ValueError(f'method: expected "classes" or "sgm", got {value!r}')
+    return out
+
+
+def _switch(name: str, value: Any, expected: str) -> bool:
+    if not isinstance(value, (bool, np.bool_)) and not (isinstance(value, int) and value in (0, 1)):
+        raise TypeError(f"{name}: expected {expected}, got {value!r}")
+    return bool(value)
+
+
+def real_number(name: str, value: Any) -> float:
+    """A number, in its unit; TypeError by name for what is none."""
+    number: float = _converted(name, value, float, "a number")
+    return number
+
+
+def whole_number(name: str, value: Any) -> int:
+    """An integer, in its unit, that the compiled part can hold; TypeError or ValueError by name for what is none."""
+    integer: int = _converted(name, value, operator.index, "an integer")
+    most = MOST.get(name, MOST_ELSE)
+    if abs(integer) > most:
+        raise ValueError(f"{name}: expected an integer up to {most}, got {integer}")
+    return integer
+
+
+def _is_missing(name: str, value: Any) -> bool:
+    return value is None and name in OPTIONAL
+
+
+def _number(name: str, value: Any) -> float | None:
+    return None if _is_missing(name, value) else real_number(name, value)
+
+
+def _count(name: str, value: Any) -> int | None:
+    if _is_missing(name, value):
         return None
+    count = whole_number(name, value)
+    if count < 0:
+        raise ValueError(f"{name}: expected a number that is not negative, got {count}")
+    return count
+
+
+def _several(name: str, value: Any, length: int, *, whole: bool) -> tuple[Any, ...]:
+    """So many numbers of whatever sequence, in its unit; the last of `grid` may be None."""
+    numbers = _converted(name, value, tuple, f"{length} numbers")
+    if len(numbers) != length:
+        raise ValueError(f"{name}: expected {length} numbers, got {len(numbers)}")
+    convert = whole_number if whole else real_number
+    return tuple(None if number is None and name == "grid" and at == 2 else convert(name, number) for at, number in enumerate(numbers))
+
+
+def _converted(name: str, value: Any, convert: Callable[[Any], Any], expected: str) -> Any:
     try:
         if isinstance(value, (str, bytes)):
             raise TypeError
         return convert(value)
-    except TypeError:
+    except (TypeError, OverflowError):
         raise TypeError(f"{name}: expected {expected}, got {value!r}") from None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import checked
+from ._stereo_options import checked, real_number, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -118,9 +117,10 @@ class TrackGraph:
         ValueError
             For a cluster that is not there, naming `node`.
         """
-        if operator.index(t) < 0 or operator.index(k) < 0:
+        time, index = (whole_number("node", at) for at in (t, k))
+        if time < 0 or index < 0:
             raise ValueError(f"node: expected a cluster of the graph, got ({t}, {k})")
-        return self._graph.follow(t, k, float(threshold), bool(backward))
+        return self._graph.follow(time, index, real_number("threshold", threshold), bool(backward))
 
     def to_networkx(self) -> _networkx.DiGraph[tuple[int, int]]:
         """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.

@@ -118,7 +118,8 @@ class VariationalGaussianMixture(_Base):
     Raises
     ------
     ValueError
-        For parameters out of range, points that are not finite, weights that are negative, not finite or all zero; each message names the argument.
+        For parameters out of range, points that are not finite or beyond 1e140, weights that are negative, not finite, all zero or so large that sums of squares overflow; each message names the argument. A spread
+        below about 1e-152 counts as none.
     """
 
     weights_: Array
@@ -307,7 +308,7 @@ class VariationalGaussianMixture(_Base):
         self.mean_precision_, self.means_ = state["mean_precision"], state["means"]
         self.weights_ = alpha / alpha.sum()
         self.covariances_ = state["scale_inverses"] / nu[:, None, None]
-        self.precisions_ = np.linalg.inv(self.covariances_).astype(np.float64)
+        self.precisions_ = state["precisions"]
         self.lower_bounds_, self.lower_bound_ = state["lower_bounds"], float(state["lower_bounds"][-1])
         self.n_iter_, self.converged_ = len(self.lower_bounds_), state["converged"]
         self.n_features_in_ = self.means_.shape[1]

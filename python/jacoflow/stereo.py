@@ -12,7 +12,6 @@ equations (1) to (5), and semi-global matching (H. Hirschmueller, 2008) of edge 
 3.0
 """
 
-import operator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
+from ._stereo_options import checked_matching
 
 __all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
@@ -68,8 +68,8 @@ def edge_disparity(
     left, right : arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
         Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats up to 1.5 are taken for shares of white. Colour is turned into
         luminance. A sample that is not finite leaves no edge pixel where the gradient's kernel reaches it, and harms no other.
-    disparity_range : (least, greatest), px, both included
-        Candidates. Those that leave the right view are not admissible.
+    disparity_range : (least, greatest), whole px, both included
+        Candidates, at most 1024. Those that leave the right view are not admissible.
     row_range : (least, greatest), rows, both included
         Row offsets that are searched where `row_offset` is None.
     row_offset : rows, or None
@@ -131,17 +131,9 @@ def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, 
 
     They have a gradient (Gaussian of `sigma` px) of at least `threshold` grey levels/px and are the steepest along its direction.
     """
-    return _edge_pixels(view, sigma, threshold, threads)
+    return _edge_pixels(view, **_options(locals()))
 
 
 def _options(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The keyword options among a function's arguments; what is no count is refused by name."""
-    out = {name: value for name, value in arguments.items() if name not in ("left", "right")}
-    for name in _COUNTS & out.keys():
-        if out[name] is not None and operator.index(out[name]) < 0:
-            raise ValueError(f"{name}: expected a number that is not negative, got {out[name]}")
-    return out
-
-
-_COUNTS = {"prior_radius", "classes", "window", "threads"}
-"""Options that are counts."""
+    """The keyword options among a function's arguments, in their units; what is of another kind, length or sign is refused by name."""
+    return checked_matching({name: value for name, value in arguments.items() if name not in ("left", "right", "view")})

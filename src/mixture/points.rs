@@ -46,7 +46,7 @@ impl Points<'_> {
             return Err(Error::argument("X", "at least one point with at least one coordinate", got));
         }
         match self.values.iter().find(|x| !x.is_finite() || x.abs() > LARGEST) {
-            Some(x) => Err(Error::argument("X", format!("finite coordinates up to {LARGEST:e}"), x)),
+            Some(x) => Err(Error::argument("X", format!("finite coordinates up to {LARGEST:e}"), format!("{x:e}"))),
             None => Ok(()),
         }
     }
@@ -54,7 +54,7 @@ impl Points<'_> {
     /// Whether points and weights can be fitted.
     ///
     /// # Errors
-    /// As [`Points::check_values`]; named `sample_weight`: another number of weights than points, one that is negative or not finite, or nothing but zeros.
+    /// As [`Points::check_values`]; named `sample_weight`: another number of weights than points, one that is negative or not finite, nothing but zeros, or so large that sums of squares overflow.
     pub(super) fn check(&self) -> Result<()> {
         self.check_values()?;
         let Some(weights) = self.weights else { return Ok(()) };
@@ -69,21 +69,29 @@ impl Points<'_> {
         if total <= 0.0 || !total.is_finite() {
             return wrong("weights that are not all zero, with a finite sum", format!("weights with the sum {total}"));
         }
+        // No sum of weighted squares, about whatever mean, is greater.
+        let largest = self.values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        if !(4.0 * largest * largest * total).is_finite() {
+            let got = format!("weights with the sum {total:e} and coordinates up to {largest:e}");
+            return wrong("weights with which sums of squares are finite", got);
+        }
         Ok(())
     }
 
-    /// Weighted mean (D).
+    /// Weighted mean (D), summed about the heaviest point: that of equal ones is theirs to the last bit, so that they have no spread however large they are.
     pub(super) fn mean(&self) -> Vec<f64> {
+        let about =
+            self.at((0..self.count()).fold(0, |best, n| if self.weight(n) > self.weight(best) { n } else { best }));
         let mut sums = vec![0.0; self.dimensions];
         let mut total = 0.0;
         for n in 0..self.count() {
             let weight = self.weight(n);
             total += weight;
-            for (sum, x) in sums.iter_mut().zip(self.at(n)) {
-                *sum += weight * x;
+            for (sum, (x, about)) in sums.iter_mut().zip(self.at(n).iter().zip(about)) {
+                *sum += weight * (x - about);
             }
         }
-        sums.iter().map(|sum| sum / total).collect()
+        sums.iter().zip(about).map(|(sum, about)| about + sum / total).collect()
     }
 }
 

@@ -59,6 +59,23 @@ impl Posterior {
         self.weight_concentration.len()
     }
 
+    /// Expected precisions `nu_k W_k` (K, D, D), from the factors that densities are computed with: symmetric and without a negative eigenvalue but for rounding, where the inverse of a matrix that
+    /// rounding made singular has none.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] for a matrix without a factor.
+    pub fn precisions(&self) -> Result<Vec<f64>> {
+        let d = self.dimensions;
+        let factors = Factors::of(self)?;
+        let mut out = Vec::with_capacity(self.scale_inverses.len());
+        for (lower, nu) in factors.lower.chunks_exact(d * d).zip(&self.degrees_of_freedom) {
+            let inverse = inverse_of_lower(lower, d);
+            let product = |i: usize, j: usize| (0..d).map(|m| inverse[m * d + i] * inverse[m * d + j]).sum::<f64>();
+            out.extend((0..d * d).map(|at| nu * product(at / d, at % d)));
+        }
+        Ok(out)
+    }
+
     /// Only the components for which `keep` holds.
     pub fn retain(&mut self, keep: &[bool]) {
         let d = self.dimensions;

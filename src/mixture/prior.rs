@@ -7,10 +7,12 @@ use crate::math::dense;
 
 /// Added to the default of the degrees of freedom, over D.
 const FREEDOM: f64 = 9.1;
-/// Pivots of a data covariance below this share of its mean diagonal are none: points in a plane.
+/// Pivots of the data's correlations below this are none: points in a plane.
 const FLAT: f64 = 1e-10;
-/// What the diagonal of such a covariance is raised by, relative to its mean, or absolutely where there is no spread at all.
+/// What the diagonal of such a covariance is raised by, relative to itself; along an axis without spread, relative to its mean, or absolutely where no axis has any.
 const RAISED: f64 = 1e-6;
+/// Variances up to this are no spread: their inverses would be near overflow, and squares below it lose their digits.
+const LEAST_VARIANCE: f64 = 1e-304;
 
 /// The prior: `pi ~ Dir(alpha0)` (8), `mu_k ~ N(m0, (beta0 Lambda_k)^-1)`, `Lambda_k ~ W(W0, nu0)` (9).
 #[derive(Debug, Clone, PartialEq)]
@@ -104,19 +106,34 @@ fn data_covariance(points: &Points) -> Vec<f64> {
             sums[j * d + i] = sums[i * d + j];
         }
     }
+    let spread: Vec<bool> = (0..d).map(|i| sums[i * (d + 1)] > LEAST_VARIANCE).collect();
+    raise_where_none(&mut sums, &spread);
     raise_if_flat(&mut sums, d);
     sums
 }
 
-/// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction.
+/// Gives axes without `spread` a small variance of their own, and no correlations.
+fn raise_where_none(matrix: &mut [f64], spread: &[bool]) {
+    let d = spread.len();
+    let typical = (0..d).filter(|i| spread[*i]).map(|i| matrix[i * (d + 1)]).sum::<f64>() / d as f64;
+    for i in (0..d).filter(|i| !spread[*i]) {
+        for j in 0..d {
+            matrix[i * d + j] = 0.0;
+            matrix[j * d + i] = 0.0;
+        }
+        matrix[i * (d + 1)] = if typical > 0.0 { (RAISED * typical).max(LEAST_VARIANCE) } else { RAISED };
+    }
+}
+
+/// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction. Correlations tell, so that the axes' units make no difference.
 fn raise_if_flat(matrix: &mut [f64], d: usize) {
-    let typical = (0..d).map(|i| matrix[i * (d + 1)]).sum::<f64>() / d as f64;
+    let deviations: Vec<f64> = (0..d).map(|i| matrix[i * (d + 1)].sqrt()).collect();
+    let correlations: Vec<f64> = (0..d * d).map(|at| matrix[at] / deviations[at / d] / deviations[at % d]).collect();
     let mut factor = vec![0.0; d * d];
-    let exists = dense::cholesky(matrix, d, &mut factor);
+    let exists = dense::cholesky(&correlations, d, &mut factor);
     let pivots = (0..d).map(|i| factor[i * (d + 1)].powi(2));
-    if exists && pivots.fold(f64::INFINITY, f64::min) > FLAT * typical {
+    if exists && pivots.fold(f64::INFINITY, f64::min) > FLAT {
         return;
     }
-    let raised = if typical > 0.0 { RAISED * typical } else { RAISED };
-    (0..d).for_each(|i| matrix[i * (d + 1)] += raised);
+    (0..d).for_each(|i| matrix[i * (d + 1)] *= 1.0 + RAISED);
 }

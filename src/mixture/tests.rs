@@ -169,6 +169,57 @@ fn surplus_components_stay_at_the_prior_and_extremes_stay_finite() {
 }
 
 #[test]
+fn units_of_single_axes_make_no_difference() {
+    // Variances 1e18 apart are no flat cloud.
+    let (x, f) = clusters(300, 2, 5);
+    let shares: Vec<f64> = (0..300).flat_map(|n| if (n / 3) % 2 == 0 { [0.7, 0.3] } else { [0.2, 0.8] }).collect();
+    let fitted = |unit: f64| {
+        let x: Vec<f64> = x.iter().enumerate().map(|(at, x)| if at % 2 == 0 { *x } else { x * unit }).collect();
+        let points = Points { dimensions: 2, values: &x, weights: Some(&f) };
+        let options = MixtureOptions { components: 2, ..MixtureOptions::default() };
+        fit(&points, &options, Start::Responsibilities(&shares)).unwrap().posterior
+    };
+    let (usual, other) = (fitted(1.0), fitted(1e-9));
+    for k in 0..2 {
+        assert_near(&other.means[2 * k..=2 * k], &usual.means[2 * k..=2 * k], 1e-9);
+        assert_near(&[1e9 * other.means[2 * k + 1]], &[usual.means[2 * k + 1]], 1e-9);
+        assert_near(&[1e18 * other.scale_inverses[4 * k + 3]], &[usual.scale_inverses[4 * k + 3]], 1e-6);
+    }
+}
+
+#[test]
+fn equal_points_have_no_spread_however_large() {
+    let x = [1e139 / 3.0; 100];
+    let options = MixtureOptions { components: 3, seeding: Seeding::Random, ..MixtureOptions::default() };
+    let fit = fit(&Points { dimensions: 2, values: &x, weights: None }, &options, Start::Seeds).unwrap();
+    assert_eq!(fit.prior.mean, x[..2]);
+    assert_near(&fit.prior.scale_inverse, &[1e-6, 0.0, 0.0, 1e-6], 1e-12);
+    for pair in fit.lower_bounds.windows(2) {
+        assert!(pair[1] >= pair[0] - 1e-11 * pair[0].abs(), "{pair:?}");
+    }
+}
+
+#[test]
+fn precisions_are_inverses_and_exist_where_rounding_leaves_none() {
+    let (x, _) = clusters(200, 3, 2);
+    let points = Points { dimensions: 3, values: &x, weights: None };
+    let posterior = fit(&points, &options(2, 5), Start::Seeds).unwrap().posterior;
+    let precisions = posterior.precisions().unwrap();
+    for k in 0..2 {
+        for (i, j) in [(0, 0), (1, 0), (2, 1), (2, 2)] {
+            let row = |m: usize| posterior.scale_inverses[(3 * k + i) * 3 + m] / posterior.degrees_of_freedom[k];
+            let product: f64 = (0..3).map(|m| row(m) * precisions[(3 * k + m) * 3 + j]).sum();
+            assert_near(&[product], &[f64::from(u8::from(i == j))], 1e-10);
+        }
+    }
+    // On a line, and what the prior adds is lost beside what the line has.
+    let line: Vec<f64> = (0..100).flat_map(|n| [1e6 * f64::from(n); 3]).collect();
+    let narrow = MixtureOptions { covariance_prior: CovariancePrior::Isotropic(1e-9), ..options(3, 20) };
+    let fit = fit(&Points { dimensions: 3, values: &line, weights: None }, &narrow, Start::Seeds).unwrap();
+    assert!(fit.posterior.precisions().unwrap().iter().all(|value| value.is_finite()));
+}
+
+#[test]
 fn components_begin_where_they_are_told() {
     let (x, f) = clusters(500, 3, 8);
     let points = Points { dimensions: 3, values: &x, weights: Some(&f) };

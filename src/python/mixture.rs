@@ -129,12 +129,14 @@ fn told(py: Python<'_>, fit: Fit) -> PyResult<Bound<'_, PyDict>> {
     let out = PyDict::new(py);
     let (k, d) = (fit.posterior.components(), fit.posterior.dimensions);
     let rounds = fit.lower_bounds.len();
-    let arrays: [(&str, &[usize], Vec<f64>); 11] = [
+    let precisions = fit.posterior.precisions()?;
+    let arrays: [(&str, &[usize], Vec<f64>); 12] = [
         ("weight_concentration", &[k], fit.posterior.weight_concentration),
         ("mean_precision", &[k], fit.posterior.mean_precision),
         ("degrees_of_freedom", &[k], fit.posterior.degrees_of_freedom),
         ("means", &[k, d], fit.posterior.means),
         ("scale_inverses", &[k, d, d], fit.posterior.scale_inverses),
+        ("precisions", &[k, d, d], precisions),
         ("counts", &[k], fit.moments.counts),
         ("centroids", &[k, d], fit.moments.means),
         ("scatters", &[k, d, d], fit.moments.scatters),

@@ -11,14 +11,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 
-/// Views in 8-bit grey levels; the first decides what the white of floats is.
+/// Views in 8-bit grey levels; the first of floats decides what their white is.
 fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[Frame<f32>; N]> {
     let mut frames = Vec::with_capacity(N);
     for (name, view) in views {
         frames.push(arrays::frame(name, view, ColourRule::Luminance)?);
     }
-    let levels = frames.first().map(GreyLevels::decide);
-    Ok(std::array::from_fn(|i| in_levels(&frames[i], levels.map_or(1.0, |levels| levels.gain(&frames[i])))))
+    let levels = GreyLevels::decide_together(&frames);
+    Ok(std::array::from_fn(|i| in_levels(&frames[i], levels.gain(&frames[i]))))
 }
 
 /// Samples times a gain, in single precision.

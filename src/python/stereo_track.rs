@@ -137,7 +137,7 @@ pub struct PyStereoTracker(Mutex<Tracking>);
 
 struct Tracking {
     tracker: StereoTracker,
-    /// Decided by the first left view.
+    /// Decided by the first views.
     levels: Option<GreyLevels>,
 }
 
@@ -148,13 +148,13 @@ impl PyStereoTracker {
 }
 
 impl Tracking {
-    /// A step from views, the left one first, in grey levels: the scale of floats is that of the first left view with which a step could be taken.
+    /// A step from views, the left one first, in grey levels: the scale of floats is that of the first views with which a step could be taken.
     fn step<const N: usize>(
         &mut self,
         views: &[AnyFrame; N],
         take: impl FnOnce(&mut StereoTracker, [Frame<f32>; N]) -> crate::error::Result<Step>,
     ) -> crate::error::Result<Step> {
-        let levels = self.levels.unwrap_or_else(|| GreyLevels::decide(&views[0]));
+        let levels = self.levels.unwrap_or_else(|| GreyLevels::decide_together(views));
         let step = take(&mut self.tracker, views.each_ref().map(|view| in_levels(view, levels.gain(view))))?;
         self.levels = Some(levels);
         Ok(step)

@@ -28,6 +28,12 @@ impl GreyLevels {
         Self { float: if levels { 1.0 } else { 255.0 } }
     }
 
+    /// Decides by frames of one moment, such as two views: by the first of them that is of floats, for the others' types say what white is.
+    pub fn decide_together(frames: &[AnyFrame]) -> Self {
+        let floats = frames.iter().find(|frame| matches!(frame, AnyFrame::F32(_) | AnyFrame::F64(_)));
+        floats.or(frames.first()).map_or(Self { float: 1.0 }, Self::decide)
+    }
+
     /// What the samples of a frame are multiplied by.
     pub fn gain(&self, frame: &AnyFrame) -> f64 {
         match frame {
@@ -69,6 +75,17 @@ mod tests {
             assert!((got - want).abs() < 1e-12);
         }
         assert_eq!(levels(&singles, &singles), [0.0, 127.5, 255.0]);
+    }
+
+    #[test]
+    fn floats_beside_bytes_decide_for_themselves() {
+        let bytes = AnyFrame::U8(Frame::new(1, 1, vec![7]).unwrap());
+        let (shares, grey) = (AnyFrame::F32(Frame::filled(1, 1, 0.5)), AnyFrame::F64(Frame::filled(1, 1, 50.0)));
+        for (pair, white) in [([bytes.clone(), shares.clone()], 255.0), ([grey, shares], 1.0)] {
+            let together = GreyLevels::decide_together(&pair);
+            assert_eq!(together.convert(&pair[1]).into_data(), [0.5 * white]);
+        }
+        assert_eq!(GreyLevels::decide_together(std::slice::from_ref(&bytes)).convert(&bytes).into_data(), [7.0]);
     }
 
     #[test]

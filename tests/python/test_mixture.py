@@ -155,6 +155,43 @@ def test_degenerate_points_stay_finite(x, weight):
     assert (np.linalg.eigvalsh(mixture.covariances_) > 0).all()
 
 
+@pytest.mark.parametrize("d", [2, 3, 10])
+@pytest.mark.parametrize("prior", [1e-3, 1e-12])
+def test_what_rounding_makes_singular_is_fitted_all_the_same(d, prior):
+    line = 1e6 * np.random.default_rng(0).normal(size=(100, 1)).repeat(d, axis=1)
+    mixture = VariationalGaussianMixture(3, random_state=0, covariance_prior=prior).fit(line)
+    precisions = mixture.precisions_
+    assert np.isfinite(precisions).all()
+    np.testing.assert_array_equal(precisions, precisions.transpose(0, 2, 1))
+    assert (np.einsum("kii->ki", precisions) > 0).all()
+    np.testing.assert_allclose(mixture.predict_proba(line).sum(1), 1)
+
+
+@pytest.mark.parametrize("d", [1, 3, 7, 10])
+@pytest.mark.parametrize("unit", [1e-150, 1e-20, 1e20, 1e130])
+def test_the_unit_of_the_points_makes_no_difference(d, unit):
+    x, f, _ = clusters(200, d)
+    usual, other = (VariationalGaussianMixture(4, random_state=0).fit(points, sample_weight=f) for points in (x, unit * x))
+    np.testing.assert_allclose(other.means_ / unit, usual.means_, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(other.predict(unit * x), usual.predict(x))
+
+
+@pytest.mark.parametrize("unit", [1e-300, 1e-160, 1e-155])
+def test_a_spread_whose_square_is_no_number_is_none(unit):
+    x, _, _ = clusters(100, 2)
+    mixture = VariationalGaussianMixture(3, random_state=0).fit(unit * x)
+    for name in ("weights_", "means_", "covariances_", "precisions_", "lower_bounds_"):
+        assert np.isfinite(getattr(mixture, name)).all(), name
+    np.testing.assert_allclose(mixture.predict_proba(unit * x).sum(1), 1)
+
+
+@pytest.mark.parametrize(("unit", "weight"), [(1.0, 1e306), (1e100, 1e200), (1e100, 1e300)])
+def test_weights_whose_sums_overflow_are_named(unit, weight):
+    x, _, _ = clusters(50, 2)
+    with pytest.raises(ValueError, match="sample_weight: "):
+        VariationalGaussianMixture(2, random_state=0).fit(unit * x, sample_weight=np.full(50, weight))
+
+
 def test_a_point_without_weight_is_predicted_and_not_fitted():
     x, f, _ = clusters(300, 2)
     weights = f.astype(float)

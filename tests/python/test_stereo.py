@@ -106,6 +106,18 @@ def test_every_sample_type_means_the_same(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_bytes_beside_shares_of_white_are_matched(method, swapped):
+    step = small()[0]
+    plain = disparity(step.left, step.right, method=method)
+    views = (step.left / 255, step.right) if swapped else (step.left, (step.right / 255).astype(np.float32))
+    got = disparity(*views, method=method)
+    both = np.isfinite(plain.disparity) & np.isfinite(got.disparity)
+    assert both.sum() >= 0.99 * len(plain.rows)
+    assert np.mean(np.abs(got.disparity - plain.disparity)[both] < 1e-2) > 0.99
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_bad_samples_damage_their_neighbourhood_and_no_more(method):
     step = small()[0]
     whole = disparity(step.left, step.right, method=method, row_offset=1.0)
@@ -179,12 +191,41 @@ def test_arrays_that_are_no_views_are_refused():
         ("window", 33),
         ("min_support", 1.5),
         ("threads", 0),
+        ("threads", -1),
+        ("disparity_range", (1, 2, 3)),
+        ("disparity_range", (0, 2**40)),
+        ("row_range", (-(2**70), 0)),
+        ("prior_radius", 2**32),
+        ("classes", 2**70),
+        ("method", None),
     ],
 )
 def test_bad_options_are_named(name, value):
     view = np.zeros((40, 40), np.uint8)
-    with pytest.raises(ValueError, match=f"{name}: "):
+    with pytest.raises(ValueError, match=f"^{name}: expected .*, got"):
         stereo.edge_disparity(view, view, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("disparity_range", (0.5, 3)), ("disparity_range", None), ("row_range", "ab"), ("sigma", "wide"), ("row_offset", "high"), ("window", None), ("classes", 1.5), ("threads", 1.5), ("subpixel", "yes"), ("check", None)],
+)  # fmt: skip
+def test_options_of_another_kind_are_named(name, value):
+    view = np.zeros((40, 40), np.uint8)
+    with pytest.raises(TypeError, match=f"^{name}: expected .*, got"):
+        stereo.edge_disparity(view, view, **{name: value})
+
+
+@pytest.mark.parametrize(("name", "value", "kind"), [("sigma", "wide", TypeError), ("threads", -1, ValueError), ("threads", 1.5, TypeError), ("threshold", 0, ValueError)])
+def test_bad_options_of_edges_are_named(name, value, kind):
+    with pytest.raises(kind, match=f"^{name}: expected .*, got"):
+        stereo.edge_pixels(np.zeros((40, 40), np.uint8), **{name: value})
+
+
+def test_ranges_are_any_two_integers():
+    view = np.zeros((40, 40), np.uint8)
+    for span in ([-8, 8], np.array([-8, 8]), (np.int64(-8), 8)):
+        assert stereo.edge_disparity(view, view, disparity_range=span, row_range=[-1, 1]).values.shape == (0,)
 
 
 def test_the_row_offset_is_found_to_a_twentieth_of_a_row():

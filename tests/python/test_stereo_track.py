@@ -125,9 +125,13 @@ def test_a_graph_comes_back_from_json_and_pickle():
     assert TrackGraph() != graph and TrackGraph().nodes == {}
     with pytest.raises(ValueError, match="json"):
         TrackGraph.from_json("[]")
-    for node in [(9, 0), (-1, 0)]:
-        with pytest.raises(ValueError, match="node"):
+    for node in [(9, 0), (-1, 0), (2**70, 0)]:
+        with pytest.raises(ValueError, match="node: "):
             graph.follow(*node)
+    with pytest.raises(TypeError, match="node: "):
+        graph.follow(0.5, 0)
+    with pytest.raises(TypeError, match="threshold: "):
+        graph.follow(0, 0, threshold="high")
 
 
 def test_networkx_has_nodes_arcs_and_attributes():
@@ -282,6 +286,10 @@ def test_views_that_do_not_fit_are_refused_with_both_shapes():
         ("patience", -1),
         ("random_state", -1),
         ("disparity_range", (1,)),
+        ("disparity_range", (0, 2**40)),
+        ("grid", (2**70, 80, None)),
+        ("search", 2**70),
+        ("random_state", 2**64),
     ],
 )
 def test_options_out_of_range_are_named(option, value):

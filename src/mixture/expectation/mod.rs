@@ -191,9 +191,9 @@ mod tests {
         let scale = plain.values.iter().fold(1.0f64, |m, v| m.max(v.abs()));
         for level in Level::available() {
             let (planes, densities, band) = (&planes, &densities, 0..planes.padded);
-            let fixed = dispatch(level, Band::<D> { planes, densities, points: band.clone() });
-            let any = dispatch(level, AnyBand { planes, densities, points: band });
-            for got in [fixed, any] {
+            let any = dispatch(level, AnyBand { planes, densities, points: band.clone() });
+            let fixed = (D <= 6).then(|| dispatch(level, Band::<D> { planes, densities, points: band }));
+            for got in fixed.into_iter().chain([any]) {
                 let near = |got: f64, want: f64, scale: f64| {
                     assert!((got - want).abs() < 1e-12 * scale, "{level:?}, D = {D}: {got} {want}");
                 };
@@ -212,5 +212,8 @@ mod tests {
         both::<4>();
         both::<5>();
         both::<6>();
+        both::<7>();
+        both::<10>();
+        both::<13>();
     }
 }

@@ -48,7 +48,7 @@ impl GreyPairs {
     pub fn next(&mut self, done: usize, progress: &dyn Progress) -> Result<Option<GreyPair>> {
         progress.step(done, self.total)?;
         let Some(views) = self.pairs.next(|| progress.step(done, self.total))? else { return Ok(None) };
-        let levels = *self.levels.get_or_insert_with(|| GreyLevels::decide(&views[0]));
+        let levels = *self.levels.get_or_insert_with(|| GreyLevels::decide_together(&views));
         let prepared = |view: &AnyFrame| {
             let frame = self.threads.install(|| self.preprocess.apply(view.to_real::<f64>()));
             GreyLevels::scaled(frame, levels.gain(view)).map(|&value| value as f32)

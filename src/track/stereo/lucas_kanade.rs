@@ -154,36 +154,16 @@ impl<'a> Task<'a> {
         Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
     }
 
-    /// A step of the translation from residuals of some deviation; its length, px.
-    fn translate(
+    /// A step of the map's first `N` unknowns, two for a translation and six for an affine map, from residuals of some deviation; its length, px.
+    fn step<const N: usize>(
         &self,
         voters: &[Voter],
         (residuals, deviation): (&[f32], f64),
         map: &mut [f64; 6],
         start: &[f64; 2],
     ) -> Option<f64> {
-        let (mut matrix, mut right) = self.normal::<2>(voters, residuals, deviation);
-        for k in 0..2 {
-            let prior = (deviation / PRIOR[0]).powi(2);
-            matrix[(k, k)] += prior;
-            right[k] -= prior * (map[k] - start[k]);
-        }
-        let step = matrix.cholesky()?.solve(&right);
-        map[0] += step[0];
-        map[1] += step[1];
-        Some(step.norm())
-    }
-
-    /// A step of the affine map from residuals of some deviation; its length, px.
-    fn deform(
-        &self,
-        voters: &[Voter],
-        (residuals, deviation): (&[f32], f64),
-        map: &mut [f64; 6],
-        start: &[f64; 2],
-    ) -> Option<f64> {
-        let (mut matrix, mut right) = self.normal::<6>(voters, residuals, deviation);
-        for k in 0..6 {
+        let (mut matrix, mut right) = self.normal::<N>(voters, residuals, deviation);
+        for k in 0..N {
             let (scale, from) = if k < 2 { (PRIOR[0], start[k]) } else { (PRIOR[1] * self.radius, 0.0) };
             let prior = (deviation / scale).powi(2);
             matrix[(k, k)] += prior;
@@ -194,6 +174,24 @@ impl<'a> Task<'a> {
         Some(step.norm())
     }
 
+    /// At most so many steps of the map's first `N` unknowns at one level, with room for the residuals.
+    fn settle<const N: usize>(
+        &self,
+        steps: usize,
+        (voters, after): (&[Voter], &Frame<f32>),
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+        residuals: &mut Vec<f32>,
+    ) -> Option<()> {
+        for _ in 0..steps {
+            let deviation = self.residuals(voters, after, map, residuals)?;
+            if self.step::<N>(voters, (residuals, deviation), map, start)? < SETTLED {
+                break;
+            }
+        }
+        Some(())
+    }
+
     /// Steps at one level; the truncated residual at its end.
     fn descend(&self, level: usize, map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
         let voters = self.voters(level);
@@ -201,18 +199,8 @@ impl<'a> Task<'a> {
         let mut residuals = Vec::with_capacity(voters.len());
         let [translations, affine] = STEPS[level];
         let affine = if voters.len() < AFFINE_PIXELS { 0 } else { affine };
-        for _ in 0..translations {
-            let deviation = self.residuals(&voters, after, map, &mut residuals)?;
-            if self.translate(&voters, (&residuals, deviation), map, start)? < SETTLED {
-                break;
-            }
-        }
-        for _ in 0..affine {
-            let deviation = self.residuals(&voters, after, map, &mut residuals)?;
-            if self.deform(&voters, (&residuals, deviation), map, start)? < SETTLED {
-                break;
-            }
-        }
+        self.settle::<2>(translations, (&voters, after), map, start, &mut residuals)?;
+        self.settle::<6>(affine, (&voters, after), map, start, &mut residuals)?;
         self.residuals(&voters, after, map, &mut residuals)?;
         map.iter().all(|value| value.is_finite()).then(|| truncated_mean(&residuals))
     }

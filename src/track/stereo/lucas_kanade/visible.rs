@@ -49,13 +49,13 @@ impl Task<'_> {
         for deviation in NARROWING.map(|times| times * noise) {
             for _ in 0..STEPS_EACH {
                 self.residuals(voters, after, &map, &mut residuals)?;
-                self.translate(voters, (&residuals, deviation), &mut map, start)?;
+                self.step::<2>(voters, (&residuals, deviation), &mut map, start)?;
             }
         }
         if self.agreeing(voters, &map, noise) >= AFFINE_PIXELS {
             for _ in 0..STEPS[FINE][1] {
                 self.residuals(voters, after, &map, &mut residuals)?;
-                if self.deform(voters, (&residuals, noise), &mut map, start)? < SETTLED {
+                if self.step::<6>(voters, (&residuals, noise), &mut map, start)? < SETTLED {
                     break;
                 }
             }
