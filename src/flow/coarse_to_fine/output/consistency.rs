@@ -37,8 +37,8 @@ impl Consistency {
         let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
         let least = rows * (UNRELATED.1 * contrast).powi(2);
         let is_contradicted = |[information, energy]: [f64; 2]| {
-            let stands_out = (energy > CONTRADICTION * usual) & (energy > EXPLAINED * information);
-            stands_out | ((energy > UNRELATED.0 * information) & (energy > least))
+            let stands_out = energy > CONTRADICTION * usual && energy > EXPLAINED * information;
+            stands_out || (energy > UNRELATED.0 * information && energy > least)
         };
         let mut contradicted = Mask::filled(data.width, data.height, false);
         let rows = contradicted.data_mut().par_chunks_mut(data.width.max(1)).enumerate().with_min_len(ROWS);
