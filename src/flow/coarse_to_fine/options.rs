@@ -39,9 +39,11 @@ impl Preset {
             .ok_or_else(|| Error::argument("preset", "fast, balanced or accurate", name))
     }
 
-    /// What it means.
-    pub(super) fn effort(self) -> Effort {
+    /// What it means for so many frames.
+    pub(super) fn effort(self, frames: usize) -> Effort {
         let coupling = Coupling::default();
+        // Three frames are more exact than two: they are worth another linearisation.
+        let (finest_settled, finest_sweeps) = if frames == 2 { (0.03, 6) } else { (0.023, 4) };
         match self {
             Self::Fast => Effort {
                 last: 1,
@@ -55,9 +57,9 @@ impl Preset {
                 last: 0,
                 iterations: [3, 5, 5],
                 ahead: [2, 5, 5],
-                settled: [0.03, 0.023],
+                settled: [finest_settled, 0.023],
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
-                finest_sweeps: 6,
+                finest_sweeps,
             },
             Self::Accurate => Effort {
                 last: 0,
@@ -84,7 +86,7 @@ pub(super) struct Effort {
     pub settled: [f64; 2],
     /// After each iteration.
     pub coupling: Coupling,
-    /// Sweeps of the coupling on the finest level on the way down: they cost a fraction of what a linearisation does, and most of what is left after one is theirs to do.
+    /// Sweeps of the coupling on the finest level: they cost a fraction of what a linearisation does, and most of what is left after one is theirs to do.
     pub finest_sweeps: usize,
 }
 
@@ -117,14 +119,15 @@ impl Effort {
             1 => second,
             _ => others,
         };
-        let sweeps = if k <= self.last { self.finest_sweeps } else { self.coupling.sweeps };
-        Limits { coupling: Coupling { sweeps, ..self.coupling }, ..self.up_to(k, most) }
+        self.up_to(k, most)
     }
 
     /// So many iterations at most on level `k`.
     pub fn up_to(&self, k: usize, most: usize) -> Limits {
         let [finest, others] = self.settled;
-        Limits { most, settled: if k <= self.last { finest } else { others }, coupling: self.coupling }
+        let (settled, sweeps) =
+            if k <= self.last { (finest, self.finest_sweeps) } else { (others, self.coupling.sweeps) };
+        Limits { most, settled, coupling: Coupling { sweeps, ..self.coupling } }
     }
 }
 

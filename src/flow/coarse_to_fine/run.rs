@@ -46,7 +46,7 @@ impl CoarseToFine {
             let simd = common.level();
             let range = Range::of(frames, common.mask.as_ref());
             let mut workspace = self.memory.take::<T>();
-            let effort = self.options.preset.effort();
+            let effort = self.options.preset.effort(frames.len());
             let levels = (self.options.levels, effort.last);
             let last = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
             let plan = Plan { simd, effort, range, last };
