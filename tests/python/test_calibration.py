@@ -1,5 +1,7 @@
 """What `estimate` says by default, against exact truth: its errors lie within its deviations, and are smaller than the baselines'."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -100,9 +102,11 @@ def test_what_leaves_the_frame_has_wide_intervals(frames):
     """Beside an edge that motion of 6 px crosses nothing is seen; a field that is continued from inside is told to be so."""
     times = (0.0, 1.0) if frames == 2 else (-1.0, 0.0, 1.0)
     shares, wider = [], []
-    for motion, parameters in (("affine", {"u": 6.0, "v": 0.5, "u_x": 0.0, "v_x": 0.0, "u_y": 0.02, "v_y": 0.0}), ("waves", {"speed": 6.0, "wavelength": 128.0})):
-        scene = scenes.Scene(motion, width=176, height=160, seed=3, carrier="noise", **parameters)
-        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=3)
+    shear = {"u": 6.0, "v": 0.5, "u_x": 0.0, "v_x": 0.0, "u_y": 0.02, "v_y": 0.0}
+    motions = (("affine", shear), ("waves", {"speed": 6.0, "wavelength": 128.0}))
+    for (motion, parameters), seed in itertools.product(motions, range(3, 7)):
+        scene = scenes.Scene(motion, width=176, height=160, seed=seed, carrier="noise", **parameters)
+        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(0.0, 1.0))
         field = jacoflow.estimate(pictures, method="coarse_to_fine", time_scheme="pair" if frames == 2 else None)

@@ -25,14 +25,20 @@ pub(super) struct Comparison<'a, T> {
 }
 
 impl<T: SimdReal> Comparison<'_, T> {
-    /// Lets `other` replace the `motion` where it explains the frames better; beside such sites both are blended.
-    pub fn take_better(&self, motion: &mut Planes<T>, other: &Planes<T>) {
+    /// Lets `other` replace the `motion` where it is further from it than `apart`, px of the level, and explains the frames better; beside such sites both
+    /// are blended. Whether there are such sites.
+    pub fn take_better(&self, motion: &mut Planes<T>, other: &Planes<T>, apart: f64) -> bool {
         let (known, found) = (self.left(motion), self.left(other));
         let usual = median(known.iter().copied().filter(|left| !left.is_nan()).collect());
-        // Comparisons with what is not known are false.
-        let better = |(known, found): (&f64, &f64)| ADVANTAGE * (found + usual) < known + usual;
-        let wins: Vec<bool> = known.iter().zip(&found).map(better).collect();
         let size = (motion.width, motion.height);
+        let distance = |n: usize| {
+            let [u, v] =
+                [0, 1].map(|k| (motion.at(k, n % size.0, n / size.0) - other.at(k, n % size.0, n / size.0)).to_f64());
+            u.hypot(v)
+        };
+        // Comparisons with what is not known are false.
+        let better = |n: usize| ADVANTAGE * (found[n] + usual) < known[n] + usual && distance(n) > apart;
+        let wins: Vec<bool> = (0..known.len()).map(better).collect();
         for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
             let share = share_around(&wins, size, (x, y));
             if share > 0.0 {
@@ -42,6 +48,7 @@ impl<T: SimdReal> Comparison<'_, T> {
                 }
             }
         }
+        wins.contains(&true)
     }
 
     /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is seen.
@@ -107,16 +114,18 @@ mod tests {
         let mut moved = still.clone();
         (0..24).for_each(|y| moved.line_mut(0, y).fill(1.0));
         for (mut motion, other) in [(still.clone(), &moved), (moved.clone(), &still)] {
-            comparison.take_better(&mut motion, other);
+            assert!(comparison.take_better(&mut motion, other, 0.9));
             for y in 0..24 {
                 let u = motion.line(0, y);
                 assert!(u[2..12].iter().all(|u| *u == 0.0) && u[20..].iter().all(|u| *u == 1.0), "{y}: {u:?}");
             }
         }
-        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better than itself.
-        let mut same = moved.clone();
-        comparison.take_better(&mut same, &moved);
-        assert_eq!(same.data(), moved.data());
+        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better than itself, or than what is as near as that.
+        for (other, apart) in [(&moved, 0.0), (&still, 1.0)] {
+            let mut same = moved.clone();
+            assert!(!comparison.take_better(&mut same, other, apart));
+            assert_eq!(same.data(), moved.data());
+        }
     }
 
     #[test]

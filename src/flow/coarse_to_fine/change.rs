@@ -71,7 +71,7 @@ pub(super) fn settle<T: SimdReal>(
         chosen.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
         workspace.give_back_large();
         let level = &pyramid.levels()[last];
-        Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own);
+        Comparison { simd, level, compared: Compared::Ahead, scale, pool, space }.take_better(motion, &own, 0.0);
         space.keep(own);
     }
     for planes in [ahead, data] {

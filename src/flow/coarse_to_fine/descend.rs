@@ -23,6 +23,14 @@ const OBJECT: usize = 4;
 /// Sites along the edge that do not count: what leaves the frame there may drift for ever.
 const RIM: usize = 2;
 
+/// Iterations with loose bonds, and these: each site follows its own data. A small object that moves before a still ground is held back by the usual ones, but the
+/// ground could not be told as well.
+const LOOSE: (usize, Coupling) = (3, Coupling { flow: 1.0, jacobian: 100.0, break_at: 0.1, sweeps: 4, reweigh: 2 });
+/// What they find is another motion when it is further away than this, px of the level; nearer, it is the same with more noise.
+const ANOTHER: f64 = 0.5;
+/// Iterations that join both motions.
+const JOINED: usize = 2;
+
 /// What all iterations have in common.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
@@ -96,7 +104,7 @@ impl Plan {
         let mut own = space.planes(0, 0, MOTION);
         finer(self.simd, &above, level.size, &mut own);
         let comparison = Comparison { simd: self.simd, level, compared: Compared::Ahead, scale, pool, space };
-        comparison.take_better(motion, &own);
+        comparison.take_better(motion, &own, 0.0);
         for planes in [above, data, own] {
             space.keep(planes);
         }
@@ -122,14 +130,21 @@ impl Plan {
                 finer(self.simd, &old, level.size, &mut motion);
             }
             for _ in 0..limit.most {
-                std::mem::swap(&mut motion, &mut old);
-                rederive(&old, &mut motion);
-                let change = step.iterate(level, &limit.coupling, &mut motion);
+                let change = step.advance(level, &limit.coupling, (&mut motion, &mut old));
                 // On the finest level what is left to do is for the coarser ones to have done.
                 let is_calm = || k == self.last || moving(&old, &motion) < OBJECT;
                 if change <= limit.settled && is_calm() {
                     break;
                 }
+            }
+            if limit.loosened {
+                let mut loose = copy(space, &motion);
+                step.repeat(LOOSE.0, level, &LOOSE.1, (&mut loose, &mut old));
+                let comparison = Comparison { simd: self.simd, level, compared, scale: step.scale, pool, space };
+                if comparison.take_better(&mut motion, &loose, ANOTHER) {
+                    step.repeat(JOINED, level, &limit.coupling, (&mut motion, &mut old));
+                }
+                space.keep(loose);
             }
         }
         space.keep(old);
@@ -193,6 +208,31 @@ struct Step<'a, T> {
 }
 
 impl<T: SimdReal> Step<'_, T> {
+    /// Iterates once; the motion before is the `old` one afterwards.
+    fn advance(
+        &mut self,
+        level: &PyramidLevel<T>,
+        coupling: &Coupling,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+    ) -> f64 {
+        std::mem::swap(motion, old);
+        rederive(old, motion);
+        self.iterate(level, coupling, motion)
+    }
+
+    /// Iterates so many times.
+    fn repeat(
+        &mut self,
+        count: usize,
+        level: &PyramidLevel<T>,
+        coupling: &Coupling,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+    ) {
+        for _ in 0..count {
+            self.advance(level, coupling, (motion, old));
+        }
+    }
+
     /// Linearises about `motion` and moves it; by how much, px (root mean square).
     fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, motion: &mut Planes<T>) -> f64 {
         let views = level.views(self.compared);

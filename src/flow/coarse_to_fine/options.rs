@@ -52,6 +52,7 @@ impl Preset {
                 settled: [0.02; 2],
                 coupling: Coupling { sweeps: 4, ..coupling },
                 finest_sweeps: 4,
+                loosened: None,
             },
             Self::Balanced => Effort {
                 last: 0,
@@ -60,6 +61,7 @@ impl Preset {
                 settled: [finest_settled, 0.023],
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
                 finest_sweeps,
+                loosened: Some(2),
             },
             Self::Accurate => Effort {
                 last: 0,
@@ -68,6 +70,7 @@ impl Preset {
                 settled: [0.003; 2],
                 coupling: Coupling { break_at: 0.2, ..coupling },
                 finest_sweeps: coupling.sweeps,
+                loosened: Some(2),
             },
         }
     }
@@ -88,12 +91,18 @@ pub(super) struct Effort {
     pub coupling: Coupling,
     /// Sweeps of the coupling on the finest level: they cost a fraction of what a linearisation does, and most of what is left after one is theirs to do.
     pub finest_sweeps: usize,
+    /// From so many levels above that one on, bonds are loosened at the end, for small objects to come free; `None`: nowhere.
+    pub loosened: Option<usize>,
 }
 
 /// Pixels of a level on which work costs next to nothing.
 const SMALL: usize = 2500;
-/// Iterations and sweeps there: what coarse levels miss is lost.
-const COARSE: (usize, usize) = (10, 10);
+/// Most iterations there: what coarse levels miss is lost.
+const COARSE_ITERATIONS: usize = 20;
+/// Sweeps there.
+const COARSE_SWEEPS: usize = 10;
+/// Bonds there break at this strain, if not at less: neighbours are far from each other, and under a fast rotation move differently.
+const COARSE_BREAK: f64 = 0.07;
 
 /// When a level is done.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,14 +113,18 @@ pub(super) struct Limits {
     pub settled: f64,
     /// After each iteration.
     pub coupling: Coupling,
+    /// Whether sites are tried without their neighbours then.
+    pub loosened: bool,
 }
 
 impl Effort {
     /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is known yet.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> Limits {
+        let loosened = self.loosened.is_some_and(|above| k >= self.last + above);
         if is_coarsest || size.0 * size.1 <= SMALL {
-            let coupling = Coupling { sweeps: COARSE.1, ..self.coupling };
-            return Limits { coupling, ..self.up_to(k, COARSE.0) };
+            let break_at = self.coupling.break_at.min(COARSE_BREAK);
+            let coupling = Coupling { sweeps: COARSE_SWEEPS, break_at, ..self.coupling };
+            return Limits { coupling, loosened: loosened && !is_coarsest, ..self.up_to(k, COARSE_ITERATIONS) };
         }
         let [finest, second, others] = self.iterations;
         let most = match k.saturating_sub(self.last) {
@@ -119,7 +132,7 @@ impl Effort {
             1 => second,
             _ => others,
         };
-        self.up_to(k, most)
+        Limits { loosened, ..self.up_to(k, most) }
     }
 
     /// So many iterations at most on level `k`.
@@ -127,7 +140,7 @@ impl Effort {
         let [finest, others] = self.settled;
         let (settled, sweeps) =
             if k <= self.last { (finest, self.finest_sweeps) } else { (others, self.coupling.sweeps) };
-        Limits { most, settled, coupling: Coupling { sweeps, ..self.coupling } }
+        Limits { most, settled, coupling: Coupling { sweeps, ..self.coupling }, loosened: false }
     }
 }
 
