@@ -3,7 +3,8 @@
 use super::layers::{Background, grown, holds, is_inside};
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
-use crate::track::gradient::local_flow::{MAD, median, shifted};
+use crate::simd::{Kernel, Lanes, Level, dispatch};
+use crate::track::gradient::local_flow::{MAD, median, shifted_into};
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
 
@@ -35,6 +36,8 @@ const CAP: f64 = 25.0;
 const LEAST_INFORMATION: f64 = 0.05;
 /// Brightness ratios nearer to 1 are none.
 const LEAST_LIGHT: f64 = 0.01;
+/// Least jump of the whole scene's level that is taken for one, grey levels.
+const JUMP: f64 = 64.0;
 
 /// A frame and its reductions, made when they are first asked for: the next frame needs them again.
 #[derive(Debug, Default)]
@@ -104,17 +107,34 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
 fn reduced(frame: &Frame<f64>, factor: usize) -> Frame<f64> {
     let (width, height) = (frame.width() / factor, frame.height() / factor);
     let mut small = Frame::filled(width, height, 0.0);
-    for y in 0..height {
-        let target = small.row_mut(y);
-        for j in factor * y..factor * (y + 1) {
-            let squares = frame.row(j).chunks_exact(factor);
-            target.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square.iter().sum::<f64>());
-        }
-        for sum in target {
-            *sum /= (factor * factor) as f64;
+    dispatch(Level::detect(), Squares { frame, factor, small: &mut small });
+    smooth(&small, SIGMA)
+}
+
+/// Means over squares: rows are added first, which lanes like.
+struct Squares<'a> {
+    frame: &'a Frame<f64>,
+    factor: usize,
+    small: &'a mut Frame<f64>,
+}
+
+impl Kernel<f64> for Squares<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let Self { frame, factor, small } = self;
+        let mut line = vec![0.0; frame.width()];
+        for y in 0..small.height() {
+            line.copy_from_slice(frame.row(factor * y));
+            for j in factor * y + 1..factor * (y + 1) {
+                line.iter_mut().zip(frame.row(j)).for_each(|(sum, value)| *sum += value);
+            }
+            for (mean, square) in small.row_mut(y).iter_mut().zip(line.chunks_exact(factor)) {
+                *mean = square.iter().sum::<f64>() / (factor * factor) as f64;
+            }
         }
     }
-    smooth(&small, SIGMA)
 }
 
 fn shrunk(bounds: TargetBox, factor: usize) -> TargetBox {
@@ -237,51 +257,72 @@ fn deviation_of_the_better_half(residuals: &[f64]) -> f64 {
     *sizes.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTILE
 }
 
-/// Brightness of the frame over that of the background, where both are known: a robust ratio; 1 unless it explains the frame better.
-pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> f64 {
+/// What the light made of the scene's brightness b: it is seen as `gain b + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Light {
+    pub gain: f64,
+    /// Grey levels.
+    pub offset: f64,
+}
+
+impl Light {
+    /// That of the first frame.
+    pub const USUAL: Self = Self { gain: 1.0, offset: 0.0 };
+
+    /// The brightness that it would have been in the usual light.
+    #[inline(always)]
+    pub fn undone(self, seen: f64) -> f64 {
+        (seen - self.offset) / self.gain
+    }
+}
+
+/// The light of the frame against that of the background, where both are known: a robust ratio where that explains the frame better, or else a jump of the level, which no light makes but some
+/// cameras do.
+pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> Light {
     let hidden = grown(target, (0.0, AROUND));
     let pairs: Vec<[f64; 2]> = spread(frame.size(), hidden, LIGHT_SAMPLES)
         .filter(|(x, y)| background.known.get(*x, *y))
         .map(|(x, y)| [frame.get(x, y), background.picture.get(x, y)])
         .collect();
+    let residual = |light: Light| pairs.iter().map(|[e, b]| (light.undone(*e) - b).abs().min(CAP)).sum::<f64>();
+    let better = |light: Light, than: Light| residual(light) < LESS * residual(than);
     let mut ratios: Vec<f64> = pairs.iter().filter(|[_, b]| *b > 1.0).map(|[e, b]| e / b).collect();
-    if ratios.is_empty() {
-        return 1.0;
-    }
-    let ratio = median(&mut ratios);
-    if !(0.1..10.0).contains(&ratio) || (ratio - 1.0).abs() < LEAST_LIGHT {
-        return 1.0;
-    }
-    let residual = |ratio: f64| pairs.iter().map(|[e, b]| (e / ratio - b).abs().min(CAP)).sum::<f64>();
-    if residual(ratio) < LESS * residual(1.0) { ratio } else { 1.0 }
+    let gain = median(&mut ratios);
+    let possible = (0.1..10.0).contains(&gain) && (gain - 1.0).abs() >= LEAST_LIGHT;
+    let brighter = Light { gain, ..Light::USUAL };
+    let found = if possible && better(brighter, Light::USUAL) { brighter } else { Light::USUAL };
+    let mut differences: Vec<f64> = pairs.iter().map(|[e, b]| e - b).collect();
+    let jumped = Light { offset: median(&mut differences), ..Light::USUAL };
+    if jumped.offset.abs() > JUMP && better(jumped, found) { jumped } else { found }
 }
 
 impl Background {
-    /// The scene moved by so many px in the picture.
+    /// The scene moved by so many px in the picture. What comes into view is taken as it is seen, but does not count as known.
     pub(super) fn moved(&mut self, by: [f64; 2], frame: &Frame<f64>) {
         let back = by.map(|b| -b);
-        let picture = shifted(&self.picture, back);
         let (width, height) = self.known.size();
+        let picture = shifted_into(std::mem::take(&mut self.spare), &self.picture, back);
+        let picture = Frame::new(width, height, picture).unwrap_or_default();
+        self.spare = std::mem::replace(&mut self.picture, picture).into_data();
         // The pixel nearest to where one comes from, if that is in the picture.
         let from = |length: usize, back: f64| {
             let last = length as f64 - 1.0;
             let place = move |at: usize| at as f64 + back;
             move |at: usize| (0.0..=last).contains(&place(at)).then(|| ((place(at) + 0.5) as usize).min(length - 1))
         };
-        let columns: Vec<_> = (0..width).map(from(width, back[0])).collect();
-        let from_row = from(height, back[1]);
+        let (from_column, from_row) = (from(width, back[0]), from(height, back[1]));
+        let columns: Vec<_> = (0..width).map(from_column).collect();
         let mut known = Frame::filled(width, height, false);
         for y in 0..height {
-            let Some(row) = from_row(y).map(|j| self.known.row(j)) else { continue };
-            let brightness = picture.row(y).iter().zip(&columns);
-            for (known, (value, column)) in known.row_mut(y).iter_mut().zip(brightness) {
-                *known = value.is_finite() && column.is_some_and(|i| row[i]);
+            let row = from_row(y).map(|j| self.known.row(j));
+            let brightness = self.picture.row_mut(y).iter_mut().zip(frame.row(y)).zip(&columns);
+            for (known, ((value, seen), column)) in known.row_mut(y).iter_mut().zip(brightness) {
+                if value.is_finite() {
+                    *known = row.is_some_and(|row| column.is_some_and(|i| row[i]));
+                } else {
+                    *value = *seen;
+                }
             }
-        }
-        // What comes into view is taken as it is seen, but does not count as known.
-        self.picture = picture;
-        for (b, e) in self.picture.data_mut().iter_mut().zip(frame.data()) {
-            *b = if b.is_finite() { *b } else { *e };
         }
         self.known = known;
     }

@@ -1,6 +1,6 @@
 //! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
 
-use super::camera::{self, Seen};
+use super::camera::{self, Light, Seen};
 use super::find::{DOUBT, Finding};
 use super::{Layered, SURE, learn};
 use crate::track::gradient::options::CameraMotion;
@@ -40,13 +40,13 @@ impl Layered {
     }
 
     /// The frame, so bright as if the light were what it was at first.
-    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: f64) -> Frame<f64> {
+    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: Light) -> Frame<f64> {
         let mut data = std::mem::take(&mut self.spare);
         data.clear();
-        if light == 1.0 {
+        if light == Light::USUAL {
             data.extend_from_slice(frame.data());
         } else {
-            data.extend(frame.data().iter().map(|value| value / light));
+            data.extend(frame.data().iter().map(|value| light.undone(*value)));
         }
         Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
     }
