@@ -10,6 +10,7 @@ mod front;
 mod layers;
 mod learn;
 mod level;
+mod light;
 mod look;
 mod nodes;
 mod outgrown;
@@ -167,7 +168,7 @@ impl Layered {
         self.gap += 1;
         let Some(frame) = frame else { return self.pass_over(state, UNUSABLE) };
         let bounds = self.reached(&self.pose);
-        let light = camera::light(frame, &self.background, bounds);
+        let light = light::light(frame, &self.background, bounds);
         let seen = Seen::new(self.in_usual_light(frame, light));
         let motion = self.camera_motion(&seen, bounds);
         if self.is_wild(&seen.frame, bounds, motion) {

@@ -1,7 +1,8 @@
 //! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
 
-use super::camera::{self, Light, Seen};
+use super::camera::{self, Seen};
 use super::find::{DOUBT, Finding};
+use super::light::Light;
 use super::{Layered, SURE, learn};
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
