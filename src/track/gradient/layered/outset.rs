@@ -58,7 +58,7 @@ pub(super) struct Uncovered {
 
 impl Outset {
     pub fn new(frame: &Frame<f64>, bounds: TargetBox, target: Target) -> Self {
-        let reach = [bounds.width, bounds.height].map(|side| 0.85 * side + FARTHEST as f64 + 2.0);
+        let reach = [bounds.width, bounds.height].map(|side| side / 2.0 + FARTHEST as f64 + 2.0);
         let cut = bounds_about(bounds.centre(), reach, frame.size());
         let first = Patch::cut(frame, cut);
         let ((width, height), [x0, y0]) = (first.frame.size(), first.corner);
