@@ -16,6 +16,7 @@ Frames are arrays (H, W) of uint8, uint16, float32 or float64; positions are (x,
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any, NoReturn
@@ -24,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
+from ._stereo_options import real_number
 from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
 __all__ = [
@@ -171,15 +173,21 @@ class GradientTracker:
         eps: float | str = 0.5,
     ) -> None:
         box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
-        if isinstance(eps, str) and eps != "auto":
+        words = [_word(name, value) for name, value in (("method", method), ("control", control), ("model", model), ("camera", camera))]
+        mode, steering, shape, swing = words
+        side, degree, windows = (
+            None if value is None else _whole(name, value) for name, value in (("fov", fov), ("order", order), ("window", window))
+        )
+        if eps is None or (isinstance(eps, str) and eps != "auto"):
             raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
-        slowest = None if eps == "auto" else float(eps)
-        self._tracker = _GradientTracker(_frame(frame), box, point, method, fov, control, model, camera, order, window, slowest)
+        slowest = None if isinstance(eps, str) else real_number("eps", eps)
+        self._tracker = _GradientTracker(_frame(frame), box, point, mode, side, steering, shape, swing, degree, windows, slowest)
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
 
-        So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is.
+        So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant
+        of more than 64 grey levels that is added to a whole frame is taken off.
 
         Raises
         ------
@@ -200,6 +208,31 @@ class GradientTracker:
 def _frame(frame: ArrayLike) -> NDArray[Any]:
     """A frame as an array; a masked one stays what it is, and is refused."""
     return frame if isinstance(frame, np.ndarray) else np.asarray(frame)
+
+
+_WORDS = {
+    "method": '"layered", "local" or "paper"',
+    "control": '"integer" or "subpixel"',
+    "model": '"similarity" or "affine"',
+    "camera": '"auto" or "none"',
+    "measures": '"mean" or "instant"',
+}
+"""Arguments that take a word, and the words."""
+
+
+def _word(name: str, value: Any) -> str:
+    """A word; which ones there are the compiled part checks."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name}: expected {_WORDS[name]}, got {value!r}")
+    return value
+
+
+def _whole(name: str, value: Any) -> int:
+    """An integer of any size; what is too large for it the compiled part tells."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected an integer, got {value!r}") from None
 
 
 def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float] | None:
@@ -236,7 +269,7 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 
 def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
     """Beaudet's masks (value, along x, along y), three arrays (5, 5) [row, column] = [y, x]: value and slopes (1/px) at the middle of a least-squares polynomial of total degree `order`, 1 to 4."""
-    value, along_x, along_y = _derivative_kernels(order)
+    value, along_x, along_y = _derivative_kernels(_whole("order", order))
     return value, along_x, along_y
 
 
@@ -258,14 +291,21 @@ def local_flow(
     `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
     levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
     """
-    return PixelFlow(*_local_flow(_frame(first), _frame(second), False, window, order, cond_max, min_sigma, step_max))
+    return _flow_of_pixels(first, second, False, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
 
 
 def refine_flow(
     first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
 ) -> PixelFlow:
     """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
-    return PixelFlow(*_local_flow(_frame(first), _frame(second), True, window, order, cond_max, min_sigma, step_max))
+    return _flow_of_pixels(first, second, True, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
+
+
+def _flow_of_pixels(first: ArrayLike, second: ArrayLike, refined: bool, *, window: int, order: int, **limits: float) -> PixelFlow:
+    """Flow from a frame (H, W) to the next, px/frame; each option is checked by its name."""
+    sizes = _whole("window", window), _whole("order", order)
+    numbers = (real_number(name, value) for name, value in limits.items())
+    return PixelFlow(*_local_flow(_frame(first), _frame(second), refined, *sizes, *numbers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +330,7 @@ def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
         raise ValueError(f"flow: expected a field (H, W, 2), got shape {field.shape}")
     if valid.shape != field.shape[:2]:
         raise ValueError(f"valid: expected an array {field.shape[:2]} like the flow, got shape {valid.shape}")
-    velocity, centroid, count = _mean_flow(field, valid, eps)
+    velocity, centroid, count = _mean_flow(field, valid, real_number("eps", eps))
     return MeanFlow(np.array(velocity), np.array(centroid), count)
 
 
@@ -352,7 +392,7 @@ class GaussMarkovFilter:
         self, position: ArrayLike, *, alpha: float = 0.8, q: float = 0.5, start: ArrayLike = (1.0, 4.0, 1.0), measures: str = "mean"
     ) -> None:
         place, variances = _needed("position", position, "(x, y)", 2), _needed("start", start, "three variances", 3)
-        self._filter = _GaussMarkovFilter(place, alpha, q, variances, measures)
+        self._filter = _GaussMarkovFilter(place, real_number("alpha", alpha), real_number("q", q), variances, _word("measures", measures))
 
     def __getstate__(self) -> dict[str, Any]:
         return self._filter.save()

@@ -22,7 +22,8 @@ use output::TrackOutputArguments;
     the MOT challenge's frame,id,x,y,w,h,conf,-1,-1,-1, counted from 1. Targets are followed independently of each other.\n\
     stereo: csv has one row a cluster and step (track, group, x, y, disparity, motion, covariance, ...), json the graph of all clusters. Brightness is\n\
     taken on the scale 0 to 255: 16-bit samples are divided by 257, floats that do not exceed 1.5 in the first frame multiplied by 255.\n\
-    What exists is not replaced without --force. When a run is stopped (Ctrl-C), what there is is kept in name.partial.csv, ....\n\n\
+    What exists is not replaced without --force, and pictures of an earlier run not before the new one is complete. When a run is stopped (Ctrl-C), what\n\
+    there is is kept in name.partial.csv, ....\n\n\
     Examples:\n  \
     jacoflow track film.y4m > track.csv\n  \
     jacoflow track frames/ --box 120,80,24,30 --box 40,60,12,12 -o out/ --format csv,mot\n  \

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
 /// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it without that removes it.
 ///
@@ -27,14 +27,43 @@ enum Inner {
 #[derive(Debug)]
 struct Temporary(Option<NamedTempFile>);
 
-/// Names of the temporary files that this process has now.
+/// A folder under a temporary name inside another one, for files that are to appear together; it goes, with what is left in it, when this is dropped.
+#[derive(Debug)]
+pub(crate) struct TemporaryFolder(TempDir);
+
+impl TemporaryFolder {
+    /// Makes one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with `folder` when that may not be written.
+    pub fn inside(folder: &Path) -> Result<Self> {
+        let mut names = temporaries();
+        let made = tempfile::Builder::new().prefix(".jacoflow-").suffix(".part").tempdir_in(folder);
+        let made = made.map_err(|error| Error::io(folder, error))?;
+        names.push(made.path().to_path_buf());
+        Ok(Self(made))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        temporaries().retain(|name| name != self.0.path());
+    }
+}
+
+/// Names of the temporary files and folders that this process has now.
 static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary file of this process, for whoever ends it without unwinding (a second Ctrl-C).
+/// Removes every temporary file and folder of this process, for whoever ends it without unwinding (a second Ctrl-C).
 ///
 /// While the returned guard lives no other thread can begin or name a file: keep it to the end.
 #[must_use = "files made after the guard is dropped are not removed"]
@@ -42,7 +71,7 @@ pub(crate) fn remove_temporaries() -> impl Drop {
     let mut names = temporaries();
     for name in names.drain(..) {
         // What cannot be removed cannot be helped any more.
-        let _ = std::fs::remove_file(name);
+        let _ = std::fs::remove_file(&name).or_else(|_| std::fs::remove_dir_all(&name));
     }
     names
 }

@@ -2,9 +2,11 @@
 
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
+use crate::io::write::TemporaryFolder;
 use crate::io::{FilmWriter, NumberedFiles, write_picture};
 use crate::pipeline::output::{check_target, is_folder};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Takes pictures one after the other.
@@ -18,6 +20,8 @@ pub(super) struct Album {
 #[derive(Debug)]
 enum Place {
     Folder(NumberedFiles),
+    /// A folder that holds pictures of an earlier run, until this one is complete.
+    Replaced(Replacement),
     Film(TableTarget, Option<FilmWriter>),
 }
 
@@ -47,8 +51,10 @@ impl Album {
     pub fn create(path: &Path, stem: &str, argument: &'static str, frame_rate: f64) -> Result<Self> {
         let place = if is_film(path, argument)? {
             Place::Film(TableTarget::File(path.to_path_buf()), Some(FilmWriter::create(path, frame_rate)?))
-        } else {
+        } else if earlier(path, stem).is_empty() {
             Place::Folder(NumberedFiles::create(path, stem, "png")?)
+        } else {
+            Place::Replaced(Replacement::new(path, stem)?)
         };
         Ok(Self { place, written: 0, latest: None })
     }
@@ -61,14 +67,7 @@ impl Album {
                 other => other,
             });
         }
-        let entries = path.read_dir().into_iter().flatten().flatten();
-        let ours = |path: &PathBuf| {
-            let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            let number = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix('_'));
-            path.extension().is_some_and(|e| e == "png")
-                && number.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
-        };
-        match entries.map(|entry| entry.path()).find(ours) {
+        match earlier(path, stem).into_iter().next() {
             Some(path) => {
                 let wanted = "a place without earlier results (--force replaces them)";
                 Err(Error::argument(argument, wanted, path.display()))
@@ -85,22 +84,31 @@ impl Album {
                 write_picture(&file, picture)?;
                 self.latest = Some(file);
             }
+            Place::Replaced(new) => {
+                write_picture(new.files.path(index), picture)?;
+                self.latest = Some(new.in_place.path(index));
+            }
             Place::Film(_, writer) => writer.iter_mut().try_for_each(|film| film.write(picture))?,
         }
         self.written += 1;
         Ok(())
     }
 
-    /// A film gets its name when the run is complete; what there is of one that was stopped is kept as `name.partial.y4m`.
+    /// A film gets its name when the run is complete; what there is of one that was stopped is kept as `name.partial.y4m`. Pictures of an earlier run are replaced, all of them, when the run
+    /// is complete; those of one that was stopped are kept in `name.partial` beside them.
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
         let any = self.written > 0;
-        if let Place::Film(target, writer) = &mut self.place
-            && let Some(film) = writer.take()
-        {
-            self.latest = end_table(target, ending, any, |name| match name {
-                None => film.finish(),
-                Some(path) => film.finish_as(path),
-            })?;
+        match &mut self.place {
+            Place::Folder(_) => {}
+            Place::Replaced(new) => self.latest = new.finish(ending, self.latest.as_ref())?,
+            Place::Film(target, writer) => {
+                if let Some(film) = writer.take() {
+                    self.latest = end_table(target, ending, any, |name| match name {
+                        None => film.finish(),
+                        Some(path) => film.finish_as(path),
+                    })?;
+                }
+            }
         }
         Ok(())
     }
@@ -108,8 +116,118 @@ impl Album {
     /// How many files there are, and the last of them.
     pub fn files(&self) -> (usize, Option<PathBuf>) {
         match &self.place {
-            Place::Folder(_) => (self.written, self.latest.clone()),
+            Place::Folder(_) | Place::Replaced(_) => (self.written, self.latest.clone()),
             Place::Film(..) => (usize::from(self.latest.is_some()), self.latest.clone()),
         }
+    }
+}
+
+/// Pictures `stem_000012.png` in a folder.
+fn earlier(folder: &Path, stem: &str) -> Vec<PathBuf> {
+    let ours = |path: &PathBuf| {
+        let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let number = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix('_'));
+        path.extension().is_some_and(|e| e == "png") && number.is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let entries = folder.read_dir().into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).filter(ours).collect()
+}
+
+/// Pictures that take the place of earlier ones: they wait in a folder of their own inside the other, which goes when this is dropped.
+#[derive(Debug)]
+struct Replacement {
+    folder: PathBuf,
+    stem: String,
+    waiting: TemporaryFolder,
+    files: NumberedFiles,
+    in_place: NumberedFiles,
+}
+
+impl Replacement {
+    fn new(folder: &Path, stem: &str) -> Result<Self> {
+        let waiting = TemporaryFolder::inside(folder)?;
+        let files = NumberedFiles::create(waiting.path(), stem, "png")?;
+        let in_place = NumberedFiles::create(folder, stem, "png")?;
+        Ok(Self { folder: folder.to_path_buf(), stem: stem.into(), waiting, files, in_place })
+    }
+
+    /// Replaces the earlier pictures, or keeps what there is beside them; tells where `latest` is then.
+    fn finish(&self, ending: Ending, latest: Option<&PathBuf>) -> Result<Option<PathBuf>> {
+        let (to, stale) = match ending {
+            Ending::Complete => (self.folder.clone(), earlier(&self.folder, &self.stem)),
+            Ending::Partial if latest.is_none() => return Ok(None),
+            Ending::Partial => {
+                let beside = self.partial();
+                std::fs::create_dir_all(&beside).map_err(|error| Error::io(&beside, error))?;
+                let stale = earlier(&beside, &self.stem);
+                (beside, stale)
+            }
+        };
+        let new = earlier(self.waiting.path(), &self.stem);
+        let place = |picture: &PathBuf| picture.file_name().map(|name| to.join(name));
+        let kept: HashSet<PathBuf> = new.iter().filter_map(place).collect();
+        for picture in stale.into_iter().filter(|picture| !kept.contains(picture)) {
+            std::fs::remove_file(&picture).map_err(|error| Error::io(&picture, error))?;
+        }
+        for picture in &new {
+            let Some(target) = place(picture) else { continue };
+            std::fs::rename(picture, &target).map_err(|error| Error::io(&target, error))?;
+        }
+        Ok(latest.and_then(place))
+    }
+
+    /// Where the pictures of a run that was stopped go: `pictures` has `pictures.partial` beside it.
+    fn partial(&self) -> PathBuf {
+        // A folder such as `.` has no name of its own.
+        let folder = self.folder.canonicalize().unwrap_or_else(|_| self.folder.clone());
+        let mut name = folder.file_name().unwrap_or_default().to_os_string();
+        name.push(".partial");
+        folder.with_file_name(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::picture::GreyRange;
+    use crate::types::{AnyFrame, Frame};
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = folder.read_dir().into_iter().flatten().flatten();
+        let mut names: Vec<_> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// A run over so many frames of a level; what the folder holds before it ends.
+    fn run(folder: &Path, level: u8, frames: usize, ending: Ending) -> (Vec<String>, Album) {
+        let frame = AnyFrame::U8(Frame::from_fn(16, 16, |x, _| if x == 0 { level } else { 0 }));
+        let picture = GreyRange::of(&AnyFrame::U8(Frame::from_fn(2, 1, |x, _| 255 * x as u8))).picture(&frame);
+        let mut album = Album::create(folder, "track", "overlay", 25.0).unwrap();
+        (0..frames).for_each(|index| album.add(index, &picture).unwrap());
+        let before = names(folder);
+        album.finish(ending).unwrap();
+        (before, album)
+    }
+
+    #[test]
+    fn earlier_pictures_are_replaced_by_those_of_a_complete_run_and_by_no_others() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("p");
+        run(&folder, 200, 5, Ending::Complete);
+        std::fs::write(folder.join("notes.txt"), "mine").unwrap();
+        let first = std::fs::read(folder.join("track_000001.png")).unwrap();
+        let (before, album) = run(&folder, 90, 3, Ending::Partial);
+        assert!(before.contains(&"track_000004.png".into()), "{before:?}");
+        drop(album);
+        assert_eq!(names(&folder).len(), 6, "the earlier five, and what is the user's");
+        assert_eq!(std::fs::read(folder.join("track_000001.png")).unwrap(), first);
+        assert_eq!(names(&home.path().join("p.partial")).len(), 3);
+        let (_, album) = run(&folder, 90, 2, Ending::Complete);
+        let (count, latest) = album.files();
+        assert_eq!((count, latest), (2, Some(folder.join("track_000001.png"))));
+        drop(album);
+        assert_eq!(names(&folder), ["notes.txt", "track_000000.png", "track_000001.png"]);
+        assert_ne!(std::fs::read(folder.join("track_000001.png")).unwrap(), first);
     }
 }

@@ -136,6 +136,8 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     let again = place.line(&format!("track s.y4m {BOX} --overlay local"));
     assert!(again.code == 2 && again.err.contains("overlay") && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("track s.y4m {BOX} --overlay local --force"));
+    place.good(&format!("track s.y4m {BOX} --limit 2 --overlay local --force"));
+    assert_eq!(place.names("local"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
     // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
     let film = format!("track s.y4m {BOX} --overlay film.y4m --enlarge 2");
     place.good(&film);

@@ -64,6 +64,11 @@ impl Extent {
         Self { usual }
     }
 
+    /// How far apart the ends usually are along x and y, px.
+    pub fn usual(&self) -> [f64; 2] {
+        self.usual
+    }
+
     /// The middle along x and y, where the ends are the target's; `expected` middle and `lengths` of the picture, px.
     pub fn middle(&self, ends: &Ends, expected: [f64; 2], lengths: [f64; 2]) -> [Option<Middle>; 2] {
         std::array::from_fn(|k| {

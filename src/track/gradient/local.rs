@@ -42,6 +42,20 @@ const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
 const LEAST_EPS: f64 = 0.3;
 
+/// Moving pixels around the target, over those of all that moves, from which on they are more than a few strays.
+const ALL: f64 = 0.25;
+/// What is said where what is around the target moves as well.
+const ALL_MOVES: &str = "all around the target moves, too";
+
+/// What a pair of windows tells.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    mean: MeanFlow,
+    ends: Option<Ends>,
+    /// Whether what is around the target moves as well.
+    all_moves: bool,
+}
+
 /// One target in the loop.
 #[derive(Debug)]
 pub(super) struct LocalLoop {
@@ -104,11 +118,14 @@ impl LocalLoop {
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
         let second = frame.map(|frame| self.cut(frame));
         let told = second.as_ref().map(|second| self.measure(second));
-        let (found, ends) = (told.map(|told| told.0), told.and_then(|told| told.1));
+        let (found, ends) = (told.map(|told| told.mean), told.and_then(|told| told.ends));
+        let all_moves = told.is_some_and(|told| told.all_moves);
         let was_lost = self.missed >= LOST_AFTER;
         self.filter.predict();
         let (mut innovation, mut measured) = (f64::NAN, false);
         match &found {
+            // The mean of what moves is not the target's.
+            Some(_) if all_moves => {}
             Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
                 let missing = if self.rules.careful { 1.0 - self.share(mean.count) } else { 0.0 };
                 let (place, lean) = self.place(mean, ends.as_ref(), missing);
@@ -148,6 +165,9 @@ impl LocalLoop {
             self.before = self.cut(frame);
         }
         self.tell(state, found, (innovation, measured, was_lost));
+        if all_moves && state.status == TrackStatus::Coasting {
+            state.reason = ALL_MOVES;
+        }
     }
 
     /// Where the target is by what moves, and the deviations of that along x and y beyond what noise makes, px, where a share of what usually moves is `missing`: the middle between its ends, or the mean
@@ -196,7 +216,7 @@ impl LocalLoop {
     }
 
     /// What moves in the window between the last frame and the `second`, which is that of this one.
-    fn measure(&self, second: &Frame<f64>) -> (MeanFlow, Option<Ends>) {
+    fn measure(&self, second: &Frame<f64>) -> Measured {
         let first = &self.before;
         let velocity = self.filter.speed();
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
@@ -204,12 +224,14 @@ impl LocalLoop {
         self.keep_window(&mut flow);
         let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
         let mut mean = flow.mean(eps);
+        let all_moves = self.rules.careful && self.all_moves(&flow, &mean, eps);
         let corner = self.corner();
         mean.centroid = [mean.centroid[0] + corner[0], mean.centroid[1] + corner[1]];
         // What is farther than a step of local flow moves where it was and where it is.
         let near = mean.velocity[0].hypot(mean.velocity[1]) < self.rules.flow.step_max;
         let ends = ends(&flow, eps).filter(|_| self.rules.careful && near);
-        (mean, ends.map(|ends| [0, 1].map(|k| ends[k].map(|end| end + corner[k] + mean.velocity[k]))))
+        let ends = ends.map(|ends| [0, 1].map(|k| ends[k].map(|end| end + corner[k] + mean.velocity[k])));
+        Measured { mean, ends, all_moves }
     }
 
     /// Centre of the window that is cut.
@@ -255,20 +277,34 @@ impl LocalLoop {
         }
     }
 
-    /// Three deviations of the accepted flow outside the target, as far off that no window of local flow sees any of it.
+    /// Three deviations of the accepted flow outside the target.
     fn automatic_eps(&self, flow: &LocalFlow) -> f64 {
+        let mut sizes: Vec<f64> = self.around(flow).flat_map(|w| w.map(f64::abs)).collect();
+        (3.0 * MAD * median(&mut sizes)).max(LEAST_EPS)
+    }
+
+    /// Whether most of what is around the target moves, and is a good part of all that does: the camera moves, or the window shows something else.
+    fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, eps: f64) -> bool {
+        let (mut moving, mut all) = (0, 0);
+        for w in self.around(flow) {
+            moving += usize::from(w[0].abs() >= eps || w[1].abs() >= eps);
+            all += 1;
+        }
+        2 * moving > all && moving > FEWEST && moving as f64 > ALL * mean.count as f64
+    }
+
+    /// Accepted flow outside the target, as far off that no window of local flow sees any of it.
+    fn around(&self, flow: &LocalFlow) -> impl Iterator<Item = [f64; 2]> {
         let (corner, centre, speed) = (self.corner(), self.filter.position(), self.filter.speed());
-        let reach = [0, 1].map(|k| self.size[k] / 2.0 + MARGIN as f64 + speed[k].abs());
-        let outside = |at: usize| {
-            let place = [at % flow.flow.width(), at / flow.flow.width()];
+        let usual = self.extent.usual();
+        let reach = [0, 1].map(|k| self.size[k].max(usual[k]) / 2.0 + MARGIN as f64 + speed[k].abs());
+        let width = flow.flow.width();
+        let outside = move |at: usize| {
+            let place = [at % width, at / width];
             (0..2).any(|k| (corner[k] + place[k] as f64 - centre[k]).abs() > reach[k])
         };
         let pixels = flow.flow.data().iter().zip(flow.accepted.data()).enumerate();
-        let mut sizes: Vec<f64> = pixels
-            .filter(|(at, (_, accepted))| **accepted && outside(*at))
-            .flat_map(|(_, (w, _))| w.map(f64::abs))
-            .collect();
-        (3.0 * MAD * median(&mut sizes)).max(LEAST_EPS)
+        pixels.filter(move |(at, (_, accepted))| **accepted && outside(*at)).map(|(_, (w, _))| *w)
     }
 
     fn steer(&mut self) {

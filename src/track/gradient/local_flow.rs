@@ -3,6 +3,7 @@
 use super::equations::Equations;
 use super::kernels::kernels_of;
 use crate::image::Interpolation;
+use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 
 /// Factor from the median of absolute deviations to a standard deviation, for Gaussian noise.
@@ -134,19 +135,52 @@ pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
         return frame.clone();
     }
     let (width, height) = frame.size();
-    let (across, down) = (Taps::of(shift[0]), Taps::of(shift[1]));
-    let (columns, rows) = (across.range(width), down.range(height));
-    let mut along = Frame::filled(width, height, f64::NAN);
-    for y in 0..height {
-        let (source, target) = (frame.row(y), &mut along.row_mut(y)[columns.clone()]);
-        across.add(target, |k| &source[across.from(columns.start, k)..]);
-    }
-    let mut out = Frame::filled(width, height, f64::NAN);
-    for y in rows {
-        down.add(out.row_mut(y), |k| along.row(down.from(y, k)));
-    }
-    out
+    Frame::new(width, height, shifted_into(Vec::new(), frame, shift)).unwrap_or_default()
 }
+
+/// The same in memory that was used before.
+pub(super) fn shifted_into(mut memory: Vec<f64>, frame: &Frame<f64>, shift: [f64; 2]) -> Vec<f64> {
+    memory.clear();
+    memory.resize(frame.data().len(), f64::NAN);
+    dispatch(Level::detect(), Shift { frame, taps: shift.map(Taps::of), out: &mut memory });
+    memory
+}
+
+/// Rows are read along x once each, as they are needed, and their sum along y goes to the rows that are told.
+struct Shift<'a> {
+    frame: &'a Frame<f64>,
+    taps: [Taps; 2],
+    out: &'a mut [f64],
+}
+
+impl Kernel<f64> for Shift<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let (width, height) = self.frame.size();
+        let [across, down] = &self.taps;
+        let (columns, rows) = (across.range(width), down.range(height));
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        // Rows read along x, each in the line of its index modulo the number of taps.
+        let mut lines = [0; TAPS].map(|_| vec![0.0; columns.len()]);
+        let mut next = down.from(rows.start, down.first());
+        for y in rows {
+            while next <= down.from(y, down.last()) {
+                let source = self.frame.row(next);
+                across.add(&mut lines[next % TAPS], |k| &source[across.from(columns.start, k)..]);
+                next += 1;
+            }
+            let out = &mut self.out[y * width..][columns.clone()];
+            down.add(out, |k| &lines[down.from(y, k) % TAPS]);
+        }
+    }
+}
+
+/// Pixels that cubic convolution reads along an axis.
+const TAPS: usize = 4;
 
 /// Taps of a shift along one axis; those of weight zero are not needed.
 struct Taps {
@@ -161,12 +195,19 @@ impl Taps {
         Self { whole: shift.floor() as isize - 1, weights }
     }
 
+    fn first(&self) -> usize {
+        self.weights.first().map_or(0, |tap| tap.0)
+    }
+
+    fn last(&self) -> usize {
+        self.weights.last().map_or(0, |tap| tap.0)
+    }
+
     /// Pixels whose taps are all among `length`.
     fn range(&self, length: usize) -> std::ops::Range<usize> {
-        let ends = [self.weights.first(), self.weights.last()].map(|tap| tap.map_or(0, |(k, _)| *k as isize));
         let length = length as isize;
-        let first = (-self.whole - ends[0]).clamp(0, length);
-        let end = (length - self.whole - ends[1]).clamp(first, length);
+        let first = (-self.whole - self.first() as isize).clamp(0, length);
+        let end = (length - self.whole - self.last() as isize).clamp(first, length);
         first as usize..end as usize
     }
 
@@ -176,8 +217,13 @@ impl Taps {
     }
 
     /// The weighted sum of the taps' rows of values.
+    #[inline(always)]
     fn add<'a>(&self, target: &mut [f64], row: impl Fn(usize) -> &'a [f64]) {
-        if target.is_empty() {
+        if let [(a, wa), (b, wb), (c, wc), (d, wd)] = self.weights[..] {
+            let pairs = row(a).iter().zip(row(b)).zip(row(c)).zip(row(d));
+            for (t, (((a, b), c), d)) in target.iter_mut().zip(pairs) {
+                *t = wa * a + wb * b + wc * c + wd * d;
+            }
             return;
         }
         target.fill(0.0);

@@ -1,41 +1,42 @@
-//! What moves and brightens the whole picture: the camera and the light.
+//! What moves the whole picture: the camera.
 
 use super::layers::{Background, grown, holds, is_inside};
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
-use crate::track::gradient::local_flow::{MAD, median, shifted};
+use crate::simd::{Kernel, Lanes, Level, dispatch};
+use crate::track::gradient::local_flow::{MAD, median, shifted_into};
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
+use std::ops::Range;
 
 /// Pictures are reduced by these factors, one after the other.
 const FACTORS: [usize; 3] = [4, 2, 1];
 /// Around the target nothing is used, px.
-const AROUND: f64 = 14.0;
+pub(super) const AROUND: f64 = 14.0;
 /// Gaussian after the reduction, reduced px.
 const SIGMA: f64 = 1.0;
 /// Steps at a level.
 const STEPS: usize = 8;
 /// A level is left when a step is shorter, reduced px.
 const SETTLED: f64 = 0.005;
+/// Motions nearer to each other than this lead to the same, px.
+const SAME: f64 = 0.5;
 /// Shortest motion that is believed, px.
 const LEAST_MOTION: f64 = 0.05;
 /// By how much the capped residual must fall.
-const LESS: f64 = 0.9;
+pub(super) const LESS: f64 = 0.9;
 /// Pixels used at a level, at most.
 const SAMPLES: usize = 4096;
 /// Every which of them the deviation of the residuals is told from.
 const EVERY: usize = 4;
 /// Lower quartile of the absolute value of a standard normal number.
 const QUARTILE: f64 = 0.3186;
-/// Pixels that the light is told from, at most.
-const LIGHT_SAMPLES: usize = 1024;
+/// Pixels that the scatter is told from, at most.
+const SCATTER_SAMPLES: usize = 1024;
 /// Residual that all larger ones count as, grey levels.
-const CAP: f64 = 25.0;
+pub(super) const CAP: f64 = 25.0;
 /// Smallest information of a step, grey^2/px^2 per pixel.
 const LEAST_INFORMATION: f64 = 0.05;
-/// Brightness ratios nearer to 1 are none.
-const LEAST_LIGHT: f64 = 0.01;
-
 /// A frame and its reductions, made when they are first asked for: the next frame needs them again.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
@@ -69,7 +70,8 @@ pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, nois
         let reduced = |m: f64| m / f;
         let mut found = samples.refine(next, motion.map(reduced), noise);
         let finest = factor == 1;
-        if finest && swinging {
+        let goes_on = found.is_some_and(|m| (m[0] - before[0]).hypot(m[1] - before[1]) < SAME);
+        if finest && swinging && !goes_on {
             found = samples.better(next, samples.refine(next, before, noise), found);
         }
         let believed = |m: [f64; 2]| m[0].hypot(m[1]) > LEAST_MOTION / f && samples.tell(next, m);
@@ -94,7 +96,7 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
         let there = if still { now.get(x, y) } else { cubic_at(now, place[0], place[1]) };
         (still || is_inside(place, now)).then(|| there - previous.get(x, y))
     };
-    let mut changes: Vec<f64> = spread(previous.size(), hidden, LIGHT_SAMPLES).filter_map(change).collect();
+    let mut changes: Vec<f64> = spread(previous.size(), hidden, SCATTER_SAMPLES).filter_map(change).collect();
     let middle = median(&mut changes);
     let mut off: Vec<f64> = changes.iter().map(|change| (change - middle).abs()).collect();
     MAD * median(&mut off)
@@ -104,17 +106,34 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
 fn reduced(frame: &Frame<f64>, factor: usize) -> Frame<f64> {
     let (width, height) = (frame.width() / factor, frame.height() / factor);
     let mut small = Frame::filled(width, height, 0.0);
-    for y in 0..height {
-        let target = small.row_mut(y);
-        for j in factor * y..factor * (y + 1) {
-            let squares = frame.row(j).chunks_exact(factor);
-            target.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square.iter().sum::<f64>());
-        }
-        for sum in target {
-            *sum /= (factor * factor) as f64;
+    dispatch(Level::detect(), Squares { frame, factor, small: &mut small });
+    smooth(&small, SIGMA)
+}
+
+/// Means over squares: rows are added first, which lanes like.
+struct Squares<'a> {
+    frame: &'a Frame<f64>,
+    factor: usize,
+    small: &'a mut Frame<f64>,
+}
+
+impl Kernel<f64> for Squares<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let Self { frame, factor, small } = self;
+        let mut line = vec![0.0; frame.width()];
+        for y in 0..small.height() {
+            line.copy_from_slice(frame.row(factor * y));
+            for j in factor * y + 1..factor * (y + 1) {
+                line.iter_mut().zip(frame.row(j)).for_each(|(sum, value)| *sum += value);
+            }
+            for (mean, square) in small.row_mut(y).iter_mut().zip(line.chunks_exact(factor)) {
+                *mean = square.iter().sum::<f64>() / (factor * factor) as f64;
+            }
         }
     }
-    smooth(&small, SIGMA)
 }
 
 fn shrunk(bounds: TargetBox, factor: usize) -> TargetBox {
@@ -125,7 +144,7 @@ fn shrunk(bounds: TargetBox, factor: usize) -> TargetBox {
 }
 
 /// Pixels outside the box, two from the border, spread evenly; about so many at most.
-fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> impl Iterator<Item = (usize, usize)> {
     let (width, height) = size;
     let step = ((width * height) as f64 / most as f64).sqrt().ceil().max(1.0) as usize;
     (2..height.saturating_sub(2)).step_by(step).flat_map(move |y| {
@@ -237,52 +256,91 @@ fn deviation_of_the_better_half(residuals: &[f64]) -> f64 {
     *sizes.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTILE
 }
 
-/// Brightness of the frame over that of the background, where both are known: a robust ratio; 1 unless it explains the frame better.
-pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> f64 {
-    let hidden = grown(target, (0.0, AROUND));
-    let pairs: Vec<[f64; 2]> = spread(frame.size(), hidden, LIGHT_SAMPLES)
-        .filter(|(x, y)| background.known.get(*x, *y))
-        .map(|(x, y)| [frame.get(x, y), background.picture.get(x, y)])
-        .collect();
-    let mut ratios: Vec<f64> = pairs.iter().filter(|[_, b]| *b > 1.0).map(|[e, b]| e / b).collect();
-    if ratios.is_empty() {
-        return 1.0;
+/// Pixels along an axis of a picture that was shifted, as far as they come from pixels.
+struct Sources {
+    to: Range<usize>,
+    /// How much farther on the nearest pixel is that each comes from.
+    by: isize,
+}
+
+/// Those of so many pixels that come from places so far on.
+fn sources(length: usize, back: f64) -> Sources {
+    let inside = |at: &usize| (0.0..=length as f64 - 1.0).contains(&(*at as f64 + back));
+    let first = (0..length).find(inside).unwrap_or(length);
+    let end = (first..length).rev().find(inside).map_or(first, |last| last + 1);
+    Sources { to: first..end, by: (back + 0.5).floor() as isize }
+}
+
+impl Sources {
+    /// Where the pixels come from.
+    fn from(&self) -> Range<usize> {
+        let on = |at: usize| (at as isize + self.by) as usize;
+        on(self.to.start)..on(self.to.end)
     }
-    let ratio = median(&mut ratios);
-    if !(0.1..10.0).contains(&ratio) || (ratio - 1.0).abs() < LEAST_LIGHT {
-        return 1.0;
+
+    /// Where one of them comes from.
+    fn of(&self, at: usize) -> Option<usize> {
+        self.to.contains(&at).then(|| (at as isize + self.by) as usize)
     }
-    let residual = |ratio: f64| pairs.iter().map(|[e, b]| (e / ratio - b).abs().min(CAP)).sum::<f64>();
-    if residual(ratio) < LESS * residual(1.0) { ratio } else { 1.0 }
 }
 
 impl Background {
-    /// The scene moved by so many px in the picture.
+    /// The scene moved by so many px in the picture. What comes into view is taken as it is seen, but does not count as known.
     pub(super) fn moved(&mut self, by: [f64; 2], frame: &Frame<f64>) {
         let back = by.map(|b| -b);
-        let picture = shifted(&self.picture, back);
         let (width, height) = self.known.size();
-        // The pixel nearest to where one comes from, if that is in the picture.
-        let from = |length: usize, back: f64| {
-            let last = length as f64 - 1.0;
-            let place = move |at: usize| at as f64 + back;
-            move |at: usize| (0.0..=last).contains(&place(at)).then(|| ((place(at) + 0.5) as usize).min(length - 1))
-        };
-        let columns: Vec<_> = (0..width).map(from(width, back[0])).collect();
-        let from_row = from(height, back[1]);
+        let picture = shifted_into(std::mem::take(&mut self.spare), &self.picture, back);
+        let picture = Frame::new(width, height, picture).unwrap_or_default();
+        self.spare = std::mem::replace(&mut self.picture, picture).into_data();
+        // Pixels come from the nearest to where they were, if that is in the picture.
+        let [columns, rows] = [(width, back[0]), (height, back[1])].map(|(length, back)| sources(length, back));
         let mut known = Frame::filled(width, height, false);
         for y in 0..height {
-            let Some(row) = from_row(y).map(|j| self.known.row(j)) else { continue };
-            let brightness = picture.row(y).iter().zip(&columns);
-            for (known, (value, column)) in known.row_mut(y).iter_mut().zip(brightness) {
-                *known = value.is_finite() && column.is_some_and(|i| row[i]);
+            if let Some(row) = rows.of(y).map(|j| self.known.row(j)) {
+                known.row_mut(y)[columns.to.clone()].copy_from_slice(&row[columns.from()]);
+            }
+            let pixels = known.row_mut(y).iter_mut().zip(self.picture.row_mut(y)).zip(frame.row(y));
+            for ((known, value), seen) in pixels.filter(|((_, value), _)| !value.is_finite()) {
+                (*known, *value) = (false, *seen);
             }
         }
-        // What comes into view is taken as it is seen, but does not count as known.
-        self.picture = picture;
-        for (b, e) in self.picture.data_mut().iter_mut().zip(frame.data()) {
-            *b = if b.is_finite() { *b } else { *e };
-        }
         self.known = known;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_of_a_shifted_row_come_from_the_nearest_that_there_are() {
+        for back in [0.0, 0.3, 0.5, 0.7, 2.0, 2.6, -0.4, -0.5, -3.0, -3.2, 9.0, 12.0, -12.0] {
+            let found = sources(10, back);
+            for at in 0..10 {
+                let place = at as f64 + back;
+                let want = (0.0..=9.0).contains(&place).then(|| (place + 0.5).floor() as usize);
+                assert_eq!(found.of(at), want, "{at} {back}");
+            }
+            assert!(found.to.is_empty() || found.from().end <= 10, "{back}");
+        }
+    }
+
+    #[test]
+    fn what_comes_into_view_is_seen_and_not_known() {
+        let still = Frame::from_fn(30, 20, |x, y| (3 * x + 7 * y) as f64);
+        let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
+        for by in [[2.0, -1.0], [0.4, 0.0], [-1.7, 2.3]] {
+            let mut background = Background::new(&still, nowhere);
+            let now = Frame::filled(30, 20, -5.0);
+            // Memory that was used before changes nothing.
+            background.spare = vec![1e9; 700];
+            background.moved(by, &now);
+            assert!((background.picture.get(15, 10) - (3.0 * (15.0 - by[0]) + 7.0 * (10.0 - by[1]))).abs() < 1e-9);
+            assert!(background.known.get(15, 10));
+            let new =
+                background.picture.data().iter().zip(background.known.data()).filter(|(value, _)| **value == -5.0);
+            let unknown: Vec<bool> = new.map(|(_, known)| !*known).collect();
+            assert!(!unknown.is_empty() && unknown.iter().all(|unknown| *unknown), "{by:?}");
+        }
     }
 }

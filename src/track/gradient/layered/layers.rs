@@ -144,6 +144,8 @@ pub(super) struct Background {
     pub picture: Frame<f64>,
     /// Where it was seen.
     pub known: Frame<bool>,
+    /// Memory of the picture before the camera moved.
+    pub spare: Vec<f64>,
 }
 
 impl Background {
@@ -151,7 +153,7 @@ impl Background {
     pub fn new(frame: &Frame<f64>, bounds: TargetBox) -> Self {
         let hidden = grown(bounds, UNSEEN);
         let known = Frame::from_fn(frame.width(), frame.height(), |x, y| !holds(&hidden, x, y));
-        let mut this = Self { picture: frame.clone(), known };
+        let mut this = Self { picture: frame.clone(), known, spare: Vec::new() };
         this.guess(&hidden);
         this
     }

@@ -12,6 +12,8 @@ use crate::types::{Frame, TargetBox};
 const FORGETTING: f64 = 0.95;
 /// Weight of the first support, grey^2.
 pub(super) const PRIOR: f64 = 144.0;
+/// The same over the variance of the noise, where that is more: what noise alone says of the support stays small beside it.
+const PRIOR_IN_NOISE: f64 = 30.0;
 /// Rate of the template.
 const TEMPLATE_RATE: f64 = 0.08;
 /// Rate of the background.
@@ -80,7 +82,7 @@ fn learn_support(target: &mut Target, at: usize, (seen, behind, bright): (f64, f
         return;
     }
     let contrast = bright - behind;
-    let prior = (1.0 - FORGETTING) * PRIOR;
+    let prior = (1.0 - FORGETTING) * PRIOR.max(PRIOR_IN_NOISE * noise * noise);
     let n = FORGETTING * target.n.data()[at] + contrast * (seen - behind) + prior * target.prior.data()[at];
     let d = FORGETTING * target.d.data()[at] + contrast * contrast + prior;
     (target.n.data_mut()[at], target.d.data_mut()[at]) = (n, d);

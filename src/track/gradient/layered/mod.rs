@@ -10,8 +10,10 @@ mod front;
 mod layers;
 mod learn;
 mod level;
+mod light;
 mod look;
 mod nodes;
+mod outgrown;
 mod outset;
 mod patch;
 mod pose;
@@ -44,12 +46,14 @@ const WARY: usize = 8;
 const UNUSABLE: &str = "the frame cannot be used";
 /// What is said of a frame that has little to do with the one before.
 const WILD: &str = "the frame is nothing like those before";
-/// Least information about the rotation, of all there could be.
-const TOLD: f64 = 0.88;
+/// Least information about the rotation, of all there could be, from which on it is told; else the angle is held. Round targets are known by their outline: this bounds what errors of that may turn.
+const TOLD: f64 = 0.75;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Deviation of the middle of the learnt support from that of the target, px: it stays from frame to frame, and no filter takes it away.
 const OUTLINE: f64 = 0.07;
+/// What noise adds to that, over noise by contrast, px: what is learnt of an edge from noisy frames stays wrong for as long as it is remembered.
+const OUTLINE_IN_NOISE: f64 = 1.4;
 /// Rate of the filtered change of size and angle.
 const RATE: f64 = 0.3;
 /// The same of the mean visibility.
@@ -96,6 +100,8 @@ pub(super) struct Layered {
     front: Option<Front>,
     /// How far the displacement since the first frame may be from what is said, until that is told, px.
     doubt: [f64; 2],
+    /// Noise over the contrast of the target, when it was last seen whole.
+    faintness: f64,
 }
 
 /// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
@@ -118,6 +124,7 @@ impl Layered {
         Self {
             front: None,
             doubt: [0.0; 2],
+            faintness: 0.0,
             outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
                 Shape::Similarity => Freedom::Similarity,
@@ -150,7 +157,8 @@ impl Layered {
     /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
     pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
         let mut covariance = self.filter.covariance();
-        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += OUTLINE * OUTLINE + doubt * doubt);
+        let outline = OUTLINE.hypot(OUTLINE_IN_NOISE * self.faintness);
+        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += outline * outline + doubt * doubt);
         covariance
     }
 
@@ -159,8 +167,8 @@ impl Layered {
         let was_lost = matches!(state.status, TrackStatus::Lost | TrackStatus::Out);
         self.gap += 1;
         let Some(frame) = frame else { return self.pass_over(state, UNUSABLE) };
-        let bounds = self.bounds(&self.pose);
-        let light = camera::light(frame, &self.background, bounds);
+        let bounds = self.reached(&self.pose);
+        let light = light::light(frame, &self.background, bounds);
         let seen = Seen::new(self.in_usual_light(frame, light));
         let motion = self.camera_motion(&seen, bounds);
         if self.is_wild(&seen.frame, bounds, motion) {
@@ -179,7 +187,7 @@ impl Layered {
         }
         self.look_at_the_whole_way();
         self.tell(state, finding.as_ref(), motion);
-        state.gain = self.gain * light;
+        state.gain = self.gain * light.gain;
         state.reacquired = was_lost && finding.is_some();
         self.hold_beyond_the_border(state, frame.size());
         self.spare = std::mem::replace(&mut self.previous, seen).frame.into_data();
@@ -222,7 +230,10 @@ impl Layered {
             self.freedom != Freedom::Similarity || aligned.rotation_told >= TOLD || occluded && self.rotation_told;
         let at = self.position(&pose);
         if !self.rotation_told && !occluded {
-            pose = self.placed(pose.upright(), at);
+            pose = self.placed(pose.turned_to(self.pose.angle()), at);
+        }
+        if !occluded {
+            self.faintness = (self.noise / look.contrast.max(1.0)).min(1.0);
         }
         let visible = look.visibility.max(0.1);
         let variance: [f64; 2] = std::array::from_fn(|k| {
@@ -268,8 +279,8 @@ impl Layered {
             learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
         }
         if self.front.is_some() {
-            let bounds = self.bounds(&self.pose);
-            learn::learn_background(&mut self.background, frame, bounds, self.noise);
+            let reached = self.reached(&self.pose);
+            learn::learn_background(&mut self.background, frame, reached, self.noise);
         }
     }
 
@@ -284,8 +295,8 @@ impl Layered {
         learn::learn_target(&mut self.target, &view, gain, self.noise);
         self.gain *= gain;
         self.usual += VISIBILITY_RATE * (visibility - self.usual);
-        let bounds = self.bounds(&self.pose);
-        learn::learn_background(&mut self.background, frame, bounds, self.noise);
+        let reached = self.reached(&self.pose);
+        learn::learn_background(&mut self.background, frame, reached, self.noise);
     }
 
     /// No measurement.

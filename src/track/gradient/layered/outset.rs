@@ -77,16 +77,26 @@ impl Outset {
         self.frames += 1;
     }
 
+    /// A frame beside the first.
+    pub fn changes(&self, frame: &Frame<f64>, noise: f64) -> Changes<'_> {
+        let now = Patch::cut(frame, self.cut).frame;
+        Changes { outset: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 }
+    }
+
     /// What the next frame tells of the first box.
     pub fn tell(&mut self, frame: &Frame<f64>, noise: f64) -> Option<Uncovered> {
         self.frames += 1;
-        let now = Patch::cut(frame, self.cut).frame;
-        let changes = Changes { outset: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 };
+        let changes = self.changes(frame, noise);
         let moved = changes.displacement()?;
         let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
         let hidden = if told { segment::hidden(&changes, moved) } else { None };
         (self.moved, self.told) = (moved, self.frames);
         hidden.map(|hidden| Uncovered { moved: moved.map(|m| m as f64), frames: self.frames, hidden })
+    }
+
+    /// Frames since the first.
+    pub fn frames(&self) -> usize {
+        self.frames
     }
 
     /// How far all that moved did since the first frame, px; `None` where the last frame does not tell it.

@@ -55,10 +55,10 @@ impl Pose {
         (c - b).atan2(a + d)
     }
 
-    /// The same without its rotation.
-    pub fn upright(&self) -> Self {
-        let (sin, cos) = self.angle().sin_cos();
-        Self { a: product([[cos, sin], [-sin, cos]], self.a), ..*self }
+    /// The same at another angle, rad.
+    pub fn turned_to(&self, angle: f64) -> Self {
+        let (sin, cos) = (angle - self.angle()).sin_cos();
+        Self { a: product([[cos, -sin], [sin, cos]], self.a), ..*self }
     }
 
     /// Half the sides of the upright box around a turned one with these half sides.
@@ -83,8 +83,10 @@ mod tests {
         assert_eq!(moved.p, [10.0, 7.0]);
         assert!((moved.scale() - 2.2).abs() < 1e-12);
         assert_eq!(turned.apply([1.0, 3.0]), [4.0, 7.0]);
-        let upright = turned.upright();
-        assert!(upright.angle().abs() < 1e-12 && (upright.scale() - 2.0).abs() < 1e-12);
+        for angle in [0.0, -0.7, 3.0] {
+            let held = turned.turned_to(angle);
+            assert!((held.angle() - angle).abs() < 1e-12 && (held.scale() - 2.0).abs() < 1e-12);
+        }
         assert_eq!(turned.reach([3.0, 1.0]), [2.0, 6.0]);
         assert_eq!(turned.stretch(), [2.0, 2.0]);
         // Turned by a right angle and then stretched along y.

@@ -2,6 +2,7 @@
 
 use super::camera::{self, Seen};
 use super::find::{DOUBT, Finding};
+use super::light::Light;
 use super::{Layered, SURE, learn};
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
@@ -40,13 +41,13 @@ impl Layered {
     }
 
     /// The frame, so bright as if the light were what it was at first.
-    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: f64) -> Frame<f64> {
+    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: Light) -> Frame<f64> {
         let mut data = std::mem::take(&mut self.spare);
         data.clear();
-        if light == 1.0 {
+        if light == Light::USUAL {
             data.extend_from_slice(frame.data());
         } else {
-            data.extend(frame.data().iter().map(|value| value / light));
+            data.extend(frame.data().iter().map(|value| light.undone(*value)));
         }
         Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
     }

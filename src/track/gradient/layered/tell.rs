@@ -16,6 +16,12 @@ impl Layered {
         TargetBox::about(self.position(pose), width * across, height * down)
     }
 
+    /// Upright box around the target at a pose, its corners included: where it may hide the scene.
+    pub(super) fn reached(&self, pose: &Pose) -> TargetBox {
+        let half = pose.reach(self.target.extent().map(|side| 0.5 * side));
+        TargetBox::about(self.position(pose), 2.0 * half[0], 2.0 * half[1])
+    }
+
     /// A target that has left the picture waits at its border.
     pub(super) fn hold_beyond_the_border(&mut self, state: &mut TrackState, (width, height): (usize, usize)) {
         if self.missed == 0 {

@@ -2,12 +2,13 @@
 
 use super::find::YOUNG;
 use super::front::Front;
-use super::layers::{Background, UNSEEN, grown, holds};
-use super::learn::{CONTINUED, SOLID};
+use super::layers::{Background, Target, UNSEEN, grown, holds};
+use super::learn::{self, CONTINUED, SOLID};
 use super::outset::{Outset, Uncovered};
 use super::patch::smooth_known;
 use super::pose::Pose;
 use super::{Layered, begun};
+use crate::track::gradient::detect::MovingTarget;
 use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is told in whole pixels, px^2.
@@ -26,14 +27,16 @@ impl Layered {
         let Some(mut outset) = self.outset.take().filter(|_| motion == [0.0; 2]) else { return };
         match outset.tell(frame, self.noise) {
             Some(found) => self.begin_anew(&outset, &found, frame),
-            None if outset.is_over() => {}
-            None => self.outset = Some(outset),
+            None => match outset.outgrown(frame, self.noise) {
+                Some(larger) => self.begin_with(&larger, frame, outset.frames()),
+                None if outset.is_over() => {}
+                None => self.outset = Some(outset),
+            },
         }
     }
 
     fn begin_anew(&mut self, outset: &Outset, found: &Uncovered, frame: &Frame<f64>) {
         let at = outset.bounds.centre();
-        let centre = [at[0] + found.moved[0], at[1] + found.moved[1]];
         self.target = outset.target.clone();
         let ([x0, y0], (width, height)) = (outset.first.corner, found.hidden.size());
         self.target.hide(|xi| {
@@ -43,17 +46,29 @@ impl Layered {
             found.hidden.get(pixel(at[0] + xi[0], x0, width), pixel(at[1] + xi[1], y0, height))
         });
         self.background.begin_anew(outset, found, frame, STILL * self.noise);
+        self.begin_at([at[0] + found.moved[0], at[1] + found.moved[1]], found.moved, found.frames);
+        (self.hidden, self.age) = (true, YOUNG);
+        self.front = Front::of(outset, &found.hidden);
+    }
+
+    /// The first box held only the middle of what moves: all of that is the target.
+    fn begin_with(&mut self, larger: &MovingTarget, frame: &Frame<f64>, frames: usize) {
+        self.target = Target::new(frame, larger.bounds, learn::PRIOR);
+        self.background = Background::new(frame, larger.bounds);
+        self.begin_at(larger.bounds.centre(), larger.displacement, frames);
+    }
+
+    /// Begins at a place that was reached in so many frames, by a displacement in whole pixels.
+    fn begin_at(&mut self, centre: [f64; 2], moved: [f64; 2], frames: usize) {
         self.pose = Pose::at(centre);
         self.filter = begun(centre);
         for (k, (x, p)) in self.filter.x.iter_mut().zip(&mut self.filter.p).enumerate() {
-            let frames = found.frames as f64;
-            x[1] = found.moved[k] / frames;
+            x[1] = moved[k] / frames as f64;
             (p[(0, 0)], p[(1, 1)]) = (WHOLE_PIXELS, 1.0);
         }
         (self.rate, self.before, self.usual) = ([0.0; 6], None, 1.0);
-        (self.missed, self.hidden, self.age) = (0, true, YOUNG);
-        (self.turned, self.wary) = (0.0, 0);
-        self.front = Front::of(outset, &found.hidden);
+        (self.missed, self.hidden, self.age) = (0, false, 0);
+        (self.turned, self.wary, self.front) = (0.0, 0, None);
     }
 
     /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
@@ -70,7 +85,7 @@ impl Layered {
     }
 }
 
-impl super::layers::Target {
+impl Target {
     /// Points that are not known: they are guessed to be like those nearest to them.
     fn hide(&mut self, hidden: impl Fn([f64; 2]) -> bool) {
         let (width, height) = self.a.size();
