@@ -114,7 +114,7 @@ def test_tracks_of_the_graph_reach_from_end_to_end():
     assert (4, last) in back and min(t for t, _ in back) == 0
     first = min(back)
     assert (4, last) in graph.follow(*first)
-    assert graph.follow(4, last, threshold=2.5, backward=True) == [(4, last)]
+    assert graph.follow(4, last, threshold=2.0, backward=True) == [(4, last)]
     assert all(0 <= forward <= 1 and 0 <= backward <= 1 for forward, backward in graph.arcs.values())
     assert np.allclose(graph.nodes[first].next_velocity, [-3, 0, 0], atol=0.1)
 
@@ -130,6 +130,9 @@ def test_a_graph_comes_back_from_json_and_pickle():
             graph.follow(*node)
     with pytest.raises(TypeError, match="node: "):
         graph.follow(0.5, 0)
+    for threshold in (-0.1, 2.1, float("inf"), float("nan")):
+        with pytest.raises(ValueError, match="threshold: expected a score, 0 to 2"):
+            graph.follow(0, next(k for t, k in graph.nodes if t == 0), threshold=threshold)
     with pytest.raises(TypeError, match="threshold: "):
         graph.follow(0, 0, threshold="high")
 
