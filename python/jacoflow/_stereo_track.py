@@ -198,7 +198,7 @@ class StereoTracker:
     luminance_levels : int
         Levels of the reduced luminance; default 64.
     arc_threshold : float
-        Least score of an arc that continues a track ("paper"), 0 to 2.
+        Least score of an arc that continues a track, 0 to 2.
     reseed_below : float
         Components with fewer pixels begin anew where the mixture explains least ("improved").
     recognition : bool
