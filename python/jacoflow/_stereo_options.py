@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -49,6 +50,20 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     if any(side is not None and side < 0 for side in out["grid"]):
         raise ValueError(f"grid: expected numbers of cells, got {out['grid']}")
     return out
+
+
+def checked_views(left: ArrayLike, right: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Both views as arrays, (H, W) or (H, W, 3) each; ValueError with both shapes where one is of another kind. What their sizes have to do with one another the compiled part tells."""
+    views = as_array(left), as_array(right)
+    for name, view in zip(("left", "right"), views, strict=True):
+        if not (view.ndim == 2 or (view.ndim == 3 and view.shape[2] in (3, 4))):
+            raise ValueError(f"{name}: expected a view (H, W) or (H, W, 3), got left {views[0].shape} and right {views[1].shape}")
+    return views
+
+
+def as_array(view: ArrayLike) -> NDArray[Any]:
+    """A view (H, W) as an array; one that is an array stays what it is."""
+    return view if isinstance(view, np.ndarray) else np.asarray(view)
 
 
 def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import checked, real_number, whole_number
+from ._stereo_options import as_array, checked, checked_views, real_number, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -115,7 +115,7 @@ class TrackGraph:
         Raises
         ------
         ValueError
-            For a cluster that is not there, naming `node`.
+            For a cluster that is not there, naming `node`, and a `threshold` outside of 0 to 2.
         """
         time, index = (whole_number("node", at) for at in (t, k))
         if time < 0 or index < 0:
@@ -198,11 +198,11 @@ class StereoTracker:
     luminance_levels : int
         Levels of the reduced luminance; default 64.
     arc_threshold : float
-        Least score of an arc that continues a track ("paper"), 0 to 2.
+        Least score of an arc that continues a track, 0 to 2.
     reseed_below : float
         Components with fewer pixels begin anew where the mixture explains least ("improved").
     recognition : bool
-        Whether lost tracks are waited for; default yes ("paper": no). A component that covers less than `least_overlap` of its moved self loses its track, which is waited for `patience` steps and given to a new component within
+        Whether lost tracks are waited for; default yes ("paper": no). A component loses its track where less than `least_overlap` of its moved self, and of what it then is, meets the other; the track is waited for `patience` steps and given to a new component within
         `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity).
     grouping : bool
         Whether clusters that move alike are grouped; default yes ("paper": no). `group_limits`: farthest apart (cells), motions in the picture (px) and in depth (disparity) that differ at most.
@@ -279,7 +279,7 @@ class StereoTracker:
         ValueError
             For views of different size or of another size than before, naming both shapes.
         """
-        return _step(self._tracker.update(_view(left), _view(right)))
+        return _step(self._tracker.update(*checked_views(left, right)))
 
     def update_disparity(self, left: ArrayLike, disparity: ArrayLike) -> StereoStep:
         """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part.
@@ -289,7 +289,7 @@ class StereoTracker:
         ValueError
             As `update`.
         """
-        return _step(self._tracker.update_disparity(_view(left), _view(disparity)))
+        return _step(self._tracker.update_disparity(as_array(left), as_array(disparity)))
 
     @property
     def graph(self) -> TrackGraph:
@@ -302,11 +302,7 @@ class StereoTracker:
         return {track: StereoTrack(*parts) for track, parts in self._tracker.tracks().items()}
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("StereoTracker: expected its graph, its tracks or its steps to be kept, got a tracker to pickle; it holds the last views smoothed at three levels")
-
-
-def _view(view: ArrayLike) -> NDArray[Any]:
-    return view if isinstance(view, np.ndarray) else np.asarray(view)
+        raise TypeError("StereoTracker: expected its graph, its tracks or its steps to be kept, got a tracker to pickle; it holds the last views smoothed at several levels")
 
 
 def _step(told: dict[str, Any]) -> StereoStep:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
-from ._stereo_options import checked_matching
+from ._stereo_options import checked_matching, checked_views
 
 __all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
@@ -79,7 +79,7 @@ def edge_disparity(
         "classes": the paper's. Signed gradient directions in 12 classes; the candidate with most agreement in a window. Whole px. "sgm": gradients compared in 5 x 5 px and smoothed along chains of edge pixels from
         eight sides; fewer mistakes, fractions of a px, faster.
     subpixel : bool
-        "sgm": refine to fractions of a px: a parabola's lowest point, then Lucas-Kanade steps along x in 9 x 9 px, kept within 1 px of that.
+        "sgm": refine to fractions of a px: where two lines of equal slope through the least cost and its neighbours meet, then Lucas-Kanade steps along x in 9 x 9 px, kept within 1 px of that.
     check : bool
         "sgm": keep only what matching from the right view confirms to 1 px.
     prior : array (H, W) or None
@@ -102,7 +102,7 @@ def edge_disparity(
 
     ValueError names an argument that is out of range or views that do not fit, with both shapes.
     """
-    return EdgeDisparity(*_edge_disparity(left, right, _options(locals())))
+    return EdgeDisparity(*_edge_disparity(*checked_views(left, right), _options(locals())))
 
 
 def estimate_row_offset(
@@ -123,7 +123,7 @@ def estimate_row_offset(
     The most frequent row offset of the class matching, then twice: disparity by "sgm", then Lucas-Kanade steps along y over all matched edge pixels, robustly weighted. Arguments
     and units are those of `edge_disparity`. 0.0 where nothing can be matched; ValueError as there.
     """
-    return _estimate_row_offset(left, right, _options(locals()))
+    return _estimate_row_offset(*checked_views(left, right), _options(locals()))
 
 
 def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:

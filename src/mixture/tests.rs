@@ -136,8 +136,12 @@ fn order_of_components_makes_no_difference() {
     let points = Points { dimensions: 3, values: &x, weights: Some(&f) };
     let turned: Vec<f64> = r.chunks(3).flat_map(|row| [row[2], row[0], row[1]]).collect();
     let [a, b] = [r, turned].map(|r| fit(&points, &options(3, 20), Start::Responsibilities(&r)).unwrap().posterior);
-    let alpha = [1, 2, 0].map(|k| b.weight_concentration[k]);
-    assert_near(&alpha, &a.weight_concentration, 1e-12);
+    let b = b.renamed(&[2, 0, 1]);
+    assert_near(&b.weight_concentration, &a.weight_concentration, 1e-12);
+    assert_near(&b.mean_precision, &a.mean_precision, 1e-12);
+    assert_near(&b.degrees_of_freedom, &a.degrees_of_freedom, 1e-12);
+    assert_near(&b.means, &a.means, 1e-12);
+    assert_near(&b.scale_inverses, &a.scale_inverses, 1e-12);
 }
 
 #[test]

@@ -1,8 +1,11 @@
-//! `jacoflow stereo`: pairs in every layout, formats, pictures, mistakes.
+//! `jacoflow stereo`: pairs in every layout, formats, pictures, mistakes, interruption.
 
-use super::support::Place;
+use super::support::{Place, temporary};
 use jacoflow::io::{Colour, DisparityFormat, read_image};
 use std::fs;
+use std::io::Write;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 pub const WIDTH: usize = 96;
 pub const HEIGHT: usize = 64;
@@ -119,6 +122,40 @@ fn classes_give_whole_pixels_and_pictures_show_them() {
     let again = place.line(line);
     assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("{line} --force --threads 1"));
+}
+
+#[test]
+fn an_interrupted_run_leaves_whole_files_only() {
+    let place = Place::new();
+    let line = "stereo - --layout top-bottom --disparities -8,12 -o out --format npz,pfm --json";
+    let mut command = place.command(&line.split_whitespace().collect::<Vec<_>>());
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut pipe = child.stdin.take().unwrap();
+    pipe.write_all(&header(WIDTH, 2 * HEIGHT)).unwrap();
+    for index in 0..2 {
+        let [left, right] = views(index);
+        pipe.write_all(&[b"FRAME\n".to_vec(), left, right].concat()).unwrap();
+    }
+    pipe.flush().unwrap();
+    let start = Instant::now();
+    while !(place.path("out/disparity_000001.npz").exists() && place.path("out/disparity_000001.pfm").exists()) {
+        assert!(start.elapsed() < Duration::from_secs(60), "waited in vain for two pairs");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    // The pipe stays open: the run waits for a pair when the signal comes.
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    drop(pipe);
+    assert_eq!(output.status.code(), Some(130));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(summary["interrupted"].as_bool(), Some(true));
+    assert_eq!(place.names("out").len(), 4);
+    assert!(temporary(&place.path("out")).is_empty());
+    for index in 0..2 {
+        let name = format!("out/disparity_{index:06}.npz");
+        assert!((median(&place, &name, DisparityFormat::Npz) - disparity(index) as f32).abs() < 0.1, "{name}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 from scipy.special import gammaln
+from scipy.stats import multivariate_t
 from sklearn.base import clone
 from sklearn.mixture import BayesianGaussianMixture
 from sklearn.utils.estimator_checks import check_estimator
@@ -70,6 +71,25 @@ def test_weights_are_repetitions_and_seeds_do_not_know_the_order(d):
     repeated = VariationalGaussianMixture(5, random_state=3).fit(np.repeat(x, f, axis=0)[order])
     np.testing.assert_allclose(repeated.means_, ours.means_, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(repeated.lower_bound_, ours.lower_bound_, rtol=1e-11)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 7])
+def test_one_component_has_the_exact_posterior_and_evidence(d):
+    """Of one Gaussian with a conjugate prior all is known: the evidence is the product of what is predicted of each point from those before it, which are Student's t."""
+    rng = np.random.default_rng(d)
+    x = rng.normal(size=(30, d)) @ rng.normal(size=(d, d)) + 3
+    beta, nu, mean, scatter = 0.5, d + 2.0, np.full(d, 0.2), 0.7 * np.eye(d)
+    prior = {"mean_prior": mean, "mean_precision_prior": beta, "degrees_of_freedom_prior": nu, "covariance_prior": scatter}
+    mixture = VariationalGaussianMixture(1, **prior, tol=None, max_iter=2).fit(x)
+    evidence = 0.0
+    for point in x:
+        evidence += multivariate_t.logpdf(point, mean, scatter * (beta + 1) / (beta * (nu - d + 1)), df=nu - d + 1)
+        off = point - mean
+        scatter = scatter + beta / (beta + 1) * np.outer(off, off)
+        mean, beta, nu = mean + off / (beta + 1), beta + 1, nu + 1
+    np.testing.assert_allclose(mixture.lower_bound_, evidence, rtol=1e-12)
+    np.testing.assert_allclose(mixture.means_[0], mean, rtol=1e-12)
+    np.testing.assert_allclose(mixture.covariances_[0], scatter / nu, rtol=1e-11)
 
 
 def test_bound_rises_and_ends_by_tolerance():

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from jacoflow import stereo
+from jacoflow.track import StereoTracker
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import stereo_scenes
@@ -166,10 +167,11 @@ def test_views_that_do_not_fit_are_told_with_both_shapes(left, right):
 def test_arrays_that_are_no_views_are_refused():
     good = np.zeros((40, 40), np.uint8)
     for bad in (np.zeros(40, np.uint8), np.zeros((2, 40, 40, 3), np.uint8), np.zeros((40, 40, 2), np.uint8)):
-        with pytest.raises(ValueError, match="left: "):
-            stereo.edge_disparity(bad, good)
-        with pytest.raises(ValueError, match="right: "):
-            stereo.edge_disparity(good, bad)
+        for name, views in (("left", (bad, good)), ("right", (good, bad))):
+            for asked in (stereo.edge_disparity, stereo.estimate_row_offset, StereoTracker().update):
+                with pytest.raises(ValueError, match=f"^{name}: ") as refused:
+                    asked(*views)
+                assert all(str(view.shape) in str(refused.value) for view in views)
     for bad in (np.zeros((40, 40), np.int32), np.zeros((40, 40), complex)):
         with pytest.raises(TypeError, match="left: "):
             stereo.edge_disparity(bad, good)

@@ -2,6 +2,7 @@
 
 import pickle
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,27 @@ def test_two_things_that_move_are_two_tracks_with_their_motions():
     assert np.isnan(tracker.tracks[board.track_id].velocities[0]).all()
 
 
+def test_what_grows_is_measured_as_far_as_its_rim():
+    """A tenth a step: 120 px from the middle that is 12 px, which no translation explains."""
+    from scipy.ndimage import gaussian_filter, map_coordinates
+
+    for seed in range(3):
+        texture = gaussian_filter(np.random.default_rng(seed).uniform(0, 255, (60, 80)).repeat(8, 0).repeat(8, 1), 2.0)
+        rows, columns = np.mgrid[:240, :320]
+        tracker = StereoTracker(n_components=1, disparity_range=(-8, 8))
+        for scale in (1.0, 1.1, 1.21):
+            left = map_coordinates(texture, [240 + (rows - 120) / scale, 320 + (columns - 160) / scale], order=1).astype(np.float32)
+            step = tracker.update_disparity(left, np.where(np.hypot(*np.gradient(left)) > 8, 2.0, np.nan))
+        (cluster,) = step.clusters
+        np.testing.assert_allclose(cluster.affine[2:], [0.1, 0.0, 0.0, 0.1], atol=0.005)
+
+
+@pytest.mark.parametrize(("seed", "label"), [(101, 2), (103, 1)])
+def test_who_is_taken_over_by_a_component_at_its_rim_keeps_its_track(seed, label):
+    scores = scored(replace(small(), seed=seed), "improved")
+    assert scores.id_kept(label) == scores.index_kept(label) == scores.path(label) == 6
+
+
 def scored(scene, mode):
     tracker = StereoTracker(mode, disparity_range=scene.disparity_range)
     return follow(scene, scene.film(), tracker, False)[0]
@@ -85,6 +107,8 @@ def test_who_was_hidden_is_recognised():
     scores = scored(crossing(), "improved")
     assert scores.recognised(2)
     assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.index_kept(label) for label in (1, 2, 3)]
+    # Whose pixels are nearly all hidden at once is still who is left, as long as that is where it went.
+    assert [scores.id_kept(label) for label in (1, 2, 3)] == [9, 11, 16]
     # Of the wall much is being covered, or has just come to light.
     errors = scores.motion_errors()
     assert gross(errors[0]) <= 0.011 and len(errors[0]) > 100 and gross(errors[3]) == 0
@@ -114,7 +138,7 @@ def test_tracks_of_the_graph_reach_from_end_to_end():
     assert (4, last) in back and min(t for t, _ in back) == 0
     first = min(back)
     assert (4, last) in graph.follow(*first)
-    assert graph.follow(4, last, threshold=2.5, backward=True) == [(4, last)]
+    assert graph.follow(4, last, threshold=2.0, backward=True) == [(4, last)]
     assert all(0 <= forward <= 1 and 0 <= backward <= 1 for forward, backward in graph.arcs.values())
     assert np.allclose(graph.nodes[first].next_velocity, [-3, 0, 0], atol=0.1)
 
@@ -130,6 +154,9 @@ def test_a_graph_comes_back_from_json_and_pickle():
             graph.follow(*node)
     with pytest.raises(TypeError, match="node: "):
         graph.follow(0.5, 0)
+    for threshold in (-0.1, 2.1, float("inf"), float("nan")):
+        with pytest.raises(ValueError, match="threshold: expected a score, 0 to 2"):
+            graph.follow(0, next(k for t, k in graph.nodes if t == 0), threshold=threshold)
     with pytest.raises(TypeError, match="threshold: "):
         graph.follow(0, 0, threshold="high")
 

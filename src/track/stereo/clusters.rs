@@ -1,5 +1,6 @@
 //! Voxels and edge pixels by the component that they belong to.
 
+use super::succession::reordered;
 use super::voxels::{EdgePoints, Lattice, Voxels};
 
 /// Label of a place that no cluster is at.
@@ -35,6 +36,18 @@ impl Clusters {
             pixels[label as usize].push(i as u32);
         }
         Self { voxels, points, members, pixels, of_point, dense }
+    }
+
+    /// The same with the components called otherwise.
+    pub fn renamed(mut self, names: &[usize]) -> Self {
+        self.members = reordered(self.members, names);
+        self.pixels = reordered(self.pixels, names);
+        self.of_point.iter_mut().for_each(|label| *label = names[*label as usize] as u32);
+        self.dense
+            .iter_mut()
+            .filter(|label| **label != NOBODY)
+            .for_each(|label| *label = names[usize::from(*label)] as u16);
+        self
     }
 
     /// The grid.
@@ -93,5 +106,9 @@ pub(super) mod tests {
         assert_eq!(clusters.of_point, [0, 2, 2, 2, 2]);
         assert_eq!((clusters.members[2].len(), clusters.pixels[2].len(), clusters.pixels[1].len()), (3, 4, 0));
         assert_eq!(clusters.template(2), [[1, 2], [4, 2]]);
+        let renamed = clusters.clone().renamed(&[0, 2, 1, 3]);
+        assert_eq!((renamed.at([1, 2, 3]), renamed.at([1, 2, 9]), renamed.at([0, 0, 0])), (Some(0), Some(1), None));
+        assert_eq!(renamed.of_point, [0, 1, 1, 1, 1]);
+        assert_eq!((&renamed.members[1], &renamed.pixels[1]), (&clusters.members[2], &clusters.pixels[2]));
     }
 }

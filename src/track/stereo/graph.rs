@@ -143,9 +143,9 @@ impl TrackGraph {
     /// A track: the clusters `(time, index)` reached from one along arcs whose score is at least `threshold`, forwards in time or backwards; itself among them.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `node` where there is no such cluster, `threshold` for one that is not a number.
+    /// [`Error::Argument`] named `node` where there is no such cluster, `threshold` for one that no score can be.
     pub fn follow(&self, time: usize, index: usize, threshold: f64, backward: bool) -> Result<Vec<(usize, usize)>> {
-        if threshold.is_nan() {
+        if !(0.0..=2.0).contains(&threshold) {
             return Err(Error::argument("threshold", "a score, 0 to 2", threshold));
         }
         if self.node(time, index).is_none() {
@@ -254,7 +254,11 @@ mod tests {
     fn what_is_not_there_is_refused_by_name() {
         let mut graph = graph();
         assert!(graph.follow(5, 0, 0.4, false).unwrap_err().to_string().starts_with("node: "));
-        assert!(graph.follow(0, 0, f64::NAN, false).unwrap_err().to_string().starts_with("threshold: "));
+        for threshold in [f64::NAN, -0.1, 2.1, f64::INFINITY] {
+            let message = graph.follow(0, 0, threshold, false).unwrap_err().to_string();
+            assert!(message.starts_with("threshold: ") && message.contains("0 to 2"), "{message}");
+        }
+        assert_eq!(graph.follow(1, 1, 2.0, false).unwrap(), [(1, 1), (2, 3)]);
         let arc = Arc { time: 0, from: 0, to: 9, forward: 0.5, backward: 0.5 };
         assert!(graph.connect(arc).unwrap_err().to_string().starts_with("arc: "));
         assert!(graph.connect(Arc { to: 1, forward: 1.5, ..arc }).unwrap_err().to_string().starts_with("arc: "));

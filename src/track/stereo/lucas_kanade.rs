@@ -9,11 +9,14 @@ use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
 
 /// Deviations of the Gaussians, coarse to fine, px.
-const SIGMAS: [f32; 3] = [4.0, 2.0, 1.0];
-/// Steps with a translation, and after those with an affine map, at each level.
-const STEPS: [[usize; 2]; 3] = [[4, 0], [3, 3], [1, 6]];
+const SIGMAS: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Ways to the finest level: steps with a translation, and after those with an affine map, at each level before it. Of what grows the rim moves farther than a fine level can follow: the map has to be affine
+/// from the coarsest one on. Of what is about to leave the picture too little is seen there, and less says more.
+const WAYS: [[[usize; 2]; FINE]; 2] = [[[4, 4], [3, 3], [3, 3]], [[0, 0], [4, 0], [3, 3]]];
+/// Those at the finest level.
+const FINE_STEPS: [usize; 2] = [1, 6];
 /// Most pixels that vote at each level: neighbours say the same in coarse pictures.
-const VOTERS: [usize; 3] = [400, 800, usize::MAX];
+const VOTERS: [usize; 4] = [200, 400, 800, usize::MAX];
 /// A step shorter than this, px, is the last one at its level.
 const SETTLED: f64 = 1e-3;
 /// Least deviation of the residual, grey levels: frames are rounded.
@@ -31,7 +34,7 @@ const TRUNCATED: f64 = 30.0;
 
 /// A frame smoothed at every level.
 #[derive(Debug, Clone)]
-pub(super) struct SmoothedLevels([Frame<f32>; 3]);
+pub(super) struct SmoothedLevels([Frame<f32>; SIGMAS.len()]);
 
 impl SmoothedLevels {
     /// Smooths a frame in grey levels.
@@ -88,18 +91,16 @@ pub(super) fn affine_motion(
 ) -> Option<PlaneMotion> {
     let task = Task::new(before, after, pixels)?;
     let mut best: Option<([f64; 6], f64)> = None;
-    for start in starts {
+    for (start, way) in starts.iter().flat_map(|start| WAYS.iter().map(move |way| (start, way))) {
         let mut map = [start[0], start[1], 0.0, 0.0, 0.0, 0.0];
-        let Some(residual) = (0..FINE).try_fold(f64::INFINITY, |_, level| task.descend(level, &mut map, start)) else {
-            continue;
-        };
+        let Some(residual) = task.go(way, &mut map, start) else { continue };
         if best.is_none_or(|(_, least)| residual < least) {
             best = Some((map, residual));
         }
     }
     let (mut map, _) = best?;
     let start = [map[0], map[1]];
-    task.descend(FINE, &mut map, &start)?;
+    task.descend(FINE, FINE_STEPS, &mut map, &start)?;
     task.told(&map)
 }
 
@@ -192,12 +193,23 @@ impl<'a> Task<'a> {
         Some(())
     }
 
-    /// Steps at one level; the truncated residual at its end.
-    fn descend(&self, level: usize, map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
+    /// Goes a way as far as the level before the finest; the truncated residual there.
+    fn go(&self, way: &[[usize; 2]; FINE], map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
+        let mut levels = way.iter().enumerate().filter(|(_, steps)| **steps != [0, 0]);
+        levels.try_fold(f64::INFINITY, |_, (level, steps)| self.descend(level, *steps, map, start))
+    }
+
+    /// Steps at one level, with a translation and with an affine map; the truncated residual at its end.
+    fn descend(
+        &self,
+        level: usize,
+        [translations, affine]: [usize; 2],
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+    ) -> Option<f64> {
         let voters = self.voters(level);
         let after = &self.after.0[level];
         let mut residuals = Vec::with_capacity(voters.len());
-        let [translations, affine] = STEPS[level];
         let affine = if voters.len() < AFFINE_PIXELS { 0 } else { affine };
         self.settle::<2>(translations, (&voters, after), map, start, &mut residuals)?;
         self.settle::<6>(affine, (&voters, after), map, start, &mut residuals)?;

@@ -19,6 +19,7 @@ mod options;
 mod overlap;
 mod settings;
 mod step;
+mod succession;
 mod tracker;
 mod voxels;
 mod warm_start;

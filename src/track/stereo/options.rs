@@ -4,6 +4,9 @@ use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::stereo::Method;
 
+/// Most components: far fewer than a mixture may have, as every two of them are compared at each step.
+const MOST_COMPONENTS: usize = 4096;
+
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StereoMode {
@@ -233,6 +236,10 @@ impl StereoTrackerOptions {
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
         self.matching_options(self.row_offset).check()?;
+        if !(1..=MOST_COMPONENTS).contains(&self.components) {
+            let expected = format!("a positive integer up to {MOST_COMPONENTS}");
+            return Err(Error::argument("n_components", expected, self.components));
+        }
         self.mixture_options(false, 0).check()?;
         if self.warm_max_iter == 0 {
             return Err(Error::argument("warm_max_iter", "a positive integer", 0));
@@ -248,9 +255,6 @@ impl StereoTrackerOptions {
         if [columns, rows, layers].iter().any(|side| !(1..=4096).contains(side)) || columns * rows * layers > 1 << 26 {
             let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
             return Err(Error::argument("grid", expected, format!("({rows}, {columns}, {layers})")));
-        }
-        if !(1..=4096).contains(&self.components) {
-            return Err(Error::argument("n_components", "1 to 4096", self.components));
         }
         if !(1..=64).contains(&self.search) {
             return Err(Error::argument("search", "1 to 64 cells", self.search));
@@ -309,7 +313,11 @@ mod tests {
             options.check().unwrap_err().to_string()
         };
         assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
-        assert!(with(|o| o.components = 0).starts_with("n_components: "));
+        for wrong in [0, MOST_COMPONENTS + 1, 100_000] {
+            let options = StereoTrackerOptions { components: wrong, ..StereoTrackerOptions::default() };
+            let message = options.check().unwrap_err().to_string();
+            assert!(message.starts_with("n_components: ") && message.contains("up to 4096"), "{message}");
+        }
         assert!(with(|o| o.search = 0).starts_with("search: "));
         assert!(with(|o| o.disparity_range = [5, -5]).starts_with("disparity_range: "));
         assert!(with(|o| o.max_iter = 0).starts_with("max_iter: "));

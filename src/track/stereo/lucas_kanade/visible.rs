@@ -1,6 +1,6 @@
 //! Motion of what is still visible of a cluster: where more than half of it is being covered, a deviation taken from its own residuals makes all of it look sound.
 
-use super::{AFFINE_PIXELS, FINE, PlaneMotion, SETTLED, STEPS, SmoothedLevels, Task, Voter};
+use super::{AFFINE_PIXELS, FINE, FINE_STEPS, PlaneMotion, SETTLED, SmoothedLevels, Task, Voter};
 
 /// Deviations over the noise, one after another: from what lets an expectation be a pixel wrong to what is left at the end.
 const NARROWING: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
@@ -53,7 +53,7 @@ impl Task<'_> {
             }
         }
         if self.agreeing(voters, &map, noise) >= AFFINE_PIXELS {
-            for _ in 0..STEPS[FINE][1] {
+            for _ in 0..FINE_STEPS[1] {
                 self.residuals(voters, after, &map, &mut residuals)?;
                 if self.step::<6>(voters, (&residuals, noise), &mut map, start)? < SETTLED {
                     break;

@@ -11,6 +11,7 @@ use super::super::motion::{
 };
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::step::Step;
+use super::super::succession::successors;
 use super::super::voxels::{EdgePoints, Voxels};
 use super::super::warm_start::moved;
 use super::StereoTracker;
@@ -84,6 +85,10 @@ impl StereoTracker {
         };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
+        let (clustered, seeded) = match &last {
+            Some(last) => succeeding(&last.clusters, clustered, seeded, &motions, self.options.arc_threshold),
+            None => (clustered, seeded),
+        };
         let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !seeded.get(k).is_some_and(|seeded| *seeded));
@@ -91,7 +96,9 @@ impl StereoTracker {
             Some(last) => both_ways(&last.clusters, &clusters, &motions, own),
             None => (vec![], vec![]),
         };
-        let overlap = |k: usize| forward.get(k).and_then(|row: &Row| row.get(k)).copied().unwrap_or(0.0);
+        // Of what is being hidden little meets its moved self, but what is left of it lies there; of what comes to light it is the other way round.
+        let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
+        let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
         self.name_by_components(&clusters, posterior.as_ref(), &seeded, overlap);
         let arrivals: Vec<Arrival> = (0..components)
             .map(|k| match own(k) {
@@ -197,6 +204,23 @@ impl StereoTracker {
         }
         out
     }
+}
+
+/// What clustering gave, its components called after those that they continue, and which of them began as seeds: who took over what was there before is no newcomer.
+fn succeeding(
+    before: &Clusters,
+    clustered: Clustered,
+    seeded: Vec<bool>,
+    motions: &[Option<(FineMotion, Carried)>],
+    least: f64,
+) -> (Clustered, Vec<bool>) {
+    let (forward, backward) = both_ways(before, &clustered.clusters, motions, |k| motions.get(k).copied().flatten());
+    let names = successors(&forward, &backward, least);
+    if names.iter().enumerate().all(|(k, name)| k == *name) {
+        return (clustered, seeded);
+    }
+    let newcomers = (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
+    (clustered.renamed(&names), newcomers)
 }
 
 /// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where it has none, that of the cluster which covers it most.

@@ -14,6 +14,14 @@ pub(super) struct Clustered {
     pub rounds: usize,
 }
 
+impl Clustered {
+    /// The same with the components called otherwise.
+    pub fn renamed(self, names: &[usize]) -> Self {
+        let posterior = self.posterior.map(|posterior| posterior.renamed(names));
+        Self { clusters: self.clusters.renamed(names), posterior, rounds: self.rounds }
+    }
+}
+
 impl StereoTracker {
     /// Clusters voxels from where the components were carried to; which of them were seeded anew.
     pub(super) fn cluster_carried(

@@ -1,0 +1,80 @@
+//! Which component of a step goes on for which one of the last: a component is the object that most of it moves with.
+//!
+//! Two components may lie in one flat thing, a large one and a few pixels at its rim. Both explain it, the sharper one wins, and once in a while that is the small one: it takes the thing over, and the large one is left with the rim.
+
+use super::overlap::Row;
+
+/// What each component is called from now on: as the one of the last step with which it shares most, where each is the other's strongest arc, of at least `least`. The others keep their
+/// names as far as these are free, and else get what is left over.
+///
+/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step, and the other way round.
+pub(super) fn successors(forward: &[Row], backward: &[Row], least: f64) -> Vec<usize> {
+    let count = backward.len();
+    if forward.len() != count {
+        return (0..count).collect();
+    }
+    let score = |from: usize, to: usize| forward[from][to] + backward[to][from];
+    // Of equals a component's own.
+    let strongest = |own: usize, score: &dyn Fn(usize) -> f64| {
+        (0..count).fold(own, |best, other| if score(other) > score(best) { other } else { best })
+    };
+    let mut names = vec![None; count];
+    let mut taken = vec![false; count];
+    for from in 0..count {
+        let to = strongest(from, &|to| score(from, to));
+        if strongest(to, &|other| score(other, to)) == from && score(from, to) >= least {
+            names[to] = Some(from);
+            taken[from] = true;
+        }
+    }
+    for (k, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_none()) {
+        if !taken[k] {
+            *name = Some(k);
+            taken[k] = true;
+        }
+    }
+    let mut free = (0..count).filter(|k| !taken[*k]).collect::<Vec<_>>().into_iter();
+    names.into_iter().map(|name| name.or_else(|| free.next()).expect("as many names as components")).collect()
+}
+
+/// Puts what belongs to each component where its name says.
+pub(super) fn reordered<T>(values: Vec<T>, names: &[usize]) -> Vec<T> {
+    let mut named: Vec<(usize, T)> = names.iter().copied().zip(values).collect();
+    named.sort_by_key(|(name, _)| *name);
+    named.into_iter().map(|(_, value)| value).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Overlaps in both directions of three components, from the shares of each that meet each.
+    fn named(shares: [[f64; 3]; 3]) -> Vec<usize> {
+        let rows: Vec<Row> = shares.iter().map(|row| row.to_vec()).collect();
+        let columns: Vec<Row> = (0..3).map(|j| shares.iter().map(|row| row[j]).collect()).collect();
+        successors(&rows, &columns, 0.4)
+    }
+
+    #[test]
+    fn who_takes_over_most_of_a_component_is_it() {
+        assert_eq!(named([[0.9, 0.1, 0.0], [0.1, 0.8, 0.0], [0.0, 0.0, 1.0]]), [0, 1, 2]);
+        // 1 takes over 0, which is left with what was 1's.
+        assert_eq!(named([[0.1, 0.9, 0.0], [0.3, 0.0, 0.0], [0.0, 0.0, 1.0]]), [1, 0, 2]);
+        // In a ring.
+        assert_eq!(named([[0.0, 0.9, 0.0], [0.0, 0.0, 0.8], [0.7, 0.0, 0.0]]), [2, 0, 1]);
+    }
+
+    #[test]
+    fn weak_and_equal_shares_change_nothing() {
+        assert_eq!(named([[0.0, 0.19, 0.0], [0.0, 0.0, 0.0], [0.0; 3]]), [0, 1, 2]);
+        assert_eq!(named([[0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.0; 3]]), [0, 1, 2]);
+        // 0 goes into 1, which has been there all along.
+        assert_eq!(named([[0.0, 0.6, 0.0], [0.0, 0.9, 0.0], [0.0; 3]]), [0, 1, 2]);
+        assert_eq!(successors(&[], &[vec![], vec![]], 0.4), [0, 1]);
+    }
+
+    #[test]
+    fn what_belongs_to_components_goes_with_their_names() {
+        assert_eq!(reordered(vec!['a', 'b', 'c'], &[2, 0, 1]), ['b', 'c', 'a']);
+    }
+}
