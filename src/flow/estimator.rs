@@ -214,7 +214,8 @@ impl Estimator {
             plane.resize(n, T::nan());
             plane
         });
-        let tells = self.common.covariance && self.common.systematic && matches!(self.engine, Engine::Windowed(_));
+        let knows = matches!(self.engine, Engine::Windowed(_) | Engine::CoarseToFine(_));
+        let tells = self.common.covariance && self.common.systematic && knows;
         let entries = field.covariance.as_ref().map_or(0, Vec::len);
         field.systematic = tells.then(|| {
             let mut planes = field.systematic.take().unwrap_or_default();

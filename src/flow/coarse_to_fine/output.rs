@@ -2,7 +2,7 @@
 
 mod consistency;
 
-use super::covariance::{Energy, Spread, covariance};
+use super::covariance::{Energy, Spread, Spreads, covariance};
 use super::data::{DataOptions, ENERGY, MOTION, UU, UV, VV};
 use super::grid::Planes;
 use super::memory::Space;
@@ -14,7 +14,6 @@ use super::run::Estimate;
 use crate::flow::options::Common;
 use crate::flow::site::{FieldBand, bands};
 use crate::flow::windowed::run::are_rounded;
-use crate::flow::windowed::solve::ENTRIES;
 use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, Sites, Status};
@@ -30,7 +29,7 @@ fn rows() -> f64 {
 }
 
 /// The covariance of the estimate, wherever it may be asked for.
-pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], common: &Common) -> Spread<T> {
+pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], common: &Common) -> Spreads<T> {
     // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let left = halved_noise().powi(estimate.level as i32);
@@ -40,12 +39,12 @@ pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], 
         // Rounding is the least noise that whole numbers can have.
         None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
     };
-    covariance(estimate, noise, frames.len() == 2)
+    covariance(estimate, noise, frames.len() == 2, common.systematic)
 }
 
 /// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to the first frame.
 pub(super) fn fill<T: SimdReal>(
-    (estimate, covariance): (&Estimate<T>, Option<Spread<T>>),
+    (estimate, spreads): (&Estimate<T>, Option<Spreads<T>>),
     space: &Space<T>,
     frames: &[&Frame<T>],
     common: &Common,
@@ -65,7 +64,7 @@ pub(super) fn fill<T: SimdReal>(
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
         consistency: Consistency::of(estimate),
-        covariance,
+        spreads,
         evidence: estimate.evidence.as_ref(),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
@@ -112,7 +111,7 @@ struct Writer<'a, T: Clone> {
     mask: Option<&'a Mask>,
     observable: bool,
     consistency: Consistency,
-    covariance: Option<Spread<T>>,
+    spreads: Option<Spreads<T>>,
     evidence: Option<&'a Evidence<T>>,
 }
 
@@ -123,13 +122,23 @@ impl<T: SimdReal> Writer<'_, T> {
             for k in 0..MOTION {
                 band.motion[k][at] = T::from_f64(motion[k]);
             }
-            if let Some(spread) = &self.covariance {
-                for k in 0..ENTRIES {
-                    band.covariance[k][at] = spread.at(k, (x, y));
+            for (spread, planes) in self.spreads(band) {
+                for (k, plane) in planes.iter_mut().enumerate() {
+                    plane[at] = spread.at(k, (x, y));
                 }
             }
             self.close(band, at, (x, y));
         }
+    }
+
+    /// The covariance and its systematic part, as far as they are wanted, with the planes they go to.
+    fn spreads<'s, 'p, 'b>(
+        &'s self,
+        band: &'p mut FieldBand<'b, T>,
+    ) -> impl Iterator<Item = (&'s Spread<T>, &'p mut Vec<&'b mut [T]>)> {
+        let whole = self.spreads.as_ref().map(|spreads| &spreads.whole);
+        let systematic = self.spreads.as_ref().and_then(|spreads| spreads.systematic.as_ref());
+        whole.zip(Some(&mut band.covariance)).into_iter().chain(systematic.zip(Some(&mut band.systematic)))
     }
 
     /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken back.
@@ -137,7 +146,8 @@ impl<T: SimdReal> Writer<'_, T> {
         let status = self.status(pixel);
         band.status[at] = status;
         if !status.is_valid() {
-            band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[at] = T::nan());
+            let planes = band.motion.iter_mut().chain(&mut band.covariance).chain(&mut band.systematic);
+            planes.for_each(|plane| plane[at] = T::nan());
         }
         self.diagnose(band, at, pixel, status.is_valid());
     }
@@ -221,8 +231,8 @@ impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
             for (k, plane) in band.motion.iter_mut().enumerate() {
                 copy(reader.plane(k), columns, &mut plane[places.clone()]);
             }
-            if let Some(spread) = &writer.covariance {
-                for (k, plane) in band.covariance.iter_mut().enumerate() {
+            for (spread, planes) in writer.spreads(band) {
+                for (k, plane) in planes.iter_mut().enumerate() {
                     spread.row(k, y, &mut entries, &mut line);
                     copy(&line, columns, &mut plane[places.clone()]);
                 }

@@ -1,7 +1,7 @@
 //! From frames to a filled field: the pyramid, the iterations, the results.
 
 use super::change::settle;
-use super::covariance::Spread;
+use super::covariance::Spreads;
 use super::descend::{Found, Plan};
 use super::grid::Planes;
 use super::levels::Compared;
@@ -65,7 +65,7 @@ fn spread<T: SimdReal>(
     workspace: &mut Workspace<T>,
     (frames, common): (&[&Frame<T>], &Common),
     field: &FlowField<T>,
-) -> Option<Spread<T>> {
+) -> Option<Spreads<T>> {
     if field.covariance.is_none() {
         workspace.clear_large();
         return None;

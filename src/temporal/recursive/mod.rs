@@ -13,7 +13,7 @@
 //!
 //! `Cov(x) = (V / g) P + (1 - V) B + d d^T`,
 //!
-//! which for equal `C = N + B` is `V N + B`: noise falls, and `B` is the floor. [`windowed`](crate::flow::windowed) estimates tell `B`; of others [`SHARE`] of the covariance is taken for it.
+//! which for equal `C = N + B` is `V N + B`: noise falls, and `B` is the floor. Windowed and coarse-to-fine estimates tell `B`; of others [`SHARE`] of the covariance is taken for it.
 //!
 //! Noise of consecutive estimates counts as independent. It is not: a pair shares one frame with the next, a triple two. But shared frames enter with opposite signs (a difference's older frame is the newer
 //! one of the difference before), so that errors are correlated negatively and their mean is better than told, never worse: `tests/recursive.rs` prints the correlations, down to -1/2.

@@ -5,7 +5,7 @@
 //! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is read from how much the flow changes from window to window.
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
-//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame it is that of seen sites, continued; the field itself tells how fast it departs from that.
+//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it is that of other sites, continued; the field itself tells how fast it departs from that.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
 //! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
 //!
@@ -18,11 +18,13 @@ mod noise;
 mod seen;
 mod spread;
 
+use super::grid::Planes;
 use super::locking::Locking;
 use super::run::Estimate;
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 pub(super) use noise::Energy;
+use rayon::prelude::*;
 pub(super) use spread::Spread;
 
 /// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
@@ -45,44 +47,83 @@ const AHEAD_ENERGY: f64 = 4.0;
 const CHANGE: f64 = 0.55;
 /// Share of the acceleration, px/frame^2, that a triple takes for motion.
 const ACCELERATION: f64 = 0.015;
+/// Where no more than this share of the places has texture, they do not tell how motion differs from place to place.
+const TELLING: f64 = 0.02;
+/// Share of the variance of noise that repeats itself in the next frames' estimates: the texture moves on slowly, and its part of the errors with it.
+const REPEATED: f64 = 0.3;
 
 /// A covariance: its upper triangle, row by row.
 type Entries = [f64; ENTRIES];
 
+/// A covariance and that part of it which does not average out over time, if it was asked for.
+#[derive(Debug, Default)]
+pub(super) struct Spreads<T> {
+    pub whole: Spread<T>,
+    pub systematic: Option<Spread<T>>,
+}
+
 /// The covariance at every place of the evidence.
 ///
-/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first
-/// frame, where the motion of a pair is found midway.
-pub(super) fn covariance<T: SimdReal>(estimate: &Estimate<T>, energy: Energy, carried: bool) -> Spread<T> {
-    let Some(evidence) = &estimate.evidence else { return Spread::default() };
+/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first frame, where the motion of a pair is found midway. `apart`: with the systematic part beside it, all
+/// that is not noise, and a share of that.
+pub(super) fn covariance<T: SimdReal>(
+    estimate: &Estimate<T>,
+    energy: Energy,
+    carried: bool,
+    apart: bool,
+) -> Spreads<T> {
+    let Some(evidence) = &estimate.evidence else { return Spreads::default() };
     let (width, height) = evidence.size();
     let axes = (spread::Places::of(estimate.motion.width), spread::Places::of(estimate.motion.height));
     let seen = seen::Seen::new(&estimate.data, (width, height));
-    let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, &seen);
     let data = (&estimate.data, &seen);
     let noise = noise::Noise::new(evidence, data, energy, carried);
+    let known = known(&noise, &estimate.data, (width, height));
+    let known = known.as_ref().unwrap_or(&seen);
+    let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, known);
     let change = estimate.change.as_ref();
     let change = change
         .map(|evidence| noise::Noise::new(evidence, data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise));
     let kind = usize::from(!carried);
     let mut places = bending::bending(&estimate.motion, evidence, BENDING[kind]);
+    let mut noises = vec![[0.0; ENTRIES]; if apart { places.len() } else { 0 }];
     for (n, place) in places.iter_mut().enumerate() {
         let at = (n % width, n / width);
         let motion = bending::motion_at(&estimate.motion, at);
-        add_noise(place, &noise.at(at.0, at.1), [FLOW_NOISE[kind], SLOPE_NOISE]);
+        let mut noisy = [0.0; ENTRIES];
+        add_noise(&mut noisy, &noise.at(at.0, at.1), [FLOW_NOISE[kind], SLOPE_NOISE]);
         if let Some(change) = &change {
-            add_noise(place, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
+            add_noise(&mut noisy, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
         }
-        extrapolation.add(place, seen.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
+        extrapolation.add(place, known.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
         add_locking(place, &motion, &estimate.locking);
         if !carried {
             add_acceleration(place, &motion);
         }
+        place.iter_mut().zip(&noisy).for_each(|(entry, noise)| *entry += noise);
+        if apart {
+            noises[n] = noisy;
+        }
     }
-    if carried {
-        places = carry::to_first_frame(&places, &estimate.motion, axes);
-    }
-    Spread::new(&places, axes, estimate.level)
+    let spread = |places: Vec<Entries>| {
+        let told = if carried { carry::to_first_frame(&places, &estimate.motion, axes) } else { places };
+        Spread::new(&told, axes, estimate.level)
+    };
+    let systematic = apart.then(|| {
+        let without =
+            |(place, noise): (&Entries, &Entries)| std::array::from_fn(|k| place[k] - (1.0 - REPEATED) * noise[k]);
+        spread(places.iter().zip(&noises).map(without).collect())
+    });
+    Spreads { whole: spread(places), systematic }
+}
+
+/// What is seen and has texture, if it is less than what is seen, and not too little to tell anything.
+fn known<T: SimdReal>(noise: &noise::Noise<'_, T>, data: &Planes<T>, size: (usize, usize)) -> Option<seen::Seen> {
+    let places = (0..size.0 * size.1).into_par_iter();
+    let textured: Vec<bool> = places.map(|n| noise.is_textured(data, n % size.0, n / size.0)).collect();
+    let count = textured.iter().filter(|textured| **textured).count();
+    let tells = count < textured.len() && count as f64 >= TELLING * textured.len() as f64;
+    tells.then(|| seen::Seen::textured(data, size, &textured))
 }
 
 /// Adds noise of the density times its share in the flow and in the derivatives along x and y; `factors` for the flow and for the slopes.

@@ -14,7 +14,7 @@
 //! the factors of white noise drawn and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge has been continued with slopes as noisy as those of the
 //! data's windows.
 
-use super::super::data::SEEN;
+use super::super::data::{SEEN, UU, UV, VV};
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, SPACING, TERMS};
 use super::seen::{Edge, Seen};
@@ -38,6 +38,10 @@ const FAR: f64 = 2.5;
 const LEAST_LEFT: f64 = 1e-3;
 /// Least weight of wider windows at a place that counts.
 const COUNTS: f64 = 0.1;
+/// Texture is looked for within so many sites of a place.
+const NEAR: usize = 2;
+/// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2 px.
+const TEXTURED: f64 = 10.0;
 
 /// The residual energy that noise leaves, grey^2.
 #[derive(Debug, Clone, Copy)]
@@ -111,12 +115,35 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
-    /// What is left at a place.
-    pub fn at(&self, x: usize, y: usize) -> Left {
-        let energy = match self.energy {
+    /// The residual energy of the noise at a place.
+    fn energy(&self, x: usize, y: usize) -> f64 {
+        match self.energy {
             Energy::Known(energy) => energy,
             Energy::AtLeast(least) => self.evidence.energy(x, y).max(least),
+        }
+    }
+
+    /// Whether there is texture within [`NEAR`] sites of a place, that is whether motion in any direction is known from there alone.
+    pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
+        let around = |place: usize, len: usize| {
+            let middle = (SPACING * place).min(len - 1);
+            middle.saturating_sub(NEAR)..(middle + NEAR + 1).min(len)
         };
+        let (columns, rows) = (around(x, data.width), around(y, data.height));
+        let count = (columns.len() * rows.len()) as f64;
+        let mean = |k| {
+            let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
+            rows.clone().map(row).sum::<f64>() / count
+        };
+        let energy = self.energy(x, y);
+        let [a, b, c] = inverse_without_noise([UU, UV, VV].map(mean), self.gradient * energy);
+        let best = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
+        self.excess * energy * best <= TEXTURED
+    }
+
+    /// What is left at a place.
+    pub fn at(&self, x: usize, y: usize) -> Left {
+        let energy = self.energy(x, y);
         let inverse = inverse_without_noise(informed(self.evidence.information(x, y)), self.gradient * energy);
         let scale = self.excess * energy;
         let (flow_share, slope_share) = (of_white_noise(1), of_white_noise(2));

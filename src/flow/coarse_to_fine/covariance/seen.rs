@@ -1,6 +1,7 @@
 //! How far places are from the edge of what all frames see.
 //!
 //! Where motion leads out of a frame there are no data, and the motion is that of the nearest seen sites, continued. That edge, and not the frame's, is where windows see less.
+//! Areas without texture are continued in the same way.
 
 use super::super::data::SEEN;
 use super::super::grid::Planes;
@@ -29,8 +30,22 @@ pub(super) struct Edge {
 
 impl Seen {
     /// At the `width x height` places of the evidence.
-    pub fn new<T: SimdReal>(data: &Planes<T>, (width, height): (usize, usize)) -> Self {
-        let seen = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= LEAST;
+    pub fn new<T: SimdReal>(data: &Planes<T>, size: (usize, usize)) -> Self {
+        Self::with(data, size, |_, _| true)
+    }
+
+    /// The same, where only those sites count as seen whose nearest place has texture (`textured`, row by row): where there is none, motion is continued as well.
+    pub fn textured<T: SimdReal>(data: &Planes<T>, size: (usize, usize), textured: &[bool]) -> Self {
+        let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
+        Self::with(data, size, |x, y| textured[nearest(y, size.1) * size.0 + nearest(x, size.0)])
+    }
+
+    fn with<T: SimdReal>(
+        data: &Planes<T>,
+        (width, height): (usize, usize),
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> Self {
+        let seen = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= LEAST && counts(x, y);
         let along = Axis::new([data.width, data.height], [width, height], seen);
         let across = Axis::new([data.height, data.width], [height, width], |y, x| seen(x, y));
         let distances = (0..width * height).map(|n| {
