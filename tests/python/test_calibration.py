@@ -156,7 +156,7 @@ def test_the_covariance_is_positive_definite_and_grows_with_noise_and_without_te
 @pytest.mark.parametrize(("preset", "least"), [("fast", 0.7), ("balanced", 0.75)])
 def test_areas_without_texture_are_told_as_uncertain_as_they_are(preset, least):
     """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the intervals say how far motion departs from that. Without this they hold the truth
-    in a fifth to a half of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100 intervals are asked to hold."""
+    in an eighth to three fifths of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100 intervals are asked to hold."""
     y, x = np.indices((200, 200)).astype(float)
 
     def along(x):

@@ -95,7 +95,7 @@ def test_fusion_of_a_steady_flow_agrees_with_each_estimate():
     plain = jacoflow.estimate(np.stack(frames), **options)
     fused = jacoflow.estimate(np.stack(frames), temporal="recursive", **options)
     inner = np.s_[16:-16, 16:-16]
-    assert np.median(fused[-1].std("u")[inner]) < 0.85 * np.median(plain[-1].std("u")[inner])
+    assert np.median(fused[-1].std("u")[inner]) < 0.95 * np.median(plain[-1].std("u")[inner])
     # Nothing changed, so that few pixels start anew.
     same = np.isclose(fused[-1].u, plain[-1].u, rtol=0, atol=1e-6)[inner]
     assert same.mean() < 0.1
