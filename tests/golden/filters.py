@@ -5,12 +5,12 @@
 The system is fixed here and in src/filter/tests.rs: state (x, y, speed, heading), range and bearing measured from the origin; every number is a plain formula.
 """
 
-import json
 import math
 from pathlib import Path
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from record import write
 
 STEPS = 30
 Q = np.diag([1e-3, 1e-3, 1e-2, 1e-3])
@@ -112,7 +112,7 @@ def main() -> None:
         "linear": linear(),
     }
     path = Path(__file__).parent / "filters.json"
-    path.write_text(json.dumps(record, indent=1) + "\n")
+    write(path, record)
 
 
 if __name__ == "__main__":

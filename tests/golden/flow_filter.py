@@ -3,7 +3,6 @@
     python tests/golden/flow_filter.py
 """
 
-import json
 import sys
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 here = Path(__file__).parent
 sys.path.insert(0, str(here.parent.parent / "benchmarks"))
 from reference_filter import Settings, ramp_measurements, run  # noqa: E402
+from record import write  # noqa: E402
 
 FRAMES = [0, 1, 2, 3, 5, 10, 20, 50, 100, 200, 300, 399]
 
@@ -26,7 +26,7 @@ def main() -> None:
             "means": means[FRAMES].tolist(),
             "variances": np.diagonal(covariances[FRAMES], axis1=1, axis2=2).tolist(),
         }
-    (here / "flow_filter.json").write_text(json.dumps(record, indent=1) + "\n")
+    write(here / "flow_filter.json", record)
 
 
 if __name__ == "__main__":
