@@ -3,7 +3,7 @@
 use super::candidates::Comparison;
 use super::couple::{CoupleScratch, Coupled, Coupling, couple};
 use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
-use super::gaps::{continue_corrections, gaps};
+use super::gaps::Gaps;
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::{Space, Workspace};
@@ -251,9 +251,9 @@ impl<T: SimdReal> Step<'_, T> {
         (motion, old): (&mut Planes<T>, &mut Planes<T>),
     ) {
         let Some(above) = above else { return };
-        let Some(gaps) = gaps(self.data, self.noise) else { return };
+        let Some(gaps) = Gaps::find(self.data, self.noise) else { return };
         finer(self.plan.simd, above, level.size, old);
-        continue_corrections(&gaps, old, motion);
+        gaps.continue_corrections(old, motion);
     }
 
     /// Linearises about `motion` and moves it; by how much, px (root mean square).

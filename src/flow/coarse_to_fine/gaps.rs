@@ -8,40 +8,74 @@ use super::grid::Planes;
 use crate::image::fill_holes;
 use crate::simd::SimdReal;
 use crate::types::Frame;
+use std::ops::Range;
 
 /// Information about motion in all directions together, over the noise, px^-2, from which on a site is no gap: noise alone has about as much. With twice as much
 /// motion in gaps is still better, but recordings lose at weak texture that does tell something.
 const TEXTURED: f64 = 7.0;
 
-/// Which sites are gaps, row by row; `None` if none or all are. `data`: a level's equations; `noise`: their typical energy, grey^2.
-pub(super) fn gaps<T: SimdReal>(data: &Planes<T>, noise: T) -> Option<Vec<bool>> {
-    let least = T::from_f64(TEXTURED) * noise;
-    let texture = |y: usize| data.line(normal(0, 0), y).iter().zip(data.line(normal(1, 1), y));
-    let gaps: Vec<bool> = (0..data.height).flat_map(|y| texture(y).map(|(uu, vv)| *uu + *vv < least)).collect();
-    let count = gaps.iter().filter(|gap| **gap).count();
-    (count > 0 && count < gaps.len()).then_some(gaps)
+/// Sites along both axes of a block that must be without texture for there to be a gap: the coupling carries corrections across smaller ones.
+const BLOCK: usize = 4;
+
+/// The sites of a level that have no texture, where they are enough to matter.
+pub(super) struct Gaps {
+    /// Row by row.
+    sites: Vec<bool>,
+    /// All of them and their neighbours.
+    columns: Range<usize>,
+    rows: Range<usize>,
 }
 
-/// Continues what was corrected `from` the motion that a level began with into the `gaps` of `motion`.
-pub(super) fn continue_corrections<T: SimdReal>(gaps: &[bool], from: &Planes<T>, motion: &mut Planes<T>) {
-    let (width, height) = (motion.width, motion.height);
-    let gap = |x: usize, y: usize| gaps[y * width + x];
-    for k in 0..MOTION {
-        let correction =
-            Frame::from_fn(
-                width,
-                height,
-                |x, y| {
-                    if gap(x, y) { T::nan() } else { motion.at(k, x, y) - from.at(k, x, y) }
-                },
-            );
-        let correction = fill_holes(&correction, None);
+impl Gaps {
+    /// By the equations of a level, `data`, and their typical energy, `noise`, grey^2. `None` where there is no gap, or nothing else.
+    pub fn find<T: SimdReal>(data: &Planes<T>, noise: T) -> Option<Self> {
+        let (width, height) = (data.width, data.height);
+        let least = T::from_f64(TEXTURED) * noise;
+        let mut sites = Vec::with_capacity(width * height);
         for y in 0..height {
-            for (x, value) in motion.line_mut(k, y).iter_mut().enumerate().filter(|(x, _)| gap(*x, y)) {
-                *value = from.at(k, x, y) + correction.get(x, y);
+            let texture = data.line(normal(0, 0), y).iter().zip(data.line(normal(1, 1), y));
+            sites.extend(texture.map(|(uu, vv)| *uu + *vv < least));
+        }
+        if !has_block(&sites, width) {
+            return None;
+        }
+        let is_gap = |row: &[bool]| row.contains(&true);
+        let rows: Vec<usize> = (0..height).filter(|y| is_gap(&sites[y * width..][..width])).collect();
+        let columns: Vec<usize> = (0..width).filter(|x| rows.iter().any(|y| sites[y * width + x])).collect();
+        let with_neighbours = |of: &[usize], len: usize| of[0].saturating_sub(1)..(of[of.len() - 1] + 2).min(len);
+        let (columns, rows) = (with_neighbours(&columns, width), with_neighbours(&rows, height));
+        sites.contains(&false).then_some(Self { sites, columns, rows })
+    }
+
+    /// Continues what was corrected `from` the motion that a level began with into the gaps of `motion`.
+    pub fn continue_corrections<T: SimdReal>(&self, from: &Planes<T>, motion: &mut Planes<T>) {
+        let (columns, width) = (&self.columns, motion.width);
+        let gaps = |y: usize| &self.sites[y * width..][columns.clone()];
+        for k in 0..MOTION {
+            let mut correction = Frame::filled(columns.len(), self.rows.len(), T::nan());
+            for (row, y) in self.rows.clone().enumerate() {
+                let pairs = motion.line(k, y)[columns.clone()].iter().zip(&from.line(k, y)[columns.clone()]);
+                for ((out, (now, began)), gap) in correction.row_mut(row).iter_mut().zip(pairs).zip(gaps(y)) {
+                    *out = if *gap { T::nan() } else { *now - *began };
+                }
+            }
+            let correction = fill_holes(&correction, None);
+            for (row, y) in self.rows.clone().enumerate() {
+                let pairs = from.line(k, y)[columns.clone()].iter().zip(correction.row(row));
+                let out = motion.line_mut(k, y)[columns.clone()].iter_mut();
+                for ((out, (began, correction)), _) in out.zip(pairs).zip(gaps(y)).filter(|(_, gap)| **gap) {
+                    *out = *began + *correction;
+                }
             }
         }
     }
+}
+
+/// Whether there is a whole [`BLOCK`] of gaps.
+fn has_block(sites: &[bool], width: usize) -> bool {
+    sites.chunks_exact(BLOCK * width).any(|rows| {
+        (0..width / BLOCK).any(|n| (0..BLOCK).all(|y| rows[y * width + BLOCK * n..][..BLOCK] == [true; BLOCK]))
+    })
 }
 
 #[cfg(test)]
@@ -58,21 +92,27 @@ mod tests {
     #[test]
     fn gaps_are_where_nothing_is_told_in_any_direction() {
         let mut data = Planes::<f32>::new(SIZE.0, SIZE.1, COUNT);
-        assert!(gaps(&data, 2.0).is_none(), "there is nothing to continue");
+        assert!(Gaps::find(&data, 2.0).is_none(), "there is nothing to continue");
         for y in 0..SIZE.1 {
             for x in 0..SIZE.0 {
                 // One direction is enough: the coupling carries the other along the edge.
                 data.line_mut(normal(1, 1), y)[x] = if in_hole(x, y) { 1.9 * TEXTURED as f32 } else { 1e3 };
             }
         }
-        let found = gaps(&data, 2.0).unwrap();
-        assert!(found.iter().enumerate().all(|(n, gap)| *gap == in_hole(n % SIZE.0, n / SIZE.0)));
-        assert!(gaps(&data, 1.8).is_none(), "with less noise everything is texture");
+        let found = Gaps::find(&data, 2.0).unwrap();
+        assert!(found.sites.iter().enumerate().all(|(n, gap)| *gap == in_hole(n % SIZE.0, n / SIZE.0)));
+        assert_eq!((found.columns, found.rows), (7..21, 5..19));
+        assert!(Gaps::find(&data, 1.8).is_none(), "with less noise everything is texture");
+        for y in (0..SIZE.1).filter(|y| y % BLOCK == 0) {
+            data.line_mut(normal(1, 1), y).fill(1e3);
+        }
+        assert!(Gaps::find(&data, 2.0).is_none(), "rows in between are near");
     }
 
     #[test]
     fn corrections_go_on_in_gaps_and_nothing_else_changes() {
-        let holes: Vec<bool> = (0..SIZE.0 * SIZE.1).map(|n| in_hole(n % SIZE.0, n / SIZE.0)).collect();
+        let sites = (0..SIZE.0 * SIZE.1).map(|n| in_hole(n % SIZE.0, n / SIZE.0)).collect();
+        let gaps = Gaps { sites, columns: 7..21, rows: 5..19 };
         let mut from = Planes::<f64>::new(SIZE.0, SIZE.1, MOTION);
         let mut motion = from.clone();
         let correction = |k: usize, y: usize| 0.3 + 0.1 * k as f64 - 0.01 * y as f64;
@@ -84,7 +124,7 @@ mod tests {
             }
         }
         let before = motion.clone();
-        continue_corrections(&holes, &from, &mut motion);
+        gaps.continue_corrections(&from, &mut motion);
         for (k, y) in (0..MOTION).flat_map(|k| (0..SIZE.1).map(move |y| (k, y))) {
             for x in 0..SIZE.0 {
                 let left = motion.at(k, x, y) - from.at(k, x, y) - correction(k, y);
