@@ -1,5 +1,6 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
+use super::camera::Intrinsics;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 /// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.
@@ -94,6 +95,13 @@ impl Motion {
     pub fn plane_flow(&self, point: [f64; 2], inverse_depth: f64) -> [f64; 2] {
         let rows = Rows::plane(point);
         (rows.g * self.u() * inverse_depth + rows.r * self.w()).into()
+    }
+
+    /// Flow at a place of the picture, px with a camera, else as [`Motion::plane_flow`].
+    pub fn picture_flow(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
+        let Some(camera) = camera else { return self.plane_flow(point, inverse_depth) };
+        let flow = self.plane_flow(camera.to_plane(point), inverse_depth);
+        (camera.unscale() * Vector2::from(flow)).into()
     }
 
     /// Flow of a unit bearing on the sphere, a 3-vector perpendicular to it: equation (1).

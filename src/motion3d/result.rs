@@ -1,7 +1,8 @@
 //! What an estimate tells.
 
+use super::camera::Intrinsics;
 use super::motion::Motion;
-use nalgebra::SMatrix;
+use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
 
 /// How far an estimate can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -77,6 +78,8 @@ pub struct MotionEstimate {
     pub inverse_depth_std: Vec<f64>,
     /// `nu~` (N), the depths in the weights; those of maximum likelihood are `nu^`. NaN for points left out.
     pub inverse_depth_smooth: Vec<f64>,
+    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; empty otherwise. Slopes are per unit of the plane at distance 1.
+    pub surfaces: Vec<[f64; 3]>,
     /// Frames to contact (N), `-1 / (nu~ u_z)`: positive when approaching, infinite where there is no approach.
     pub time_to_contact: Vec<f64>,
     /// Standard deviations of those (N), of the depths and of the motion.
@@ -117,6 +120,7 @@ impl MotionEstimate {
             inverse_depth: vec![f64::NAN; n],
             inverse_depth_std: vec![f64::NAN; n],
             inverse_depth_smooth: vec![f64::NAN; n],
+            surfaces: Vec::new(),
             time_to_contact: vec![f64::NAN; n],
             time_to_contact_std: vec![f64::NAN; n],
             inliers: vec![false; n],
@@ -126,27 +130,26 @@ impl MotionEstimate {
             likelihood: Likelihood { motion: none, covariance: UNKNOWN, tangent: nowhere, cost: f64::NAN },
         }
     }
+}
 
-    /// Covariance of the translation vector `u` (3 x 3), from that of its direction.
-    pub fn translation_covariance(&self) -> [[f64; 3]; 3] {
-        let (t, c) = (&self.tangent, &self.covariance);
-        let entry = |i: usize, j: usize| (0..2).map(|a| (0..2).map(|b| t[a][i] * c[a][b] * t[b][j]).sum::<f64>()).sum();
-        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+/// The focus of expansion `K (u / u_z)` with its covariance from that of `(psi, w)` in the axes `tangent` (px, px^2; without a camera on the plane at distance 1); `None` when `|u_z| < 1e-9`.
+pub fn focus_of_expansion(
+    motion: &Motion,
+    tangent: &[[f64; 3]; 2],
+    covariance: &[[f64; 5]; 5],
+    camera: Option<&Intrinsics>,
+) -> Option<([f64; 2], [[f64; 2]; 2])> {
+    let [x, y, z] = motion.translation;
+    if !(z.abs() >= 1e-9) {
+        return None;
     }
-
-    /// The focus of expansion `K (u / u_z)` with its covariance (px, px^2; without a camera on the plane at distance 1); `None` when `|u_z| < 1e-9`.
-    pub fn focus_of_expansion(&self, camera: Option<&super::Intrinsics>) -> Option<([f64; 2], [[f64; 2]; 2])> {
-        let [x, y, z] = self.motion.translation;
-        if !(z.abs() >= 1e-9) {
-            return None;
-        }
-        let at = [x / z, y / z];
-        // d(x / z) = (dx - (x / z) dz) / z.
-        let slope = nalgebra::Matrix2x3::new(1.0, 0.0, -at[0], 0.0, 1.0, -at[1]) / z;
-        let slope = camera.map_or(slope, |camera| camera.unscale() * slope);
-        let of_u = self.translation_covariance();
-        let covariance = slope * nalgebra::Matrix3::from_fn(|i, j| of_u[i][j]) * slope.transpose();
-        let at = camera.map_or(at, |camera| camera.to_pixel(at));
-        Some((at, std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)]))))
-    }
+    let at = [x / z, y / z];
+    // d(x / z) = (dx - (x / z) dz) / z.
+    let slope = Matrix2x3::new(1.0, 0.0, -at[0], 0.0, 1.0, -at[1]) / z;
+    let slope = camera.map_or(slope, |camera| camera.unscale() * slope);
+    let slope = slope * Matrix3x2::from_fn(|i, j| tangent[j][i]);
+    let block = Matrix2::from_fn(|i, j| covariance[i][j]);
+    let of_focus = slope * block * slope.transpose();
+    let at = camera.map_or(at, |camera| camera.to_pixel(at));
+    Some((at, std::array::from_fn(|i| std::array::from_fn(|j| of_focus[(i, j)]))))
 }
