@@ -178,21 +178,9 @@ fn on(
     };
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
-    let improved = (wanted || low).then(|| {
-        let mut made = made;
-        let weights = match &options.weight_depths {
-            Some(depths) => {
-                let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
-                nu.resize(inliers.stride, 0.0);
-                WeightDepths::Known(nu)
-            }
-            None => WeightDepths::Smoothed(made.get_or_insert_with(smoother)),
-        };
-        efficient(&inliers, chosen.motion(), weights)
-    });
-    let improved: Option<Efficient> = improved.flatten();
+    let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
     let mut solution = Solution::new(&chosen, plugged, improved, wanted);
-    solution.alternatives = rivals(&candidates, inliers.n);
+    solution.alternatives = close(&candidates, inliers.n)[1..].iter().map(|other| *other.motion()).collect();
     let distinct = (3.0 * solution.covariance.map_or(0.0, |c| direction_deviation(&c))).to_radians().max(1e-6);
     let mut planar = false;
     if let Some(twin) = twin(&inliers, &solution.motion, distinct) {
@@ -217,6 +205,24 @@ fn on(
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
 
+/// The smoothed weights' solution from the best minimum from which they have one: a spurious minimum, whose epipole sits among noisy points, may have none.
+fn smoothed(
+    inliers: &Observations,
+    options: &MotionOptions,
+    candidates: &[Candidate],
+    made: Option<DepthSmoother>,
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> Option<Efficient> {
+    let starts = close(candidates, inliers.n);
+    if let Some(depths) = &options.weight_depths {
+        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
+        nu.resize(inliers.stride, 0.0);
+        return starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
+    }
+    let mut smoother = made.unwrap_or_else(smoother);
+    starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
+}
+
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
 fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
     let before = scaled.sigma;
@@ -226,8 +232,9 @@ fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 
     factor
 }
 
-/// Other minima that come close to the chosen one.
-fn rivals(candidates: &[Candidate], n: usize) -> Vec<Motion> {
-    let close = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
-    candidates[1..].iter().filter(|other| other.cost < close).map(|other| *other.motion()).collect()
+/// The chosen minimum and those that come close to it.
+fn close(candidates: &[Candidate], n: usize) -> &[Candidate] {
+    let limit = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
+    let count = candidates.iter().take_while(|other| other.cost < limit).count();
+    &candidates[..count.max(1)]
 }
