@@ -62,7 +62,7 @@ class MotionSolution:
     tangent: Array | None = None
     """Axes (2, 3) of psi, no unit: `u + psi @ tangent`."""
     cost: float = float("nan")
-    """Sum of the squared residuals across the epipolar lines, in units of noise."""
+    """Sum of the squared residuals across the epipolar lines, in units of noise; of alternatives: how much more than that of the first choice, with what the depths say."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +229,10 @@ def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
 
 
 def _estimate(told: dict[str, Any]) -> MotionEstimate:
-    rivals = zip(told.pop("alternative_translations"), told.pop("alternative_rotations"), strict=True)
+    rivals = zip(told.pop("alternative_translations"), told.pop("alternative_rotations"), told.pop("alternative_costs").tolist(), strict=True)
     ml = {name: told.pop(f"ml_{name}") for name in ("translation", "rotation", "covariance", "tangent", "cost")}
     surfaces = told.pop("surfaces")
-    alternatives = tuple(MotionSolution(u, w) for u, w in rivals)
+    alternatives = tuple(MotionSolution(u, w, cost=cost) for u, w, cost in rivals)
     slopes = surfaces[:, 1:] if len(surfaces) else None
     return MotionEstimate(**told, surface_slopes=slopes, alternatives=alternatives, ml=MotionSolution(**ml))
 

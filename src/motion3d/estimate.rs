@@ -2,14 +2,16 @@
 
 use super::covariance::{direction_deviation, plugged};
 use super::efficient::{Efficient, WeightDepths, efficient};
+use super::grid::reach_of_plausible;
 use super::intake::whiten;
+use super::kernels::{depths, equations};
 use super::likelihood::{Candidate, choose, minima};
-use super::motion::Motion;
+use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::options::{Flow, Method, MotionOptions, Noise};
 use super::refine::{Effort, refine};
 use super::report::{Solution, report, rotation_report};
-use super::result::{MotionEstimate, Status};
+use super::result::{Alternative, MotionEstimate, Status};
 use super::robust;
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only, twin};
@@ -124,11 +126,13 @@ fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<Ro
     let sigma2 = rotation.chi2 / (2.0 * n - 3.0);
     let left = cost / (n - 5.0).max(1.0);
     let none = rotation.chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
-    (none || (left / sigma2).ln() > -SEARCHED / n.sqrt()).then_some(rotation)
+    (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
 /// Standard deviations by which the best of all directions explains pure noise better than any one would, and a margin.
 const SEARCHED: f64 = 5.5;
+/// What few points add to that.
+const FEW_POINTS: f64 = 12.0;
 
 /// Estimates on the points that obey one motion.
 fn on(
@@ -180,14 +184,18 @@ fn on(
     let low = plugged.is_none();
     let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
     let mut solution = Solution::new(&chosen, plugged, improved, wanted);
-    solution.alternatives = close(&candidates, inliers.n)[1..].iter().map(|other| *other.motion()).collect();
+    solution.alternatives = close(&candidates, inliers.n)[1..]
+        .iter()
+        .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
+        .collect();
     let distinct = (3.0 * solution.covariance.map_or(0.0, |c| direction_deviation(&c))).to_radians().max(1e-6);
     let mut planar = false;
     if let Some(twin) = twin(&inliers, &solution.motion, distinct) {
         planar = twin.behind - chosen.minimum.equations.behind < EXCLUDED;
         if planar {
-            solution.alternatives.retain(|other| other.angle_to(&twin.motion) > distinct);
-            solution.alternatives.insert(0, twin.motion);
+            solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
+            let excess = twin.behind - chosen.minimum.equations.behind;
+            solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
         }
     }
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
@@ -195,7 +203,7 @@ fn on(
         Status::FewPoints
     } else if planar {
         Status::Ambiguous
-    } else if !(deviation <= WIDE) {
+    } else if !(deviation <= WIDE) || far(&inliers, &[solution.motion, *chosen.motion()], deviation, rng.stream(4)) {
         Status::IllConditioned
     } else if low {
         Status::LowSnr
@@ -205,7 +213,16 @@ fn on(
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
 
-/// The smoothed weights' solution from the best minimum from which they have one: a spurious minimum, whose epipole sits among noisy points, may have none.
+/// Whether directions beyond three deviations and [`WIDE`] degrees explain the flow as well as the estimate.
+fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
+    reach_of_plausible(inliers, motions, rng) > WIDE + 3.0 * deviation
+}
+
+/// Most minima from which smoothed weights are tried.
+const TRIED: usize = 3;
+
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a
+/// motion is easier to judge.
 fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,
@@ -220,7 +237,24 @@ fn smoothed(
         return starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
     }
     let mut smoother = made.unwrap_or_else(smoother);
-    starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
+    let mut found: Vec<Efficient> = starts
+        .iter()
+        .take(TRIED)
+        .filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
+        .collect();
+    if found.len() > 1 {
+        let cost = |found: &Efficient| cost_of(inliers, &smoother, &found.motion);
+        let costs: Vec<f64> = found.iter().map(cost).collect();
+        let best = (1..found.len()).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
+        return Some(found.swap_remove(best));
+    }
+    found.pop()
+}
+
+/// `J`, the depths behind the camera and the depth map's roughness.
+fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
+    let at = equations(observations, motion, &tangents(&motion.u()), None);
+    at.cost + at.behind + smoother.cost(&depths(observations, motion))
 }
 
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.

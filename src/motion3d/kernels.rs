@@ -476,36 +476,36 @@ impl Bilinear {
     }
 }
 
-/// Truncated cost of a motion: `sum min(e^2, cut^2)` and the depths behind the camera, each term at most `cut^2`.
-struct ConsensusSums<'a> {
+/// The truncated cost of a motion.
+struct ConsensusSum<'a> {
     planes: Planes<'a>,
     motion: &'a Motion,
     floor: f64,
     cut2: f64,
 }
 
-impl Kernel<f64> for ConsensusSums<'_> {
-    type Output = [f64; 2];
+impl Kernel<f64> for ConsensusSum<'_> {
+    type Output = [f64; 1];
     #[inline(always)]
-    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 2] {
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 1] {
         let motion = Everywhere::<V>::new(self.motion);
         let (floor, cut2) = (V::splat(self.floor), V::splat(self.cut2));
-        let mut sums = [V::zero(); 2];
+        let mut sum = V::zero();
         for i in (0..self.planes[0].len()).step_by(V::LANES) {
             let seen = see(&self.planes, i, &motion, floor);
-            sums[0] = sums[0] + (seen.across * seen.across * seen.inverse).min(cut2);
             let behind = seen.along.min(V::zero());
-            sums[1] = sums[1] + (behind * behind * seen.inverse).min(cut2);
+            let both = seen.across.mul_add(seen.across, behind * behind) * seen.inverse;
+            sum = sum + both.min(cut2);
         }
-        sums.map(total)
+        [total(sum)]
     }
 }
 
-/// `(sum min(e^2, cut^2), sum over nu^ < 0 of min((nu^ / sd)^2, cut^2))`.
-pub(super) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> (f64, f64) {
-    let [across, behind] = over_chunks(observations, |range| {
+/// `sum min(e^2 + [nu^ < 0] (nu^ / sd)^2, cut^2)`: a point that does not obey counts once, for whatever reason.
+pub(super) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
+    let [cost] = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
-        dispatch(observations.level, ConsensusSums { planes, motion, floor: observations.floor, cut2: cut * cut })
+        dispatch(observations.level, ConsensusSum { planes, motion, floor: observations.floor, cut2: cut * cut })
     });
-    (across, behind)
+    cost
 }

@@ -58,5 +58,5 @@ pub use estimate::estimate_motion;
 pub use motion::{Motion, Projection};
 pub use options::{Flow, Method, MotionOptions, Noise, Placement};
 pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};
-pub use result::{Likelihood, MotionEstimate, Status, focus_of_expansion};
+pub use result::{Alternative, Likelihood, MotionEstimate, Status, focus_of_expansion};
 pub use smoothing::Smoother;

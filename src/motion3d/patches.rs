@@ -11,7 +11,7 @@ use super::covariance::{Matrix5, direction_deviation, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement};
-use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, nested};
+use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
 use super::special::by_chance;
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
@@ -210,7 +210,7 @@ fn tell(
     let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
     match system.twin(motion) {
         Some(twin) if twin.angle_to(motion).min(twin.reversed().angle_to(motion)) > distinct => {
-            out.alternatives.push(twin);
+            out.alternatives.push(Alternative { motion: twin, excess: 0.0 });
             true
         }
         _ => false,

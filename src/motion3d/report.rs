@@ -7,7 +7,7 @@ use super::likelihood::Candidate;
 use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
-use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, nested};
+use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
 use super::special::RotationOnly;
 use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
 
@@ -18,7 +18,7 @@ pub(super) struct Solution {
     /// `None` where nothing is known.
     pub covariance: Option<Matrix5>,
     pub status: Status,
-    pub alternatives: Vec<Motion>,
+    pub alternatives: Vec<Alternative>,
     likelihood: Likelihood,
     /// Depths in the weights, where they were smoothed.
     smooth: Option<Vec<f64>>,

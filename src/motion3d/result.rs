@@ -51,6 +51,15 @@ pub struct Likelihood {
     pub cost: f64,
 }
 
+/// Another motion that explains the flow about as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// The motion.
+    pub motion: Motion,
+    /// How much less likely it is, with its depths: in squared units of noise, like `J`; negative where maximum likelihood preferred it and the depths did not.
+    pub excess: f64,
+}
+
 /// A motion with its uncertainty and the depths of N points.
 #[derive(Debug, Clone)]
 pub struct MotionEstimate {
@@ -91,7 +100,7 @@ pub struct MotionEstimate {
     /// Residuals across the epipolar lines (N), in units of noise; NaN for points left out as unusable.
     pub residuals: Vec<f64>,
     /// Other motions that explain the flow about as well, the best first.
-    pub alternatives: Vec<Motion>,
+    pub alternatives: Vec<Alternative>,
     /// The maximum-likelihood solution.
     pub likelihood: Likelihood,
 }

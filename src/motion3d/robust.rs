@@ -138,12 +138,10 @@ fn narrow(observations: &Observations, start: Motion, bound: f64) -> Motion {
     refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7 }).motion
 }
 
-/// The sign with fewer depths behind the camera, and the truncated cost.
+/// The sign with the lower truncated cost, and that.
 fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
-    let reversed = motion.reversed();
-    let ((across, behind), (_, behind_reversed)) =
-        (truncated(observations, &motion, INLIER), truncated(observations, &reversed, INLIER));
-    if behind_reversed < behind { (reversed, across + behind_reversed) } else { (motion, across + behind) }
+    let signs = [motion, motion.reversed()].map(|motion| (motion, truncated(observations, &motion, INLIER)));
+    if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
 }
 
 /// Points within three deviations of their epipolar line and of the half space before the camera.

@@ -100,9 +100,9 @@ pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) 
         return None;
     }
     let n = normal.cholesky()?.solve(&right);
-    let residual = |k: usize| s2[k] * (nu[k] - n.dot(&eta(k))).powi(2);
-    let chi2: f64 = (0..observations.n).map(residual).sum();
-    if !by_chance(chi2, (used - 3) as f64) || n.norm() <= 0.0 {
+    let rest = |k: usize| nu[k] - n.dot(&eta(k));
+    let chi2: f64 = (0..observations.n).map(|k| s2[k] * rest(k).powi(2)).sum();
+    if !by_chance(chi2, (used - 3) as f64) || n.norm() <= 0.0 || bent(observations, &s2, rest) {
         return None;
     }
     let u = motion.u();
@@ -115,6 +115,31 @@ pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) 
     let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });
     let better = if signs[1].behind < signs[0].behind { signs[1] } else { signs[0] };
     (angle > distinct).then_some(better)
+}
+
+/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the motion would have it: all depths together tell that with less certainty.
+///
+/// `rest`: what a plane leaves of each depth.
+fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {
+    const TERMS: usize = 9;
+    let terms = if observations.spherical { TERMS } else { 6 };
+    let mut sums = nalgebra::SMatrix::<f64, TERMS, { TERMS + 1 }>::zeros();
+    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
+        let [x, y, z] = observations.position[k];
+        let height = if observations.spherical { z } else { 1.0 };
+        let row = [height, x, y, x * x, x * y, y * y, x * z, y * z, z * z, rest(k)];
+        for i in 0..terms {
+            for j in (i..terms).chain([TERMS]) {
+                sums[(i, j)] += s2[k] * row[i] * row[j];
+            }
+        }
+    }
+    let normal = nalgebra::DMatrix::from_fn(terms, terms, |i, j| sums[(i.min(j), i.max(j))]);
+    let right = nalgebra::DVector::from_fn(terms, |i, _| sums[(i, TERMS)]);
+    // Without a solution (points on a line) nothing is known of the bending.
+    let Some(factor) = normal.cholesky() else { return false };
+    let explained = right.dot(&factor.solve(&right));
+    !by_chance(explained, (terms - 3 + 5) as f64)
 }
 
 #[cfg(test)]

@@ -210,7 +210,7 @@ fn told<'py>(py: Python<'py>, found: MotionEstimate) -> PyResult<Bound<'py, PyDi
     let n = found.inverse_depth.len();
     let alternatives = found.alternatives.len();
     let ml = &found.likelihood;
-    let arrays: [(&str, &[usize], Vec<f64>); 19] = [
+    let arrays: [(&str, &[usize], Vec<f64>); 20] = [
         ("translation", &[3], found.motion.translation.to_vec()),
         ("rotation", &[3], found.motion.rotation.to_vec()),
         ("covariance", &[5, 5], flat(&found.covariance)),
@@ -224,8 +224,9 @@ fn told<'py>(py: Python<'py>, found: MotionEstimate) -> PyResult<Bound<'py, PyDi
         ("time_to_contact_std", &[n], found.time_to_contact_std),
         ("residuals", &[n], found.residuals),
         ("surfaces", &[found.surfaces.len(), 3], flat_rows(&found.surfaces)),
-        ("alternative_translations", &[alternatives, 3], found.alternatives.iter().flat_map(|m| m.translation).collect()),
-        ("alternative_rotations", &[alternatives, 3], found.alternatives.iter().flat_map(|m| m.rotation).collect()),
+        ("alternative_translations", &[alternatives, 3], found.alternatives.iter().flat_map(|a| a.motion.translation).collect()),
+        ("alternative_rotations", &[alternatives, 3], found.alternatives.iter().flat_map(|a| a.motion.rotation).collect()),
+        ("alternative_costs", &[alternatives], found.alternatives.iter().map(|a| a.excess).collect()),
         ("ml_translation", &[3], ml.motion.translation.to_vec()),
         ("ml_rotation", &[3], ml.motion.rotation.to_vec()),
         ("ml_covariance", &[5, 5], flat(&ml.covariance)),

@@ -88,7 +88,7 @@ fn a_plane_has_two_motions() {
     let found = run(&scene, &Noise::Sigma(0.005));
     assert_eq!(found.status, Status::Ambiguous);
     let twin = Motion::new(n.into(), (Vector3::from(W) + n.cross(&Vector3::from(motion.translation))).into());
-    let both = [found.motion, found.alternatives[0]];
+    let both = [found.motion, found.alternatives[0].motion];
     for truth in [motion, twin] {
         let nearest = both.iter().map(|m| m.angle_to(&truth).to_degrees()).fold(f64::INFINITY, f64::min);
         assert!(nearest < 3.0, "{nearest}: {both:?}");
@@ -106,9 +106,14 @@ fn a_plane_has_two_motions() {
 #[test]
 fn a_narrow_field_is_not_trusted() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
-    let scene = Scene::new(motion, 60, 0.02, 0.1, 3, |_, _, r| 0.5 + r);
-    let found = run(&scene, &Noise::Sigma(0.1));
-    assert!(matches!(found.status, Status::IllConditioned | Status::LowSnr), "{:?} {}", found.status, found.direction_std);
+    let mut trusted = 0;
+    for seed in 0..20 {
+        let scene = Scene::new(motion, 60, 0.02, 0.1, seed, |_, _, r| 0.5 + r);
+        let found = run(&scene, &Noise::Sigma(0.1));
+        let error = found.motion.angle_to(&motion).to_degrees();
+        trusted += u32::from(found.status == Status::Ok && error > 4.0 * found.direction_std);
+    }
+    assert!(trusted <= 2, "{trusted} of 20 were silently wrong");
 }
 
 #[test]

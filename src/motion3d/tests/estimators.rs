@@ -83,8 +83,8 @@ fn trial(method: Method, trials: u64, scene: impl Fn(u64) -> Scene) -> (f64, f64
 fn smoothed_weights_beat_maximum_likelihood_and_covariances_cover() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
     let scene = |seed| Scene::new(motion, 500, 0.6, 0.1, seed, |x, y, _| smooth(x, y));
-    let (plain, _) = trial(Method::MaximumLikelihood, 40, scene);
-    let (smoothed, inside) = trial(Method::Efficient, 40, scene);
+    let (plain, _) = trial(Method::MaximumLikelihood, 200, scene);
+    let (smoothed, inside) = trial(Method::Efficient, 200, scene);
     assert!(plain > 1.3 * smoothed, "{plain} {smoothed}");
     assert!((2.2..3.5).contains(&smoothed), "published: 2.80, got {smoothed}");
     assert!(inside >= 0.82, "{inside}");
