@@ -138,15 +138,14 @@ def two_views(scene: str, name: str, sigma: float, median: float, seed: int, *, 
 
 
 def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float) -> tuple[Scene, np.ndarray, np.ndarray]:
-    """Affine flow of patches with half size `radius` px (f = 500, mean flow 3 px): scene in px, Jacobians (N, 2, 2), covariances (N, 6, 6)."""
+    """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in px, Jacobians (N, 2, 2), covariances (N, 6, 6)."""
     rng = np.random.default_rng(seed)
     u, w = motion(name)
     points = rng.uniform(-h, h, (n, 2))
-    nu = rng.uniform(0.5, 1.5, n)
+    # Mean flow 3 px at |G u| = 1.
+    nu = rng.uniform(0.5, 1.5, n) * 3 / 500
     slants = 0.8 * nu[:, None] * rng.normal(size=(n, 2))
     g, r = rows(points)
-    scale = 3 / 500 / np.mean(np.linalg.norm(nu[:, None] * (g @ u) + r @ w, axis=1))
-    nu, slants, w = scale * nu, scale * slants, scale * w
     x, y = points.T
     t = g @ u
     one = np.ones(n)

@@ -102,6 +102,10 @@ class MotionEstimate:
     """`-1 / (nu u_z)` (N,), frames, of `inv_depth_smooth`: positive when approaching, infinite when `u_z = 0`."""
     time_to_contact_std: Array
     """Standard deviations (N,) of `time_to_contact`, frames, from those of the depths and of the motion."""
+    approach_rate: float
+    """`nu u_z` of all inliers together, 1/frame, weighted by what each point's own flow says: that of one object or of the scene's mean; `-1 / approach_rate` is its time to contact in frames. NaN for six numbers a patch."""
+    approach_rate_std: float
+    """Standard deviation of `approach_rate`, 1/frame, of the depths and of the motion."""
     inliers: NDArray[np.bool_]
     """Points (N,) that obey the motion."""
     sigma: float

@@ -48,7 +48,7 @@ pub(super) fn efficient(observations: &Observations, start: &Motion, mut weights
     let mut smooth = Vec::new();
     for _ in 0..ROUNDS {
         smooth = match &mut weights {
-            WeightDepths::Smoothed(smoother) => smoother.smooth(&depths(observations, &motion)).nu,
+            WeightDepths::Smoothed(smoother) => smoother.smooth(&depths(observations, &motion)),
             WeightDepths::Known(nu) => nu.clone(),
         };
         let before = motion;

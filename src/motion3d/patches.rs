@@ -97,14 +97,13 @@ impl AffinePatches<'_> {
 /// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth` and `initial`, which this form does not have.
+/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust` and `weight_inv_depth`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let refuse = |name: &'static str| Err(Error::argument(name, "its default, as six numbers are given a patch", "another value"));
     match options {
         MotionOptions { robust: true, .. } => return refuse("robust"),
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
-        MotionOptions { initial: Some(_), .. } => return refuse("initial"),
         _ => {}
     }
     let system = patches.system(options.placement);
@@ -119,7 +118,8 @@ fn estimate(system: &System, n: usize, options: &MotionOptions) -> MotionEstimat
     if let Some((rotation, covariance)) = turning(system) {
         return turning_report(system, n, rotation, &covariance);
     }
-    let Some(best) = minimum(system, CounterRng::new(options.seed)) else {
+    let near = options.initial.map(|initial| system.refine(&Motion::new(initial.translation, initial.rotation)));
+    let Some(best) = near.or_else(|| minimum(system, CounterRng::new(options.seed))) else {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     };
     let tangent = tangents(&best.u());

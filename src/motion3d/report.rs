@@ -5,7 +5,7 @@ use super::efficient::Efficient;
 use super::kernels::{Depths, depths, equations};
 use super::likelihood::Candidate;
 use super::motion::Motion;
-use super::observations::Observations;
+use super::observations::{Observations, Row};
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
 use super::special::RotationOnly;
@@ -114,35 +114,44 @@ pub(super) fn report(
     out
 }
 
-/// Times to contact with their deviations, by first order from those of the depth and of the motion.
+/// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`.
+fn rate_slopes(row: &Row, nu: f64, inverse: f64, u: &Vector3<f64>, tangent: &Matrix2x3<f64>) -> SMatrix<f64, 5, 1> {
+    let t = row.g * u;
+    let turn: Vector2<f64> = tangent * row.g.transpose() * t * (-nu * inverse);
+    let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
+    SMatrix::<f64, 5, 1>::from_column_slice(&[
+        u.z * turn.x + nu * tangent[(0, 2)],
+        u.z * turn.y + nu * tangent[(1, 2)],
+        u.z * spin.x,
+        u.z * spin.y,
+        u.z * spin.z,
+    ])
+}
+
+/// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, seen: &Depths, solution: &Solution) {
     let (u, tangent) = (solution.motion.u(), &solution.tangent);
     let covariance = solution.covariance.unwrap_or_else(|| Matrix5::from_element(f64::NAN));
+    let (mut weights, mut rates, mut common) = (0.0, 0.0, SMatrix::<f64, 5, 1>::zeros());
     for (k, &source) in all.source.iter().enumerate() {
         let source = source as usize;
-        let nu = if out.inverse_depth_smooth[source].is_finite() {
-            out.inverse_depth_smooth[source]
-        } else {
-            seen.nu[k]
-        };
+        let smooth = out.inverse_depth_smooth[source];
+        let nu = if smooth.is_finite() { smooth } else { seen.nu[k] };
         let rate = nu * u.z;
         out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
-        let row = all.row(k);
-        let t = row.g * u;
         let inverse = if seen.s2[k] > 0.0 { 1.0 / seen.s2[k] } else { f64::INFINITY };
-        // nu^ = T . d / s^2 with d about nu T: its slopes are -nu T . (G e) / s^2 along the axes and -(T . R) / s^2 along w.
-        let turn: Vector2<f64> = tangent * row.g.transpose() * t * (-nu * inverse);
-        let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-        let slopes = SMatrix::<f64, 5, 1>::from_column_slice(&[
-            u.z * turn.x + nu * tangent[(0, 2)],
-            u.z * turn.y + nu * tangent[(1, 2)],
-            u.z * spin.x,
-            u.z * spin.y,
-            u.z * spin.z,
-        ]);
+        let slopes = rate_slopes(&all.row(k), nu, inverse, &u, tangent);
         let variance = u.z * u.z * inverse + (slopes.transpose() * covariance * slopes)[0];
         out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
+        if out.inliers[source] && seen.s2[k] > 0.0 {
+            weights += seen.s2[k];
+            rates += seen.s2[k] * seen.nu[k] * u.z;
+            common += seen.s2[k] * slopes;
+        }
     }
+    let common = common / weights;
+    let variance = u.z * u.z / weights + (common.transpose() * covariance * common)[0];
+    out.approach = (rates / weights, variance.sqrt());
 }
 
 /// What is told about a camera that only turns, or stands still.
@@ -175,6 +184,7 @@ pub(super) fn rotation_report(
     for &source in &inliers.source {
         out.inliers[source as usize] = true;
     }
+    out.approach = (0.0, f64::INFINITY);
     out.likelihood.motion = out.motion;
     out.likelihood.cost = rotation.chi2;
     out

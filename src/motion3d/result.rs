@@ -93,6 +93,8 @@ pub struct MotionEstimate {
     pub time_to_contact: Vec<f64>,
     /// Standard deviations of those (N), of the depths and of the motion.
     pub time_to_contact_std: Vec<f64>,
+    /// `nu u_z` of the points together and its standard deviation, 1/frame, weighted by what each point's own flow says: that of one object, or of the scene's mean. Its time to contact is `-1 / rate`.
+    pub approach: (f64, f64),
     /// Points that obey the motion (N).
     pub inliers: Vec<bool>,
     /// Standard deviation of the flow, given or estimated, in its unit; 1 where covariances were given.
@@ -132,6 +134,7 @@ impl MotionEstimate {
             surfaces: Vec::new(),
             time_to_contact: vec![f64::NAN; n],
             time_to_contact_std: vec![f64::NAN; n],
+            approach: (f64::NAN, f64::NAN),
             inliers: vec![false; n],
             sigma,
             residuals: vec![f64::NAN; n],

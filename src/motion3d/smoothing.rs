@@ -36,15 +36,6 @@ enum Kind {
     Nearest(usize),
 }
 
-/// Depths smoothed at one motion.
-#[derive(Debug, Clone)]
-pub(super) struct Smoothed {
-    /// `nu~`, the posterior mean; as long as the planes.
-    pub nu: Vec<f64>,
-    /// `sum [ln(tot s^2) + min(res^2 / tot, 25)]`: how unlikely the depths are, given their neighbours.
-    pub cost: f64,
-}
-
 /// A fitted predictor with what it says about the compared points.
 struct Fitted {
     kind: Kind,
@@ -144,23 +135,18 @@ impl DepthSmoother {
         Fitted { kind: Kind::Prior, prediction, excess, loss }
     }
 
-    /// How unlikely the depths are, given their neighbours, in units of `J`.
+    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 / tot, 25)]`.
     pub fn cost(&self, depths: &Depths) -> f64 {
         let sites = self.sites(depths);
-        self.cost_of(&sites, &self.best(&sites))
-    }
-
-    fn cost_of(&self, sites: &[Site], fitted: &Fitted) -> f64 {
+        let fitted = self.best(&sites);
         let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
         loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
     }
 
-    /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths.
-    pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
+    /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
+    pub fn smooth(&mut self, depths: &Depths) -> Vec<f64> {
         let sites = self.sites(depths);
-        let fitted = self.best(&sites);
-        let cost = self.cost_of(&sites, &fitted);
-        let Fitted { kind, prediction, excess, .. } = fitted;
+        let Fitted { kind, prediction, excess, .. } = self.best(&sites);
         let all = match kind {
             Kind::Prior => {
                 let mean = prediction.q.first().copied().unwrap_or(0.0);
@@ -182,7 +168,7 @@ impl DepthSmoother {
             let (q, wide) = (all.q[place], (excess + all.c[place]) * site.s2);
             nu[i as usize] = q + wide / (wide + 1.0) * (site.nu - q);
         }
-        Smoothed { nu, cost }
+        nu
     }
 }
 

@@ -236,6 +236,8 @@ fn told<'py>(py: Python<'py>, found: MotionEstimate) -> PyResult<Bound<'py, PyDi
         out.set_item(name, arrays::owned(py, shape, values)?)?;
     }
     out.set_item("inliers", arrays::owned(py, &[n], found.inliers)?)?;
+    out.set_item("approach_rate", found.approach.0)?;
+    out.set_item("approach_rate_std", found.approach.1)?;
     out.set_item("ml_cost", ml.cost)?;
     out.set_item("direction_std", found.direction_std)?;
     out.set_item("sigma", found.sigma)?;
