@@ -57,6 +57,7 @@ __all__ = [
     "_mixture_partial_fit",
     "_motion3d_bound",
     "_motion3d_estimate",
+    "_motion3d_field_points",
     "_motion3d_focus",
     "_motion3d_predict",
     "_motion3d_two_views",
@@ -975,6 +976,9 @@ def _motion3d_bound(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, parameters: dict[str, Any]
 ) -> dict[str, NDArray[np.float64]]: ...
 def _motion3d_estimate(points: ArrayLike, flow: ArrayLike, parameters: dict[str, Any]) -> dict[str, Any]: ...
+def _motion3d_field_points(
+    field: FlowField, spacing: float | None, most: int | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
 def _motion3d_focus(
     translation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, intrinsics: ArrayLike | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...

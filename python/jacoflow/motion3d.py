@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _motion3d_bound, _motion3d_estimate, _motion3d_focus, _motion3d_predict, _motion3d_two_views
+from ._jacoflow import _motion3d_bound, _motion3d_estimate, _motion3d_field_points, _motion3d_focus, _motion3d_predict, _motion3d_two_views
 
 if TYPE_CHECKING:
     from . import FlowField
@@ -44,10 +44,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Status = Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
-
-SPACING = 4.0
-"""Least distance of points taken from a field, in units of its `correlation_length` (no unit): errors at that distance have a correlation of about exp(-4) = 0.02."""
-
 
 @dataclass(frozen=True, eq=False)
 class MotionSolution:
@@ -351,28 +347,11 @@ def estimate_field_motion(
         Most points; the grid is made coarser to keep to it.
     **options
         Those of `estimate_motion`; `robust` is True unless told otherwise.
+
+    Raises
+    ------
+    ValueError
+        For a stack, a field without a covariance or with a `pixel_pitch`, and for options that do not fit.
     """
-    flow, covariance = np.asarray(field.flow), field.covariance
-    if flow.ndim != 3:
-        raise ValueError(f"field: expected one field (H, W) on a grid, got shape {field.shape}; take field[t] of a stack")
-    if covariance is None:
-        raise ValueError("field: expected one with a covariance, got one without")
-    if field.pixel_pitch != (1.0, 1.0):
-        raise ValueError(f"field: expected flow in px, got pixel_pitch {field.pixel_pitch}")
-    places = np.asarray(field.points, dtype=float).reshape(*flow.shape[:2], 2)
-    pitch = float(places[0, 1, 0] - places[0, 0, 0]) if flow.shape[1] > 1 else 1.0
-    spacing = max(8.0, SPACING * field.correlation_length) if spacing is None else float(spacing)
-    if not spacing > 0:
-        raise ValueError(f"spacing: expected a positive number, got {spacing}")
-    step = max(1, int(np.ceil(spacing / pitch)))
-    if max_points is not None:
-        while -(-flow.shape[0] // step) * -(-flow.shape[1] // step) > max_points:
-            step += 1
-    pick = np.s_[step // 2 :: step, step // 2 :: step]
-    valid = np.asarray(field.valid)[pick] & (np.asarray(field.status)[pick] != _INCONSISTENT)
-    points = places[pick][valid]
-    found = estimate_motion(points, flow[pick][valid], K, cov=np.asarray(covariance)[pick][valid][:, :2, :2], **{"robust": True, **options})
-    return found, points
-
-
-_INCONSISTENT = 8
+    points, flow, covariances, _ = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points)
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, **options}), points

@@ -77,6 +77,21 @@ impl Tree {
         &self.points
     }
 
+    /// The places split into cells of at most `most` points that lie together.
+    pub fn cells(&self, most: usize) -> Vec<std::ops::Range<usize>> {
+        let mut cells = Vec::new();
+        let mut waiting = vec![0u32];
+        while let Some(node) = waiting.pop() {
+            let Node { range, children, .. } = self.nodes[node as usize];
+            if children.0 == 0 || (range.1 - range.0) as usize <= most {
+                cells.push(range.0 as usize..range.1 as usize);
+            } else {
+                waiting.extend([children.1, children.0]);
+            }
+        }
+        cells
+    }
+
     /// The `k` nearest of the points at the places `asked`, themselves left out; `k` is less than the number of points.
     pub fn nearest(&self, asked: &[u32], k: usize) -> Neighbours {
         let mut places = vec![0u32; asked.len() * k];

@@ -10,7 +10,7 @@ use super::motion::Motion;
 use super::observations::Observations;
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
-use gate::smooth_enough;
+use gate::Gate;
 use rayon::prelude::*;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
@@ -112,16 +112,17 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(motion, _)| motion)?;
     let mut found = settle(observations, best)?;
+    let gate = Gate::new(observations);
     for _ in 0..GATES {
-        let kept = smooth_enough(observations, &found);
+        let kept = gate.passed(&found);
         if kept.len() < LEAST {
             break;
         }
-        let motion = refine(&observations.subset(&kept), found.motion, None, Effort::FULL).motion;
+        let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
         let obeying = obeying(observations, &motion);
         found = Consensus { motion, inliers: obeying };
     }
-    let inliers = smooth_enough(observations, &found);
+    let inliers = gate.passed(&found);
     if inliers.len() >= LEAST {
         found.inliers = inliers;
     }
@@ -154,6 +155,11 @@ fn obeying(observations: &Observations, motion: &Motion) -> Vec<u32> {
     (0..observations.n as u32).filter(obeys).collect()
 }
 
+/// Of many points the minimum is found again with all effort afterwards.
+fn effort(observations: &Observations) -> Effort {
+    if observations.n > MANY { Effort { steps: 15, tolerance: 1e-6 } } else { Effort::FULL }
+}
+
 /// Maximum likelihood on the points that obey, until these stay the same.
 fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
     let mut motion = start;
@@ -162,9 +168,10 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < LEAST {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, Effort::FULL).motion;
+        motion = refine(&observations.subset(&inliers), motion, None, effort(observations)).motion;
         let next = obeying(observations, &motion);
-        let settled = next == inliers;
+        // Of many points a few always lie on the border.
+        let settled = next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
         inliers = next;
         if settled {
             break;
