@@ -65,7 +65,7 @@ impl DepthSmoother {
         let tree = Tree::new(&observations.position);
         let n = observations.n;
         let compared = sample(n, COMPARED, rng);
-        let most = SIZES.into_iter().rfind(|&k| k < n).filter(|_| which != Smoother::Prior);
+        let most = SIZES.into_iter().rfind(|&k| k < n);
         let lists = most.map_or_else(Neighbours::default, |k| tree.nearest(&compared, k));
         Self {
             tree,
@@ -85,7 +85,7 @@ impl DepthSmoother {
     }
 
     /// The predictor with the least loss on the compared points.
-    fn best(&self, sites: &[Site]) -> Fitted {
+    fn best(&self, sites: &[Site], which: Smoother) -> Fitted {
         let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
         let mut best: Option<Fitted> = None;
         let mut offer = |fitted: Fitted| {
@@ -93,10 +93,10 @@ impl DepthSmoother {
                 best = Some(fitted);
             }
         };
-        if self.which != Smoother::Neighbours || self.lists.k == 0 {
+        if which != Smoother::Neighbours || self.lists.k == 0 {
             offer(Self::prior(sites, &compared));
         }
-        for k in SIZES.into_iter().filter(|&k| k <= self.lists.k) {
+        for k in SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior) {
             let prediction =
                 regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
             let excess = excess(&compared, &prediction);
@@ -135,10 +135,10 @@ impl DepthSmoother {
         Fitted { kind: Kind::Prior, prediction, excess, loss }
     }
 
-    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 / tot, 25)]`.
+    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 / tot, 25)]`. Whatever smooths the weights, this looks at the better predictor.
     pub fn cost(&self, depths: &Depths) -> f64 {
         let sites = self.sites(depths);
-        let fitted = self.best(&sites);
+        let fitted = self.best(&sites, Smoother::Auto);
         let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
         loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
     }
@@ -146,7 +146,7 @@ impl DepthSmoother {
     /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
     pub fn smooth(&mut self, depths: &Depths) -> Vec<f64> {
         let sites = self.sites(depths);
-        let Fitted { kind, prediction, excess, .. } = self.best(&sites);
+        let Fitted { kind, prediction, excess, .. } = self.best(&sites, self.which);
         let all = match kind {
             Kind::Prior => {
                 let mean = prediction.q.first().copied().unwrap_or(0.0);
