@@ -21,7 +21,7 @@ K_DRIVE = np.array([[707.0912, 0, 601.8873], [0, 707.0912, 183.1104], [0, 0, 1]]
 K_CAR = np.array([[721.5377, 0, 609.5593], [0, 721.5377, 172.8540], [0, 0, 1]])
 BLOCK = 100
 """Side of the blocks, px, by which points are split into two halves that share no pixels but at the seams."""
-CAR_SPACING = 8
+CAR_SPACING = 8.0
 """Distance of the points on the car, px."""
 INTERPOLATED = 12
 """The drive's first so many true rotations are one and the same to 0.001 degrees: they were interpolated, and tell nothing of single frames."""
@@ -124,30 +124,28 @@ def spacings(data: Path) -> list[Row]:
 
 
 def car(data: Path) -> list[Row]:
-    """Time to contact of the car ahead from its own relative motion, in frames, beside the laser's."""
+    """Time to contact of the car ahead from its own relative motion, in frames, beside the laser's; over one frame and over four."""
     folder = data / "ttc_kitti_lidar"
     images = frames(folder / "image_02")
-    table = list(csv.DictReader(line for line in (folder / "lidar_range.csv").read_text().splitlines() if not line.startswith("#")))
-    laser = {int(row["frame"]): row for row in table}
+    lines = (line for line in (folder / "lidar_range.csv").read_text().splitlines() if not line.startswith("#"))
+    laser = {int(row["frame"]): row for row in csv.DictReader(lines)}
     names = [int(path.stem) for path in sorted((folder / "image_02").glob("*.png"))]
     rows: list[Row] = []
-    for index, frame in enumerate(names[:-1]):
-        box = [float(laser[frame][key]) for key in ("u0", "v0", "u1", "v1")]
-        flow = field(images[index], images[index + 1], "balanced")
-        x0, y0, x1, y1 = (round(value) for value in box)
-        spacing = int(CAR_SPACING)
-        y, x = (axis.ravel() for axis in np.mgrid[y0 + spacing // 2 : y1 : spacing, x0 + spacing // 2 : x1 : spacing])
-        vectors, covariances = np.asarray(flow.flow)[y, x], np.asarray(flow.covariance[y, x])[:, :2, :2]
-        found = motion3d.estimate_motion(np.stack([x, y], -1).astype(float), vectors, K_CAR, cov=covariances, robust=True)
-        contact = -1 / found.approach_rate
-        deviation = found.approach_rate_std / found.approach_rate**2
-        # Closing between the two frames over the range at the first.
-        z0, z1 = float(laser[frame]["Z_m"]), float(laser[names[index + 1]]["Z_m"])
-        truth = float(laser[frame]["ttc_frames"])
-        rows.append(
-            {
-                "frame": frame, "laser, frames": truth, "laser, this pair": round(z0 / (z0 - z1), 1), "ours, frames": round(contact, 1), "deviation": round(deviation, 1),
-                "off, deviations": round((contact - truth) / deviation, 2), "points": len(x), "status": found.status,
-            }
-        )  # fmt: skip
+    for step in (1, 4):
+        for index in range(len(names) - step):
+            x0, y0, x1, y1 = (round(float(laser[names[index]][key])) for key in ("u0", "v0", "u1", "v1"))
+            # The laser's box is the lower half of the car's rear.
+            box = (x0, y0 - (y1 - y0), x1 - x0, 2 * (y1 - y0))
+            flow = jacoflow.estimate([images[index], images[index + step]], preset="balanced", region=box)
+            found, points = motion3d.estimate_field_motion(flow, K_CAR, spacing=CAR_SPACING)
+            contact, deviation = -step / found.approach_rate, step * found.approach_rate_std / found.approach_rate**2
+            # The laser's range half way, over its closing speed between both frames.
+            between = [laser[name] for name in names[index : index + step + 1]]
+            truth = float(np.mean([float(row["Z_m"]) for row in between]) / np.mean([float(row["closing_m_per_frame"]) for row in between]))
+            rows.append(
+                {
+                    "frames": f"{names[index]} to {names[index + step]}", "laser": round(truth, 1), "ours": round(contact, 1), "deviation": round(deviation, 1),
+                    "off, deviations": round((contact - truth) / deviation, 2), "points": len(points), "status": found.status,
+                }
+            )  # fmt: skip
     return rows

@@ -47,7 +47,7 @@ Status = Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguo
 
 @dataclass(frozen=True, eq=False)
 class MotionSolution:
-    """A motion by itself: the maximum-likelihood solution, or another motion that explains the flow about as well."""
+    """A motion by itself, rad/frame: the maximum-likelihood solution, or another motion that explains the flow about as well."""
 
     translation: Array
     """Unit direction `u` (3,), scene relative to camera, no unit."""
@@ -63,7 +63,7 @@ class MotionSolution:
 
 @dataclass(frozen=True, eq=False)
 class MotionEstimate:
-    """A rigid motion with its uncertainty and the depths of N points."""
+    """A rigid motion, rad/frame, with its uncertainty and the inverse depths (N,) of its points."""
 
     translation: Array
     """Unit direction `u` (3,) of the scene relative to the camera, no unit; NaN where there is none."""
@@ -342,7 +342,7 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px. Errors of neighbours that go together would make the covariance of the motion too small.
+        Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px. Points closer than that get larger covariances: times `4 pi l^2 / spacing^2` with the correlation length `l`.
     max_points : int or None
         Most points; the grid is made coarser to keep to it.
     **options

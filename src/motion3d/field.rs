@@ -26,13 +26,16 @@ pub struct FieldPoints {
     pub points: Vec<[f64; 2]>,
     /// Their flow, px/frame.
     pub flow: Vec<[f64; 2]>,
-    /// Its covariances, 4 values a point, px^2.
+    /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share, `4 pi l^2 / spacing^2`.
     pub covariances: Vec<f64>,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
 
-/// Takes every so manieth valid estimate of a field. Windowed estimates share pixels, and their errors go together: closer points would make the motion's covariance too small.
+/// Takes every so manieth valid estimate of a field.
+///
+/// Windowed estimates share pixels, and their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
+/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one.
 ///
 /// A list of points is taken whole.
 ///
@@ -55,6 +58,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Grid { stride, .. } => coarse_enough(field, (spacing / stride as f64).ceil() as usize, options.most),
         Sites::Points(_) => 1,
     };
+    let shared = shared_by(field, step);
     let mut out = FieldPoints { spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
@@ -67,10 +71,21 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             let (x, y) = field.layout.sites.pixel(column, row);
             out.points.push([x as f64, y as f64]);
             out.flow.push([m[0], m[1]]);
-            out.covariances.extend([covariance[0][0], covariance[0][1], covariance[1][0], covariance[1][1]]);
+            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
+            out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
         }
     }
     Ok(out)
+}
+
+/// Points on the area over which errors are one, at least 1; a list of points is taken to know what it does.
+fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
+    let Sites::Grid { stride, .. } = field.layout.sites else { return 1.0 };
+    let (length, spacing) = (field.layout.correlation_length, (step * stride) as f64);
+    if spacing >= INDEPENDENT * length {
+        return 1.0;
+    }
+    (4.0 * std::f64::consts::PI * length * length / (spacing * spacing)).max(1.0)
 }
 
 /// The least step of at least `step` that leaves no more than `most` points.
@@ -115,6 +130,9 @@ mod tests {
         assert_eq!((points.flow[3], &points.covariances[..4]), ([0.5, 0.5], &[0.25; 4][..]));
         let few = FieldOptions { most: Some(7), ..FieldOptions::default() };
         assert_eq!(field_points(&field, &few).unwrap().points.len(), 6);
+        let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
+        let covariance = field_points(&field, &dense).unwrap().covariances[0];
+        assert!((covariance / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{covariance}");
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
     }
