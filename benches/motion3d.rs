@@ -15,8 +15,7 @@ const SIGMA: f64 = 0.02;
 /// Points in [-0.6, 0.6]^2 over a wavy surface, and their flow.
 fn scene(n: usize) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
     let (rng, motion) = (CounterRng::new(1), Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]));
-    let points: Vec<[f64; 2]> =
-        (0..n as u64).map(|k| [0, 1].map(|j| 1.2 * rng.uniform(2 * k + j) - 0.6)).collect();
+    let points: Vec<[f64; 2]> = (0..n as u64).map(|k| [0, 1].map(|j| 1.2 * rng.uniform(2 * k + j) - 0.6)).collect();
     let noise = rng.stream(1);
     let flow = points.iter().enumerate().map(|(k, &p)| {
         let depth = 1.0 + 0.35 * (3.3 * p[0] + 1.0).sin() * (2.5 * p[1]).cos();

@@ -21,6 +21,8 @@ K_DRIVE = np.array([[707.0912, 0, 601.8873], [0, 707.0912, 183.1104], [0, 0, 1]]
 K_CAR = np.array([[721.5377, 0, 609.5593], [0, 721.5377, 172.8540], [0, 0, 1]])
 BLOCK = 100
 """Side of the blocks, px, by which points are split into two halves that share no pixels but at the seams."""
+STEADY = 2e-4
+"""How much the car itself may turn, rad/frame."""
 CAR_SPACING = 8.0
 """Distance of the points on the car, px."""
 INTERPOLATED = 12
@@ -136,8 +138,11 @@ def car(data: Path) -> list[Row]:
             x0, y0, x1, y1 = (round(float(laser[names[index]][key])) for key in ("u0", "v0", "u1", "v1"))
             # The laser's box is the lower half of the car's rear.
             box = (x0, y0 - (y1 - y0), x1 - x0, 2 * (y1 - y0))
-            flow = jacoflow.estimate([images[index], images[index + step]], preset="balanced", region=box)
-            found, points = motion3d.estimate_field_motion(flow, K_CAR, spacing=CAR_SPACING)
+            flow = field(images[index], images[index + step], "balanced")
+            # The camera's rotation is the whole scene's; in the car's narrow field it would look like a sideways motion.
+            camera, _ = motion3d.estimate_field_motion(flow, K_CAR)
+            known = (camera.rotation, camera.covariance[2:, 2:] + STEADY**2 * np.eye(3))
+            found, points = motion3d.estimate_field_motion(flow, K_CAR, spacing=CAR_SPACING, region=box, rotation_prior=known)
             contact, deviation = -step / found.approach_rate, step * found.approach_rate_std / found.approach_rate**2
             # The laser's range half way, over its closing speed between both frames.
             between = [laser[name] for name in names[index : index + step + 1]]

@@ -22,8 +22,7 @@ fn two_views(camera: &Intrinsics, motion: &Motion, n: u64, scale: f64) -> (Vec<[
         let nu = scale * (0.5 + rng.uniform(3 * k + 2));
         let [x, y] = camera.to_plane(pixel);
         let eta = [x, y, 1.0];
-        let after: [f64; 3] =
-            std::array::from_fn(|i| (0..3).map(|j| turn[i][j] * eta[j]).sum::<f64>() + nu * shift[i]);
+        let after: [f64; 3] = std::array::from_fn(|i| (0..3).map(|j| turn[i][j] * eta[j]).sum::<f64>() + nu * shift[i]);
         let there = camera.to_pixel([after[0] / after[2], after[1] / after[2]]);
         points.push(pixel);
         flow.push([there[0] - pixel[0], there[1] - pixel[1]]);

@@ -17,6 +17,7 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -149,6 +150,7 @@ def estimate_motion(
     placement: Literal["midpoint", "start"] = "midpoint",
     smoother: Literal["auto", "prior", "neighbours"] = "auto",
     weight_inv_depth: ArrayLike | None = None,
+    rotation_prior: tuple[ArrayLike, ArrayLike] | None = None,
     initial: tuple[ArrayLike, ArrayLike] | None = None,
     seed: int = 0,
     threads: int | None = None,
@@ -184,6 +186,8 @@ def estimate_motion(
         What depths in the weights are drawn to: one normal distribution, regressions on 8 to 64 neighbours, or the better of them.
     weight_inv_depth : array (N,), units of |u| per frame
         Inverse depths for the weights, known from elsewhere; noise in them costs variance and causes no bias.
+    rotation_prior : (rotation (3,) in rad/frame, covariance (3, 3))
+        The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides.
     initial : (translation (3,), rotation (3,) in rad/frame)
         Look for the minimum near this motion instead of everywhere.
     seed : int
@@ -197,9 +201,10 @@ def estimate_motion(
         For shapes and values that do not fit; each message names the argument.
     """
     first, turn = (None, None) if initial is None else initial
+    known, spread = (None, None) if rotation_prior is None else rotation_prior
     parameters = {
         "K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "method": method, "robust": bool(robust), "placement": placement,
-        "smoother": smoother, "weight_inv_depth": weight_inv_depth, "initial_translation": first, "initial_rotation": turn, "seed": seed, "threads": threads,
+        "smoother": smoother, "weight_inv_depth": weight_inv_depth, "initial_translation": first, "initial_rotation": turn, "prior_rotation": known, "prior_covariance": spread, "seed": seed, "threads": threads,
         "six": jacobian is not None,
     }  # fmt: skip
     if jacobian is not None:
@@ -331,7 +336,7 @@ def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:
 
 
 def estimate_field_motion(
-    field: FlowField, K: ArrayLike, *, spacing: float | None = None, max_points: int | None = None, **options: Any
+    field: FlowField, K: ArrayLike, *, spacing: float | None = None, max_points: int | None = None, region: Sequence[int] | None = None, **options: Any
 ) -> tuple[MotionEstimate, Array]:
     """The rigid motion of the scene in a flow field, from its own covariances, and the points (N, 2), px, that it was estimated from.
 
@@ -345,6 +350,8 @@ def estimate_field_motion(
         Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px. Points closer than that get larger covariances: times `4 pi l^2 / spacing^2` with the correlation length `l`.
     max_points : int or None
         Most points; the grid is made coarser to keep to it.
+    region : (x, y, width, height), px, or None
+        Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
     **options
         Those of `estimate_motion`; `robust` is True unless told otherwise.
 
@@ -353,5 +360,5 @@ def estimate_field_motion(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, and for options that do not fit.
     """
-    points, flow, covariances, _ = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points)
+    points, flow, covariances, _ = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, **options}), points

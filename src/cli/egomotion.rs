@@ -1,6 +1,8 @@
 //! `jacoflow egomotion`: the camera's rigid motion from frame to frame.
 
-use super::arguments::{ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments, parse_positive};
+use super::arguments::{
+    ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments, parse_positive,
+};
 use super::flow::prepare;
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess_for};
@@ -108,7 +110,7 @@ impl EgomotionCommand {
         let threads = compute(&self.compute)?.0;
         Ok(EgomotionPlan {
             camera: intrinsics(&self.intrinsics)?,
-            field: FieldOptions { spacing: self.spacing, most: self.max_points },
+            field: FieldOptions { spacing: self.spacing, most: self.max_points, region: None },
             motion: MotionOptions {
                 method,
                 robust: !self.no_robust,
@@ -137,13 +139,7 @@ impl EgomotionCommand {
         }
     }
 
-    fn run<T: SimdReal>(
-        &self,
-        opened: Opened,
-        estimator: Estimator,
-        sink: Egomotion,
-        watch: &Watch,
-    ) -> Result<Report> {
+    fn run<T: SimdReal>(&self, opened: Opened, estimator: Estimator, sink: Egomotion, watch: &Watch) -> Result<Report> {
         let mut details = input_details(&opened, &self.sites);
         if let Value::Object(details) = &mut details {
             details.insert("method".into(), estimator.method().name().into());

@@ -44,7 +44,12 @@ impl MotionBound {
 ///
 /// # Errors
 /// [`Error::Argument`] for lengths that differ, noise that is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the motion.
-pub fn motion_bound(points: &Flow<'_>, noise: &Noise<'_>, motion: &Motion, inverse_depth: &[f64]) -> Result<MotionBound> {
+pub fn motion_bound(
+    points: &Flow<'_>,
+    noise: &Noise<'_>,
+    motion: &Motion,
+    inverse_depth: &[f64],
+) -> Result<MotionBound> {
     points.check(noise)?;
     check_truth(noise, motion)?;
     if inverse_depth.len() != points.len() {
@@ -99,13 +104,7 @@ fn weighted_noise(
         }
         let p = Vector2::new(t.y, -t.x) / s2.sqrt();
         let (along, turn) = (tangent * row.g.transpose() * p, row.r.transpose() * p);
-        let d = SMatrix::<f64, 5, 1>::from_column_slice(&[
-            nu[k] * along.x,
-            nu[k] * along.y,
-            turn.x,
-            turn.y,
-            turn.z,
-        ]);
+        let d = SMatrix::<f64, 5, 1>::from_column_slice(&[nu[k] * along.x, nu[k] * along.y, turn.x, turn.y, turn.z]);
         let weight = (d.transpose() * bound * d)[0] / s2;
         let mut block = sum.fixed_view_mut::<2, 2>(0, 0);
         block += weight * along * along.transpose();

@@ -17,7 +17,8 @@ impl Intrinsics {
     /// [`Error::Argument`] naming `K` unless its last row is `(0, 0, 1)`, everything is finite and its determinant is positive.
     pub fn new(matrix: [[f64; 3]; 3]) -> Result<Self> {
         let k = Matrix3::from_fn(|i, j| matrix[i][j]);
-        let refuse = |got: String| Err(Error::argument("K", "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]", got));
+        let refuse =
+            |got: String| Err(Error::argument("K", "a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]", got));
         if k.iter().any(|value| !value.is_finite()) {
             return refuse("entries that are not finite".into());
         }

@@ -36,7 +36,9 @@ pub(super) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<Plugged> {
     let whiten = factor.try_inverse()?;
     let noise = whiten * p * whiten.transpose();
     let most = SymmetricEigen::new(noise).eigenvalues.max();
-    if !(1.0 - most >= LEAST_INFORMATION) {
+    // Not a number is not enough either.
+    let enough = 1.0 - most >= LEAST_INFORMATION;
+    if !enough {
         return None;
     }
     let bound = inverse(&(h - p))?;

@@ -43,7 +43,11 @@ pub(super) enum WeightDepths<'a> {
 /// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.
 ///
 /// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes no bias.
-pub(super) fn efficient(observations: &Observations, start: &Motion, mut weights: WeightDepths<'_>) -> Option<Efficient> {
+pub(super) fn efficient(
+    observations: &Observations,
+    start: &Motion,
+    mut weights: WeightDepths<'_>,
+) -> Option<Efficient> {
     let mut motion = *start;
     let mut smooth = Vec::new();
     for _ in 0..ROUNDS {

@@ -7,7 +7,7 @@ use super::intake::whiten;
 use super::kernels::{depths, equations};
 use super::likelihood::{Candidate, choose, minima};
 use super::motion::{Motion, tangents};
-use super::observations::Observations;
+use super::observations::{Known, Observations};
 use super::options::{Flow, Method, MotionOptions, Noise};
 use super::refine::{Effort, refine};
 use super::report::{Solution, report, rotation_report};
@@ -40,7 +40,7 @@ const ROUNDING: f64 = 1e-11;
 /// not finite are left out and come back as NaN. Scenes that do not determine a motion are told by [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `initial`.
+/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     check(flow, options)?;
@@ -51,6 +51,10 @@ fn check(flow: &Flow<'_>, options: &MotionOptions) -> Result<()> {
     if let Some(depths) = options.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
         let expected = format!("{} values, one for each point", flow.len());
         return Err(Error::argument("weight_inv_depth", expected, depths.len()));
+    }
+    if let Some(prior) = options.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
+        let expected = "a finite rotation with a positive definite covariance";
+        return Err(Error::argument("rotation_prior", expected, format!("{prior:?}")));
     }
     match &options.initial {
         Some(_) if options.robust => {
@@ -93,13 +97,14 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let sigma = if scaled.unknown { f64::NAN } else { sigma };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
     }
+    scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
     if options.robust {
         let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
         };
         let inliers = scaled.observations.subset(&kept.inliers);
-        on(flow, options, &mut scaled, inliers, vec![kept.motion], rng)
+        on(flow, options, &mut scaled, inliers, Some(kept.motion), rng)
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -107,7 +112,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma);
         }
         let inliers = scaled.observations.clone();
-        on(flow, options, &mut scaled, inliers, Vec::new(), rng)
+        on(flow, options, &mut scaled, inliers, None, rng)
     }
 }
 
@@ -140,16 +145,16 @@ fn on(
     options: &MotionOptions,
     scaled: &mut Scaled,
     mut inliers: Observations,
-    known: Vec<Motion>,
+    known: Option<Motion>,
     rng: CounterRng,
 ) -> MotionEstimate {
-    let mut found = match (&options.initial, known.as_slice()) {
+    let mut found = match (&options.initial, known) {
         (Some(initial), _) => {
             let initial = Motion::new(initial.translation, initial.rotation);
             vec![refine(&inliers, initial, None, Effort::FULL)]
         }
-        (None, []) => minima(&inliers, rng.stream(2)),
-        (None, known) => known.iter().map(|&start| refine(&inliers, start, None, Effort::FULL)).collect(),
+        (None, None) => minima(&inliers, rng.stream(2)),
+        (None, Some(known)) => vec![refine(&inliers, known, None, Effort::FULL)],
     };
     let Some(best) = found.first().map(|minimum| minimum.equations.cost) else {
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
@@ -172,7 +177,7 @@ fn on(
     let (candidates, made) = if options.initial.is_some() {
         (found.into_iter().map(|minimum| Candidate { cost: minimum.equations.cost, minimum }).collect(), None)
     } else {
-        choose(&inliers, found, smoother)
+        choose(&inliers, &found, smoother)
     };
     let chosen = candidates[0];
     let wanted = match options.method {
@@ -183,7 +188,7 @@ fn on(
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
     let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
-    let mut solution = Solution::new(&chosen, plugged, improved, wanted);
+    let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
@@ -203,7 +208,10 @@ fn on(
         Status::FewPoints
     } else if planar {
         Status::Ambiguous
-    } else if !(deviation <= WIDE) || far(&inliers, &[solution.motion, *chosen.motion()], deviation, rng.stream(4)) {
+    } else if deviation.is_nan()
+        || deviation > WIDE
+        || far(&inliers, &[solution.motion, *chosen.motion()], deviation, rng.stream(4))
+    {
         Status::IllConditioned
     } else if low {
         Status::LowSnr

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Sites, Status};
+use crate::types::{FlowField, Rect, Sites, Status};
 
 /// Errors at a distance of this many correlation lengths have a correlation of about `exp(-4)`: they may be taken for independent.
 const INDEPENDENT: f64 = 4.0;
@@ -15,6 +15,8 @@ const LEAST_SPACING: f64 = 8.0;
 pub struct FieldOptions {
     /// Distance of the points along rows and columns, px; default: 4 correlation lengths of the field, at least 8 px.
     pub spacing: Option<f64>,
+    /// Only points in this rectangle of pixels.
+    pub region: Option<Rect>,
     /// Most points; the grid is made coarser to keep to it. Default: no limit.
     pub most: Option<usize>,
 }
@@ -69,6 +71,9 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             let Some(covariance) = field.covariance_at(site) else { continue };
             let m = field.affine(site).to_array().map(Real::to_f64);
             let (x, y) = field.layout.sites.pixel(column, row);
+            if !options.region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y)) {
+                continue;
+            }
             out.points.push([x as f64, y as f64]);
             out.flow.push([m[0], m[1]]);
             let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;

@@ -1,5 +1,6 @@
 //! From what is given to whitened points.
 
+use super::camera::Intrinsics;
 use super::motion::{Rows, tangents};
 use super::observations::{Observations, Row};
 use super::options::{Flow, Noise, Placement};
@@ -8,15 +9,14 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 /// Whitens the usable points; rows that are not finite or whose covariance is no covariance are left out. Unknown noise is taken to be 1 of the flow's unit.
 pub(super) fn whiten(flow: &Flow<'_>, noise: &Noise<'_>, placement: Placement) -> Observations {
     let n = flow.len();
-    let (mut rows, mut position, mut source) =
-        (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
+    let (mut rows, mut position, mut source) = (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
     let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
     for k in 0..n {
         let row = match flow {
             Flow::Plane { points, flow, camera } => {
                 let half = if placement == Placement::Midpoint { 0.5 } else { 0.0 };
                 let at = [points[k][0] + half * flow[k][0], points[k][1] + half * flow[k][1]];
-                let scale = camera.map_or_else(Matrix2::identity, |camera| camera.scale());
+                let scale = camera.map_or_else(Matrix2::identity, Intrinsics::scale);
                 let at = camera.map_or(at, |camera| camera.to_plane(at));
                 let covariance = match noise {
                     Noise::Covariances(c) => symmetric(Matrix2::from_row_slice(&c[4 * k..4 * k + 4])),

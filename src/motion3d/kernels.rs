@@ -3,11 +3,11 @@
 //! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar line and `s m = T . d` the part along it (2).
 
 use super::motion::Motion;
-use super::observations::Observations;
+use super::observations::{Known, Observations};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 
 /// Planes of an [`Observations`].
 pub(super) const PLANES: usize = 14;
@@ -117,7 +117,21 @@ fn over_chunks<const N: usize>(
 
 /// Indices of the upper triangle of a 5 x 5 matrix, row by row.
 const UPPER: [(usize, usize); 15] = [
-    (0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (1, 1), (1, 2), (1, 3), (1, 4), (2, 2), (2, 3), (2, 4), (3, 3), (3, 4), (4, 4),
+    (0, 0),
+    (0, 1),
+    (0, 2),
+    (0, 3),
+    (0, 4),
+    (1, 1),
+    (1, 2),
+    (1, 3),
+    (1, 4),
+    (2, 2),
+    (2, 3),
+    (2, 4),
+    (3, 3),
+    (3, 4),
+    (4, 4),
 ];
 
 /// The sums of one Gauss-Newton step at a motion.
@@ -185,6 +199,11 @@ impl Kernel<f64> for EquationSums<'_> {
     }
 }
 
+/// Adds a 3 x 3 matrix, times a factor, to the block of the rotation.
+fn add_to_rotation(h: &mut SMatrix<f64, 5, 5>, information: &Matrix3<f64>, factor: f64) {
+    h.fixed_view_mut::<3, 3>(2, 2).add_assign(information * factor);
+}
+
 /// The equations at a motion, `theta = (psi, w)` with `psi` along the rows of `tangent`; with `cut`, Tukey's weights that end there, in units of noise.
 pub(super) fn equations(
     observations: &Observations,
@@ -202,17 +221,19 @@ pub(super) fn equations(
         h[(i, j)] = *value;
         h[(j, i)] = *value;
     }
+    let mut gradient = SMatrix::<f64, 5, 1>::from_column_slice(&sums[15..20]);
+    let mut cost = cut.map_or(sums[23], |cut| cut * cut / 3.0 * sums[24]);
+    if let Some(known) = &observations.prior {
+        let (pull, square) = known.pull(&motion.w());
+        add_to_rotation(&mut h, &known.information, 1.0);
+        gradient.fixed_rows_mut::<3>(2).add_assign(&pull);
+        cost += square;
+    }
     p[(0, 0)] = sums[20];
     p[(0, 1)] = sums[21];
     p[(1, 0)] = sums[21];
     p[(1, 1)] = sums[22];
-    Equations {
-        h,
-        gradient: SMatrix::<f64, 5, 1>::from_column_slice(&sums[15..20]),
-        p,
-        cost: cut.map_or(sums[23], |cut| cut * cut / 3.0 * sums[24]),
-        behind: sums[25],
-    }
+    Equations { h, gradient, p, cost, behind: sums[25] }
 }
 
 /// The 3 x 3 normal equations of `w` for a fixed direction.
@@ -252,9 +273,15 @@ pub(super) fn best_rotation(observations: &Observations, direction: &Vector3<f64
         let planes = observations.slices(&range);
         dispatch(observations.level, RotationSums { planes, direction, floor: observations.floor })
     });
-    let [xx, xy, xz, xc, yy, yz, yc, zz, zc, cc] = sums;
-    let normal = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let right = Vector3::new(xc, yc, zc);
+    let [xx, xy, xz, xc, yy, yz, yc, zz, zc, mut cc] = sums;
+    let mut normal = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let mut right = Vector3::new(xc, yc, zc);
+    if let Some(known) = &observations.prior {
+        let (pull, square) = known.pull(&Vector3::zeros());
+        normal += known.information;
+        right += pull;
+        cc += square;
+    }
     let w = normal.cholesky()?.solve(&right);
     let cost = (cc - right.dot(&w)).max(0.0);
     (w.iter().all(|value| value.is_finite()) && cost.is_finite()).then_some((w, cost))
@@ -299,17 +326,16 @@ pub(super) fn depths(observations: &Observations, motion: &Motion) -> Depths {
     use super::observations::CHUNK;
     let stride = observations.stride;
     let mut out = Depths { nu: vec![0.0; stride], s2: vec![0.0; stride], e: vec![0.0; stride] };
-    let work = |(c, ((nu, s2), e)): (usize, ((&mut [f64], &mut [f64]), &mut [f64]))| {
-        let planes = observations.slices(&(c * CHUNK..c * CHUNK + nu.len()));
-        dispatch(observations.level, DepthPlanes { planes, motion, floor: observations.floor, out: [nu, s2, e] });
+    let work = |chunk: usize, out: [&mut [f64]; 3]| {
+        let planes = observations.slices(&(chunk * CHUNK..chunk * CHUNK + out[0].len()));
+        dispatch(observations.level, DepthPlanes { planes, motion, floor: observations.floor, out });
     };
     if stride <= CHUNK {
-        if stride > 0 {
-            work((0, ((&mut out.nu, &mut out.s2), &mut out.e)));
-        }
+        work(0, [&mut out.nu, &mut out.s2, &mut out.e]);
     } else {
         let planes = out.nu.par_chunks_mut(CHUNK).zip(out.s2.par_chunks_mut(CHUNK));
-        planes.zip(out.e.par_chunks_mut(CHUNK)).enumerate().for_each(work);
+        let planes = planes.zip(out.e.par_chunks_mut(CHUNK)).enumerate();
+        planes.for_each(|(chunk, ((nu, s2), e))| work(chunk, [nu, s2, e]));
     }
     out
 }
@@ -383,6 +409,9 @@ pub(super) fn information(
         h[(i, j)] = *value;
         h[(j, i)] = *value;
     }
+    if let Some(known) = &observations.prior {
+        add_to_rotation(&mut h, &known.information, 1.0);
+    }
     h
 }
 
@@ -438,7 +467,10 @@ impl Kernel<f64> for BilinearSums<'_> {
 
 /// The frozen estimating equation `sum V^t (s e)(u, w)`: five values, each bilinear in `u` and `(1, w)`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bilinear([f64; BILINEAR_SUMS]);
+pub(super) struct Bilinear {
+    sums: [f64; BILINEAR_SUMS],
+    prior: Option<Known>,
+}
 
 impl Bilinear {
     /// With `D(nu)` at a motion as weights, damped within `kappa^2 = spread` of the epipole.
@@ -449,11 +481,12 @@ impl Bilinear {
         nu: &[f64],
         spread: f64,
     ) -> Self {
-        Self(over_chunks(observations, |range| {
+        let sums = over_chunks(observations, |range| {
             let planes = observations.slices(&range);
             let weights = WeightSums { planes, nu: &nu[range], motion, tangent, floor: observations.floor };
             dispatch(observations.level, BilinearSums { weights, spread })
-        }))
+        });
+        Self { sums, prior: observations.prior }
     }
 
     /// Its value at a motion, and its slopes along `tangent` and `w`.
@@ -461,7 +494,7 @@ impl Bilinear {
         let (u, w) = (motion.translation, motion.rotation);
         let (mut value, mut slope) = (SMatrix::<f64, 5, 1>::zeros(), SMatrix::<f64, 5, 5>::zeros());
         for row in 0..5 {
-            let h = |i: usize, j: usize| self.0[12 * row + 4 * i + j];
+            let h = |i: usize, j: usize| self.sums[12 * row + 4 * i + j];
             for i in 0..3 {
                 let along = h(i, 0) + (0..3).map(|j| h(i, 1 + j) * w[j]).sum::<f64>();
                 value[row] += u[i] * along;
@@ -471,6 +504,10 @@ impl Bilinear {
                     slope[(row, 2 + j)] += u[i] * h(i, 1 + j);
                 }
             }
+        }
+        if let Some(known) = &self.prior {
+            value.fixed_rows_mut::<3>(2).add_assign(&known.pull(&motion.w()).0);
+            add_to_rotation(&mut slope, &known.information, -1.0);
         }
         (value, slope)
     }

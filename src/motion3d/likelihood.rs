@@ -29,9 +29,9 @@ pub(super) struct Candidate {
 
 impl Candidate {
     /// With the sign that has fewer depths behind the camera.
-    pub fn signed(observations: &Observations, minimum: Minimum) -> Self {
+    pub fn signed(observations: &Observations, minimum: &Minimum) -> Self {
         let reversed = minimum.reversed(observations);
-        let better = if reversed.equations.behind < minimum.equations.behind { reversed } else { minimum };
+        let better = if reversed.equations.behind < minimum.equations.behind { reversed } else { *minimum };
         // J is of the minimum in both signs; taken from one of them, so that a cut does not matter.
         Self { minimum: better, cost: reversed.equations.cost + better.equations.behind }
     }
@@ -49,7 +49,7 @@ pub(super) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimu
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
         let mut rough: Vec<Candidate> =
-            different(rough).into_iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
+            different(rough).into_iter().map(|minimum| Candidate::signed(&fewer, &minimum)).collect();
         rough.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         rough.truncate(FINALISTS);
         rough.iter().map(|candidate| refine(observations, *candidate.motion(), None, Effort::FULL)).collect()
@@ -78,11 +78,11 @@ fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
 /// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and differ by about `2 sqrt(n)` by chance.
 pub(super) fn choose(
     observations: &Observations,
-    minima: Vec<Minimum>,
+    minima: &[Minimum],
     smoother: impl FnOnce() -> DepthSmoother,
 ) -> (Vec<Candidate>, Option<DepthSmoother>) {
     let mut candidates: Vec<Candidate> =
-        minima.into_iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
+        minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
     let close = best + 8.0 * (observations.n as f64).sqrt() + 25.0;

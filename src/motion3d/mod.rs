@@ -58,7 +58,7 @@ pub use camera::Intrinsics;
 pub use estimate::estimate_motion;
 pub use field::{FieldOptions, FieldPoints, field_points};
 pub use motion::{Motion, Projection};
-pub use options::{Flow, Method, MotionOptions, Noise, Placement};
+pub use options::{Flow, Method, MotionOptions, Noise, Placement, RotationPrior};
 pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};
 pub use result::{Alternative, Likelihood, MotionEstimate, Status, focus_of_expansion};
 pub use smoothing::Smoother;

@@ -2,8 +2,9 @@
 
 use super::kernels::PLANES;
 use super::motion::Rows;
+use super::options::RotationPrior;
 use crate::simd::Level;
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
 pub(super) const CHUNK: usize = 4096;
@@ -38,6 +39,31 @@ pub(super) struct Observations {
     pub floor: f64,
     /// The instruction set of the kernels.
     pub level: Level,
+    /// What is known of the rotation beforehand.
+    pub prior: Option<Known>,
+}
+
+/// A rotation known beforehand, with the inverse of its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub rotation: Vector3<f64>,
+    pub information: Matrix3<f64>,
+}
+
+impl Known {
+    /// `None` unless everything is finite and the covariance positive definite.
+    pub fn new(prior: &RotationPrior) -> Option<Self> {
+        let covariance = Matrix3::from_fn(|i, j| 0.5 * (prior.covariance[i][j] + prior.covariance[j][i]));
+        let known = Self { rotation: prior.rotation.into(), information: covariance.cholesky()?.inverse() };
+        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
+    }
+
+    /// `(w0 - w)` times the information, and the square of the difference in its units.
+    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let off = self.rotation - w;
+        let pull = self.information * off;
+        (pull, off.dot(&pull))
+    }
 }
 
 impl Row {
@@ -72,7 +98,7 @@ impl Observations {
             size += row.g.norm_squared();
         }
         let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
-        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect() }
+        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect(), prior: None }
     }
 
     /// The points `chosen`, by index among these.
@@ -95,6 +121,7 @@ impl Observations {
             source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
             floor: self.floor,
             level: self.level,
+            prior: self.prior,
         }
     }
 

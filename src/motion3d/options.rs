@@ -61,6 +61,17 @@ pub enum Placement {
     Start,
 }
 
+/// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a thing that moves by itself.
+///
+/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotationPrior {
+    /// Rotation rate `w`, rad/frame.
+    pub rotation: [f64; 3],
+    /// Its covariance, row by row.
+    pub covariance: [[f64; 3]; 3],
+}
+
 /// Options of [`estimate_motion`](super::estimate_motion).
 #[derive(Debug, Clone, Default)]
 pub struct MotionOptions {
@@ -76,6 +87,8 @@ pub struct MotionOptions {
     pub weight_depths: Option<Vec<f64>>,
     /// A motion near which the minimum is looked for, instead of everywhere; not with `robust`.
     pub initial: Option<Motion>,
+    /// What is known of the rotation beforehand; default: nothing.
+    pub rotation_prior: Option<RotationPrior>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.

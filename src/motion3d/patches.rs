@@ -97,13 +97,16 @@ impl AffinePatches<'_> {
 /// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust` and `weight_inv_depth`, which this form does not have.
+/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth` and `rotation_prior`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
-    let refuse = |name: &'static str| Err(Error::argument(name, "its default, as six numbers are given a patch", "another value"));
+    let refuse = |name: &'static str| {
+        Err(Error::argument(name, "its default, as six numbers are given a patch", "another value"))
+    };
     match options {
         MotionOptions { robust: true, .. } => return refuse("robust"),
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
+        MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
         _ => {}
     }
     let system = patches.system(options.placement);
@@ -154,7 +157,7 @@ fn estimate(system: &System, n: usize, options: &MotionOptions) -> MotionEstimat
         Status::FewPoints
     } else if planar {
         Status::Ambiguous
-    } else if !(out.direction_std <= WIDE) {
+    } else if out.direction_std.is_nan() || out.direction_std > WIDE {
         Status::IllConditioned
     } else if low {
         Status::LowSnr
@@ -201,9 +204,8 @@ fn tell(
         let rate = surface[0] * motion.translation[2];
         out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
         let slopes = Vector2::new(surface[0] * tangent[(0, 2)], surface[0] * tangent[(1, 2)]);
-        let of_direction = covariance.map_or(f64::NAN, |c| {
-            (slopes.transpose() * c.fixed_view::<2, 2>(0, 0) * slopes)[0]
-        });
+        let of_direction =
+            covariance.map_or(f64::NAN, |c| (slopes.transpose() * c.fixed_view::<2, 2>(0, 0) * slopes)[0]);
         let variance = motion.translation[2].powi(2) * seen.covariance[(0, 0)] + of_direction;
         out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
     }
@@ -222,7 +224,8 @@ fn minimum(system: &System, rng: CounterRng) -> Option<Motion> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     let starts = apart(found, APART, STARTS);
-    let refined = starts.into_iter().map(|(start, _)| system.refine(&start)).flat_map(|motion| [motion, motion.reversed()]);
+    let refined =
+        starts.into_iter().map(|(start, _)| system.refine(&start)).flat_map(|motion| [motion, motion.reversed()]);
     refined
         .map(|motion| {
             let here = system.equations(&motion, &tangents(&motion.u()), None);
@@ -276,11 +279,7 @@ fn turning_report(system: &System, n: usize, rotation: Vector3<f64>, covariance:
 ///
 /// # Errors
 /// As [`motion_bound`](super::motion_bound).
-pub fn patch_motion_bound(
-    patches: &AffinePatches<'_>,
-    motion: &Motion,
-    surfaces: &[[f64; 3]],
-) -> Result<MotionBound> {
+pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces: &[[f64; 3]]) -> Result<MotionBound> {
     patches.check()?;
     check_truth(&Noise::Sigma(1.0), motion)?;
     if surfaces.len() != patches.points.len() {

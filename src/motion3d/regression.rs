@@ -61,7 +61,8 @@ struct Group {
 impl Group {
     #[inline(always)]
     fn put(&mut self, lane: usize, from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64) {
-        let d = [(site.at[0] - from.at[0]) * scale, (site.at[1] - from.at[1]) * scale, (site.at[2] - from.at[2]) * scale];
+        let d =
+            [(site.at[0] - from.at[0]) * scale, (site.at[1] - from.at[1]) * scale, (site.at[2] - from.at[2]) * scale];
         self.d2[lane] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let [x, y] = match axes {
             None => [d[0], d[1]],
@@ -81,8 +82,7 @@ impl Kernel<f64> for Regress<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) {
-        let mut group =
-            Group { x: [0.0; MOST], y: [0.0; MOST], d2: [0.0; MOST], nu: [0.0; MOST], s2: [0.0; MOST] };
+        let mut group = Group { x: [0.0; MOST], y: [0.0; MOST], d2: [0.0; MOST], nu: [0.0; MOST], s2: [0.0; MOST] };
         let (one, tail) = (V::constant(1.0), V::constant(TAIL));
         for start in (0..self.asked.len()).step_by(V::LANES) {
             let lanes = V::LANES.min(self.asked.len() - start);

@@ -31,7 +31,7 @@ fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
 
 impl Solution {
     /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for a covariance.
-    pub fn new(chosen: &Candidate, plugged: Option<Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
+    pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
         let minimum = &chosen.minimum;
         let likelihood = Likelihood {
             motion: minimum.motion,

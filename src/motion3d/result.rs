@@ -152,7 +152,7 @@ pub fn focus_of_expansion(
     camera: Option<&Intrinsics>,
 ) -> Option<([f64; 2], [[f64; 2]; 2])> {
     let [x, y, z] = motion.translation;
-    if !(z.abs() >= 1e-9) {
+    if z.is_nan() || z.abs() < 1e-9 {
         return None;
     }
     let at = [x / z, y / z];

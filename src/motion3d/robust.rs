@@ -171,7 +171,8 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         motion = refine(&observations.subset(&inliers), motion, None, effort(observations)).motion;
         let next = obeying(observations, &motion);
         // Of many points a few always lie on the border.
-        let settled = next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
+        let settled =
+            next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
         inliers = next;
         if settled {
             break;

@@ -97,8 +97,7 @@ impl DepthSmoother {
             offer(Self::prior(sites, &compared));
         }
         for k in SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior) {
-            let prediction =
-                regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
+            let prediction = regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
             let excess = excess(&compared, &prediction);
             let loss = loss(&compared, &prediction, excess, 0.0);
             offer(Fitted { kind: Kind::Nearest(k), prediction, excess, loss });

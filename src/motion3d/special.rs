@@ -54,9 +54,13 @@ pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
         normal += Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         right += Vector3::new(xf, yf, zf);
     }
+    if let Some(known) = &observations.prior {
+        normal += known.information;
+        right += known.pull(&Vector3::zeros()).0;
+    }
     let factor = normal.cholesky()?;
     let rotation = factor.solve(&right);
-    let mut chi2 = 0.0;
+    let mut chi2 = observations.prior.map_or(0.0, |known| known.pull(&rotation).1);
     for (component, first) in [6, 9].into_iter().enumerate() {
         let r = [plane(first), plane(first + 1), plane(first + 2)];
         for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(plane(12 + component)) {
@@ -76,7 +80,7 @@ pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Twin {
     pub motion: Motion,
-    /// Squared depths behind the camera, in units of their deviation, that it has.
+    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a known rotation.
     pub behind: f64,
 }
 
@@ -109,7 +113,8 @@ pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) 
     let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&u)));
     let behind = |motion: &Motion| -> f64 {
         let at = depths(observations, motion);
-        (0..observations.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum()
+        let behind: f64 = (0..observations.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
+        behind + observations.prior.map_or(0.0, |known| known.pull(&motion.w()).1)
     };
     let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
     let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });

@@ -58,9 +58,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
-    use super::motion3d::{
-        motion3d_bound, motion3d_estimate, motion3d_focus, motion3d_predict, motion3d_two_views,
-    };
+    use super::motion3d::{motion3d_bound, motion3d_estimate, motion3d_focus, motion3d_predict, motion3d_two_views};
     #[pymodule_export]
     use super::motion3d_field::motion3d_field_points;
     #[pymodule_export]

@@ -4,7 +4,8 @@ use super::arrays;
 use crate::error::Error;
 use crate::motion3d::{
     AffinePatches, Flow, Intrinsics, Method, Motion, MotionBound, MotionEstimate, MotionOptions, Noise, Placement,
-    Smoother, estimate_motion, estimate_patch_motion, focus_of_expansion, motion_bound, patch_motion_bound,
+    RotationPrior, Smoother, estimate_motion, estimate_patch_motion, focus_of_expansion, motion_bound,
+    patch_motion_bound,
 };
 use crate::parallel::Threads;
 use pyo3::prelude::*;
@@ -175,12 +176,27 @@ fn triple(name: &'static str, given: &(Vec<usize>, Vec<f64>)) -> PyResult<[f64; 
     }
 }
 
+/// A known rotation and its covariance.
+fn rotation_prior(from: &Bound<'_, PyDict>) -> PyResult<Option<RotationPrior>> {
+    let Some(rotation) = optional(from, "prior_rotation")? else { return Ok(None) };
+    let rotation = triple("rotation_prior", &rotation)?;
+    match optional(from, "prior_covariance")? {
+        Some((shape, values)) if shape == [3, 3] => {
+            let covariance = std::array::from_fn(|i| std::array::from_fn(|j| values[3 * i + j]));
+            Ok(Some(RotationPrior { rotation, covariance }))
+        }
+        other => {
+            let got = other.map_or_else(|| "none".into(), |(shape, _)| format!("shape {shape:?}"));
+            Err(Error::argument("rotation_prior", "a covariance of shape (3, 3)", got).into())
+        }
+    }
+}
+
 /// The core's options from the keywords of the Python function.
 fn options(from: &Bound<'_, PyDict>) -> PyResult<MotionOptions> {
     let methods = [("auto", Method::Auto), ("ml", Method::MaximumLikelihood), ("efficient", Method::Efficient)];
     let placements = [("midpoint", Placement::Midpoint), ("start", Placement::Start)];
-    let smoothers =
-        [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
+    let smoothers = [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
     let initial = optional(from, "initial_translation")?.map(|u| triple("initial", &u)).transpose()?;
     let turning = optional(from, "initial_rotation")?.map(|w| triple("initial", &w)).transpose()?;
     let seed: super::options::Integer = option(from, "seed")?;
@@ -191,6 +207,7 @@ fn options(from: &Bound<'_, PyDict>) -> PyResult<MotionOptions> {
         smoother: word("smoother", &option::<String>(from, "smoother")?, &smoothers)?,
         weight_depths: optional(from, "weight_inv_depth")?.map(|(_, values)| values),
         initial: initial.map(|translation| Motion { translation, rotation: turning.unwrap_or([0.0; 3]) }),
+        rotation_prior: rotation_prior(from)?,
         seed: u64::try_from(seed.0).map_err(|_| Error::argument("seed", "an integer of at least 0", seed.0))?,
         threads: Threads::new(option(from, "threads")?)?,
     })
@@ -205,7 +222,7 @@ fn flat_rows<const D: usize>(rows: &[[f64; D]]) -> Vec<f64> {
 }
 
 /// An estimate as a dictionary of arrays.
-fn told<'py>(py: Python<'py>, found: MotionEstimate) -> PyResult<Bound<'py, PyDict>> {
+fn told(py: Python<'_>, found: MotionEstimate) -> PyResult<Bound<'_, PyDict>> {
     let out = PyDict::new(py);
     let n = found.inverse_depth.len();
     let alternatives = found.alternatives.len();
@@ -224,8 +241,16 @@ fn told<'py>(py: Python<'py>, found: MotionEstimate) -> PyResult<Bound<'py, PyDi
         ("time_to_contact_std", &[n], found.time_to_contact_std),
         ("residuals", &[n], found.residuals),
         ("surfaces", &[found.surfaces.len(), 3], flat_rows(&found.surfaces)),
-        ("alternative_translations", &[alternatives, 3], found.alternatives.iter().flat_map(|a| a.motion.translation).collect()),
-        ("alternative_rotations", &[alternatives, 3], found.alternatives.iter().flat_map(|a| a.motion.rotation).collect()),
+        (
+            "alternative_translations",
+            &[alternatives, 3],
+            found.alternatives.iter().flat_map(|a| a.motion.translation).collect(),
+        ),
+        (
+            "alternative_rotations",
+            &[alternatives, 3],
+            found.alternatives.iter().flat_map(|a| a.motion.rotation).collect(),
+        ),
         ("alternative_costs", &[alternatives], found.alternatives.iter().map(|a| a.excess).collect()),
         ("ml_translation", &[3], ml.motion.translation.to_vec()),
         ("ml_rotation", &[3], ml.motion.rotation.to_vec()),

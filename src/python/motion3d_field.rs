@@ -2,6 +2,7 @@
 
 use super::arrays;
 use super::field::{FlowField, Store, each};
+use super::options::{self, Region};
 use crate::motion3d::{FieldOptions, field_points};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -16,14 +17,15 @@ pub fn motion3d_field_points<'py>(
     field: &FlowField,
     spacing: Option<f64>,
     most: Option<usize>,
+    region: Option<Region>,
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64)> {
     if field.count().1 {
         return Err(PyValueError::new_err("field: expected a single field, got a stack; take field[t]"));
     }
-    let options = FieldOptions { spacing, most };
+    let chosen = FieldOptions { spacing, most, region: options::region(region)? };
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| field_points(&field, &options))
+        py.detach(|| field_points(&field, &chosen))
     })?;
     let n = found.points.len();
     let flat = |rows: Vec<[f64; 2]>| rows.into_iter().flatten().collect::<Vec<f64>>();

@@ -9,9 +9,8 @@ const GROWTH: f64 = 1.02;
 /// Frames of a textured plane that is approached, 128 x 96 px.
 fn approach(place: &Place, folder: &str, count: i32) {
     std::fs::create_dir(place.path(folder)).unwrap();
-    let wave = |k: f64, x: f64, y: f64| {
-        (0.11 + 0.3 * (k * 1.7).sin().abs()) * ((k * 2.3).cos() * x + (k * 2.3).sin() * y) + k
-    };
+    let wave =
+        |k: f64, x: f64, y: f64| (0.11 + 0.3 * (k * 1.7).sin().abs()) * ((k * 2.3).cos() * x + (k * 2.3).sin() * y) + k;
     for frame in 0..count {
         let scale = GROWTH.powi(frame);
         let picture = GrayImage::from_fn(128, 96, |x, y| {

@@ -87,7 +87,9 @@ fn from_nearest(observations: &Observations, inliers: &[u32], seen: &Depths) -> 
 /// Differences of the inliers' depths from the median of the inliers in their cell.
 fn within_cells(tree: &Tree, cells: &[Range<usize>], inliers: &[u32], seen: &Depths) -> Vec<f64> {
     let mut obeys = vec![false; tree.order().len()];
-    inliers.iter().for_each(|&k| obeys[k as usize] = true);
+    for &k in inliers {
+        obeys[k as usize] = true;
+    }
     let medians: Vec<Vec<f64>> = cells
         .par_chunks(TOGETHER)
         .map(|cells| {
@@ -103,7 +105,9 @@ fn within_cells(tree: &Tree, cells: &[Range<usize>], inliers: &[u32], seen: &Dep
         .collect();
     let mut middle = vec![0.0; obeys.len()];
     for (cell, median) in cells.iter().zip(medians.into_iter().flatten()) {
-        tree.order()[cell.clone()].iter().for_each(|&k| middle[k as usize] = median);
+        for &k in &tree.order()[cell.clone()] {
+            middle[k as usize] = median;
+        }
     }
     inliers.iter().map(|&k| seen.nu[k as usize] - middle[k as usize]).collect()
 }

@@ -89,7 +89,8 @@ pub(super) fn search(observations: &Observations, bound: f64, rng: CounterRng) -
             let w = a.try_inverse()? * b;
             w.iter().all(|value| value.is_finite()).then_some(w)
         };
-        let rotations: Vec<Vector3<f64>> = triples.iter().filter_map(rotation).collect();
+        let known = observations.prior.map(|known| known.rotation);
+        let rotations: Vec<Vector3<f64>> = triples.iter().filter_map(rotation).chain(known).collect();
         let (best, cost) = dispatch(level, TruncatedCost { rows: &rows, rotations: &rotations, cut2 })?;
         Some((Motion::of(u, &rotations[best]), cost))
     })

@@ -133,7 +133,9 @@ fn what_is_not_finite_changes_nothing_else() {
     let scene = Scene::oblique(200, 0.02, 7);
     let want = run(&scene, &Noise::Sigma(0.02));
     let mut dirty = scene.clone();
-    for (k, (point, flow)) in [([f64::NAN, 0.0], [1.0, 1.0]), ([0.1, 0.1], [f64::INFINITY, 0.0])].into_iter().enumerate() {
+    for (k, (point, flow)) in
+        [([f64::NAN, 0.0], [1.0, 1.0]), ([0.1, 0.1], [f64::INFINITY, 0.0])].into_iter().enumerate()
+    {
         dirty.points.insert(10 * k, point);
         dirty.flow.insert(10 * k, flow);
     }

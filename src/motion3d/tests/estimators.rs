@@ -48,8 +48,11 @@ fn the_sphere_gives_the_motion_all_around() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
     let bearing = |k: u64| Vector3::new(rng.normal(3 * k), rng.normal(3 * k + 1), rng.normal(3 * k + 2)).normalize();
     let bearings: Vec<[f64; 3]> = (0..300).map(|k| bearing(k).into()).collect();
-    let flow: Vec<[f64; 3]> =
-        bearings.iter().enumerate().map(|(k, &b)| motion.sphere_flow(b, 0.5 + rng.stream(1).uniform(k as u64))).collect();
+    let flow: Vec<[f64; 3]> = bearings
+        .iter()
+        .enumerate()
+        .map(|(k, &b)| motion.sphere_flow(b, 0.5 + rng.stream(1).uniform(k as u64)))
+        .collect();
     let flow = Flow::Sphere { bearings: &bearings, flow: &flow };
     for method in [Method::MaximumLikelihood, Method::Efficient] {
         let found = estimate_motion(&flow, &Noise::Sigma(1e-6), &options(method)).unwrap();
@@ -101,14 +104,8 @@ fn covariances_cover_where_depths_are_random() {
 #[test]
 fn outliers_do_not_move_the_motion() {
     let rng = CounterRng::new(77);
-    let mut scene = Scene::new(
-        Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]),
-        800,
-        0.6,
-        0.02,
-        4,
-        |x, y, _| smooth(x, y),
-    );
+    let mut scene =
+        Scene::new(Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), 800, 0.6, 0.02, 4, |x, y, _| smooth(x, y));
     for (k, flow) in scene.flow.iter_mut().enumerate().filter(|(k, _)| k % 5 < 2) {
         *flow = [0, 1].map(|j| 4.0 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
     }
@@ -160,6 +157,32 @@ fn midpoints_make_displacements_exact_to_second_order() {
     };
     let (start, middle) = (error(Placement::Start), error(Placement::Midpoint));
     assert!(middle < 0.05 * start && middle.to_degrees() < 0.02, "{start} {middle}");
+}
+
+/// In a narrow field only what is known of the rotation tells it from a sideways translation.
+#[test]
+fn a_known_rotation_is_heeded() {
+    let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+    let scene = Scene::new(motion, 200, 0.1, 0.01, 5, |_, _, r| 0.5 + r);
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-8 } else { 0.0 }));
+    let prior = Some(RotationPrior { rotation: motion.rotation, covariance });
+    for robust in [false, true] {
+        for method in [Method::MaximumLikelihood, Method::Efficient] {
+            let run = |rotation_prior| {
+                let options = MotionOptions { rotation_prior, robust, ..options(method) };
+                estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &options).unwrap()
+            };
+            let (without, with) = (run(None), run(prior));
+            assert!(
+                with.direction_std < 0.3 * without.direction_std,
+                "{} {}",
+                with.direction_std,
+                without.direction_std
+            );
+            assert!(angle(&with, &scene) < 4.0 * with.direction_std, "{}", angle(&with, &scene));
+            assert!(with.rotation_std.iter().all(|deviation| *deviation < 1.01e-4));
+        }
+    }
 }
 
 #[test]

@@ -101,5 +101,7 @@ fn points_that_determine_nothing_have_no_bound() {
     let error = motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0; 4]).unwrap_err();
     assert!(matches!(error, crate::Error::NotObservable(_)), "{error}");
     assert!(motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 4]).unwrap_err().to_string().starts_with("sigma: "));
-    assert!(motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: "));
+    assert!(
+        motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: ")
+    );
 }

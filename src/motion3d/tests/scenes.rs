@@ -18,14 +18,7 @@ pub(in super::super) struct Scene {
 
 impl Scene {
     /// `n` points in `[-h, h]^2` whose inverse depth is a function of `(x, y) / h` and a random number.
-    pub fn new(
-        motion: Motion,
-        n: usize,
-        h: f64,
-        sigma: f64,
-        seed: u64,
-        depth: impl Fn(f64, f64, f64) -> f64,
-    ) -> Self {
+    pub fn new(motion: Motion, n: usize, h: f64, sigma: f64, seed: u64, depth: impl Fn(f64, f64, f64) -> f64) -> Self {
         let rng = CounterRng::new(seed);
         let at = |k: usize, j: u64| 2.0 * rng.uniform(3 * k as u64 + j) - 1.0;
         let points: Vec<[f64; 2]> = (0..n).map(|k| [h * at(k, 0), h * at(k, 1)]).collect();

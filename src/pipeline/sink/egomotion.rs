@@ -15,9 +15,30 @@ use std::path::PathBuf;
 
 /// Columns of the table.
 const HEADER: [&str; 24] = [
-    "frame", "time_s", "status", "method", "points", "inliers", "u_x", "u_y", "u_z", "direction_std_deg", "w_x", "w_y",
-    "w_z", "w_x_std", "w_y_std", "w_z_std", "foe_x", "foe_y", "foe_x_std", "foe_y_std", "approach_rate",
-    "approach_rate_std", "time_to_contact", "time_to_contact_std",
+    "frame",
+    "time_s",
+    "status",
+    "method",
+    "points",
+    "inliers",
+    "u_x",
+    "u_y",
+    "u_z",
+    "direction_std_deg",
+    "w_x",
+    "w_y",
+    "w_z",
+    "w_x_std",
+    "w_y_std",
+    "w_z_std",
+    "foe_x",
+    "foe_y",
+    "foe_x_std",
+    "foe_y_std",
+    "approach_rate",
+    "approach_rate_std",
+    "time_to_contact",
+    "time_to_contact_std",
 ];
 
 /// What is estimated from fields and where it goes.
