@@ -304,6 +304,8 @@ def test_a_field_gives_the_motion_and_the_points():
     assert found.approach_rate == pytest.approx(-0.02, rel=0.15)
     coarse, fewer = motion3d.estimate_field_motion(field, camera, max_points=9)
     assert len(fewer) <= 9 and coarse.inv_depth.shape == (len(fewer),)
+    _, inside = motion3d.estimate_field_motion(field, camera, region=(20, 10, 60, 50), spacing=8, robust=False)
+    assert (inside >= [20, 10]).all() and (inside < [80, 60]).all() and len(inside) > 20
     with pytest.raises(ValueError, match="^field"):
         motion3d.estimate_field_motion(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), camera)
     with pytest.raises(ValueError, match="^spacing"):

@@ -26,5 +26,9 @@ def test_a_drive_is_better_than_five_points_on_tracks():
 @pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
 def test_time_to_contact_agrees_with_the_laser():
     rows = recordings.car(DATA)
-    off = [abs(float(str(row["off, deviations"]))) for row in rows]
-    assert np.median(off) < 2 and max(off) < 4, rows
+    facing = np.abs([float(str(row["it is off"])) for row in rows])
+    assert facing.max() < 3, rows
+    off = np.array([float(str(row["off, deviations"])) for row in rows])
+    assert np.nanmedian(np.abs(off)) < 3
+    # Where the approach trades against a sideways motion that is told.
+    assert all(row["status"] != "ok" for row, value in zip(rows, off, strict=True) if not abs(value) < 4), rows
