@@ -44,7 +44,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Status = Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
 
 @dataclass(frozen=True, eq=False)
 class MotionSolution:
@@ -70,7 +69,7 @@ class MotionEstimate:
     """Unit direction `u` (3,) of the scene relative to the camera, no unit; NaN where there is none."""
     rotation: Array
     """Rotation rate `w` (3,) of the scene relative to the camera, rad/frame."""
-    status: Status
+    status: Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
     """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (a plane: see
     `alternatives`); "ill_conditioned" (`direction_std` above 20 degrees); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
     method_used: Literal["ml", "efficient"]
