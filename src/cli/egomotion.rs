@@ -175,8 +175,9 @@ fn intrinsics(text: &str) -> Result<Intrinsics> {
     let first = read(content.lines().next().unwrap_or_default());
     let all = if first.len() >= 9 { first } else { read(&content) };
     match all[..] {
-        [a, b, c, d, e, f, g, h, i] => Intrinsics::new([[a, b, c], [d, e, f], [g, h, i]]),
-        [a, b, c, _, d, e, f, _, g, h, i, _] => Intrinsics::new([[a, b, c], [d, e, f], [g, h, i]]),
+        [a, b, c, d, e, f, g, h, i] | [a, b, c, _, d, e, f, _, g, h, i, _] => {
+            Intrinsics::new([[a, b, c], [d, e, f], [g, h, i]])
+        }
         _ => Err(Error::format(path, format!("expected 9 numbers (K) or 12 (a projection matrix), got {}", all.len()))),
     }
 }

@@ -169,7 +169,7 @@ fn a_known_rotation_is_heeded() {
     for robust in [false, true] {
         for method in [Method::MaximumLikelihood, Method::Efficient] {
             let run = |rotation_prior| {
-                let options = MotionOptions { rotation_prior, robust, ..options(method) };
+                let options = MotionOptions { robust, rotation_prior, ..options(method) };
                 estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &options).unwrap()
             };
             let (without, with) = (run(None), run(prior));
