@@ -65,8 +65,7 @@ def test_theory_is_met():
     for row in scores.one_unknown(1000):
         for name in ("ML / (29)", "ones / (31)", "shrunk / its formula"):
             if row["n"] == 1000:
-                # Shrunk weights know of the noise that they share with the flow a little less than their formula.
-                assert row[name] == pytest.approx(1, abs=0.25 if name.startswith("shrunk") else 0.15), row
+                assert row[name] == pytest.approx(1, abs=0.15), row
 
 
 @pytest.mark.parametrize("case", [4, 7, 8])
