@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking motion3d` chooses among the sections; its table is then printed and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import platform
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo", "stereo_tracking")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo", "stereo_tracking", "motion3d")
 
 
 def main() -> None:
@@ -96,6 +96,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import stereo_tracking
 
         return stereo_tracking.sections(quick)
+    if name == "motion3d":
+        import motion3d
+
+        return motion3d.sections(factor=0.1 if quick else 1.0, data=data, rounds=rounds)
     if data is None:
         return {}
     import accuracy

@@ -8,6 +8,8 @@ mod support;
 
 #[path = "cli/commands.rs"]
 mod commands;
+#[path = "cli/egomotion.rs"]
+mod egomotion;
 #[path = "cli/mistakes.rs"]
 mod mistakes;
 #[path = "cli/recordings.rs"]

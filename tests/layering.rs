@@ -19,6 +19,7 @@ const LEVELS: &[(&str, u8)] = &[
     ("flow", 3),
     ("filter", 3),
     ("mixture", 3),
+    ("motion3d", 3),
     ("stereo", 3),
     ("temporal", 4),
     ("track", 4),

@@ -14,7 +14,7 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
-from . import filters, io, plot, scenes, stereo, track, video
+from . import filters, io, motion3d, plot, scenes, stereo, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -54,6 +54,7 @@ __all__ = [
     "io",
     "luminance",
     "mixture",
+    "motion3d",
     "observability",
     "plot",
     "quantise",

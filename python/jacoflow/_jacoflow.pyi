@@ -55,6 +55,12 @@ __all__ = [
     "_mixture_densities",
     "_mixture_fit",
     "_mixture_partial_fit",
+    "_motion3d_bound",
+    "_motion3d_estimate",
+    "_motion3d_field_points",
+    "_motion3d_focus",
+    "_motion3d_predict",
+    "_motion3d_two_views",
     "_observability",
     "_edge_disparity",
     "_edge_pixels",
@@ -966,6 +972,22 @@ def _mixture_partial_fit(
 def _mixture_densities(
     points: NDArray[np.float64], components: dict[str, Any], threads: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def _motion3d_bound(
+    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, parameters: dict[str, Any]
+) -> dict[str, NDArray[np.float64]]: ...
+def _motion3d_estimate(points: ArrayLike, flow: ArrayLike, parameters: dict[str, Any]) -> dict[str, Any]: ...
+def _motion3d_field_points(
+    field: FlowField, spacing: float | None, most: int | None, region: Sequence[int] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
+def _motion3d_focus(
+    translation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, intrinsics: ArrayLike | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
+def _motion3d_predict(
+    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool
+) -> NDArray[np.float64]: ...
+def _motion3d_two_views(
+    translation: ArrayLike, rotation: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

@@ -1,6 +1,7 @@
 //! The subcommands.
 
 use super::demo::DemoCommand;
+use super::egomotion::EgomotionCommand;
 use super::filter::FilterCommand;
 use super::flow::FlowCommand;
 use super::info::InfoCommand;
@@ -26,6 +27,8 @@ pub enum Command {
     Track(Box<TrackCommand>),
     /// Disparity of the edge pixels of two views
     Stereo(Box<StereoCommand>),
+    /// The camera's rigid motion from frame to frame, focus of expansion and time to contact
+    Egomotion(Box<EgomotionCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
     Synth(Box<SynthCommand>),
     /// Tell what a recording or a result file holds
@@ -43,6 +46,7 @@ impl Command {
             Self::Measure(command) => command.tell.json,
             Self::Track(command) => command.tell.json,
             Self::Stereo(command) => command.tell.json,
+            Self::Egomotion(command) => command.tell.json,
             Self::Synth(command) => command.tell.json,
             Self::Info(command) => command.tell.json,
             Self::Demo(command) => command.tell.json,
@@ -57,6 +61,7 @@ impl Command {
             Self::Measure(command) => command.execute(watch),
             Self::Track(command) => command.execute(watch),
             Self::Stereo(command) => command.execute(watch),
+            Self::Egomotion(command) => command.execute(watch),
             Self::Synth(command) => command.execute(watch),
             Self::Info(command) => command.execute(watch),
             Self::Demo(command) => command.execute(watch),

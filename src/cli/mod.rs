@@ -9,6 +9,7 @@
 mod arguments;
 mod command;
 mod demo;
+mod egomotion;
 mod filter;
 mod flow;
 mod info;
@@ -38,7 +39,8 @@ use std::ffi::OsString;
     jacoflow flow frames/ -o out/ --picture colour,divergence\n  \
     jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100\n  \
     jacoflow track film.y4m --box 120,80,24,30 -o track.csv\n  \
-    jacoflow stereo left/ right/ -o out/ --picture pictures/"
+    jacoflow stereo left/ right/ -o out/ --picture pictures/\n  \
+    jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv"
 )]
 struct Cli {
     #[command(subcommand)]

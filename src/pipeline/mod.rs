@@ -18,7 +18,10 @@ mod track;
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_device, is_folder};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
-pub use sink::{Collect, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table, TableTarget};
+pub use sink::{
+    Collect, Egomotion, EgomotionPlan, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table,
+    TableTarget,
+};
 pub use stage::{EstimatorStage, FilterStage, Output, Stage};
 pub use stereo::{
     BeginSinks, ClusterRows, GraphChart, GraphFile, GreyPair, GreyPairs, StereoFormat, StereoOverlays, StereoPicture,

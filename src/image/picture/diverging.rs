@@ -42,6 +42,12 @@ impl SignedMap {
         self.range.filter(|r| *r > 0.0 && r.is_finite()).unwrap_or_else(|| symmetric_range(plane, self.percentile))
     }
 
+    /// The colour of one value by the fixed range (1 without one); none of what is unknown.
+    pub fn colour_of(&self, value: f64) -> Option<Rgb> {
+        let range = self.range.filter(|r| *r > 0.0 && r.is_finite()).unwrap_or(1.0);
+        value.is_finite().then(|| colour(value / range))
+    }
+
     /// A picture of `plane` (row-major, `width x height`).
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 
 mod chart;
 mod clusters;
+mod contact;
 mod digits;
 mod disparity;
 mod diverging;
@@ -15,6 +16,7 @@ mod wheel;
 
 pub use chart::{ChartArc, ChartNode, chart_picture};
 pub use clusters::{ClusterMark, cluster_picture, identity_colour};
+pub use contact::{ContactMark, draw_contacts};
 pub use disparity::draw_disparity;
 pub use diverging::{SignedMap, symmetric_range};
 pub use grey::{GreyRange, grey_picture};

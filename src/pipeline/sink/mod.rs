@@ -1,11 +1,13 @@
 //! Where fields go.
 
+mod egomotion;
 mod fields;
 mod measurements;
 mod memory;
 mod pictures;
 mod table;
 
+pub use egomotion::{Egomotion, EgomotionPlan};
 pub use fields::Fields;
 pub use measurements::Measurements;
 pub use memory::Collect;

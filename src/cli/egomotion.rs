@@ -1,0 +1,206 @@
+//! `jacoflow egomotion`: the camera's rigid motion from frame to frame.
+
+use super::arguments::{
+    ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments, parse_positive,
+};
+use super::flow::prepare;
+use super::interrupt::Watch;
+use super::open::{Opened, compute, in_double, open_input, preprocess_for};
+use super::report::Report;
+use super::run::{Telling, input_details, report, run_pipeline};
+use crate::error::{Error, Result};
+use crate::flow::{Estimator, Method};
+use crate::motion3d::{self, FieldOptions, Intrinsics, MotionOptions};
+use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline, TableTarget, check_target};
+use crate::simd::SimdReal;
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Options of `egomotion`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+#[command(
+    after_help = "Rows: frame, time_s, status, method, points, inliers, direction u (the scene's relative to the camera; the camera moves by -u) with its deviation in\n\
+    degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
+    contact (frames) with their deviations. Points are taken as far apart as the errors of the flow go together.\n\
+    status: ok, few_points, too_few_points, rotation_only, ambiguous (a plane), ill_conditioned, low_snr.\n\
+    With --region on an object that moves by itself the motion is that object's, and the time to contact its own.\n\n\
+    Examples:\n  \
+    jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/\n  \
+    jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust > motion.csv\n  \
+    jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 -o car.csv"
+)]
+pub struct EgomotionCommand {
+    #[command(flatten)]
+    pub input: InputArguments,
+    /// The camera: focal lengths and principal point FX,FY,CX,CY, and skew if there is any, in px; or a text file with the 9 numbers of K or the 12 of a projection matrix
+    #[arg(long, value_name = "FX,FY,CX,CY[,SKEW]|FILE", required = true, help_heading = "Camera")]
+    pub intrinsics: String,
+    #[command(flatten)]
+    pub method: MethodArguments,
+    #[command(flatten)]
+    pub sites: SiteArguments,
+    /// Estimator of the motion: auto, ml (maximum likelihood) or efficient (weights from smoothed depths)
+    #[arg(long, value_name = "NAME", default_value = "auto", help_heading = "Motion")]
+    pub estimator: String,
+    /// Take all points for parts of one rigid scene, instead of looking for those that are
+    #[arg(long, help_heading = "Motion")]
+    pub no_robust: bool,
+    /// Distance of the points, px [default: 4 times the length over which errors of the flow go together, at least 8]
+    #[arg(long, value_name = "PX", value_parser = parse_positive, help_heading = "Motion")]
+    pub spacing: Option<f64>,
+    /// Most points of a field
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(5..), help_heading = "Motion")]
+    pub max_points: Option<usize>,
+    /// Seed of the random choices
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Motion")]
+    pub seed: u64,
+    /// A .csv file [default: standard output]
+    #[arg(long, short, value_name = "FILE", help_heading = "Output")]
+    pub output: Option<PathBuf>,
+    /// Draw what comes near in red, and the focus of expansion, over every frame: a folder for egomotion_000000.png, ...
+    #[arg(long, value_name = "FOLDER", help_heading = "Output")]
+    pub picture: Option<PathBuf>,
+    /// Replace files that exist
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    #[command(flatten)]
+    pub compute: ComputeArguments,
+    #[command(flatten)]
+    pub tell: TellArguments,
+}
+
+impl EgomotionCommand {
+    /// Runs the command.
+    pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        let plan = self.plan()?;
+        let opened = open_input(&self.input)?;
+        if self.method.no_covariance {
+            return Err(Error::argument("no_covariance", "a covariance, which weighs the points", "none"));
+        }
+        let prepared = prepare(&opened, &self.input, &self.method, &self.sites, &self.compute)?;
+        let method = prepared.estimator.method();
+        if matches!(method, Method::HornSchunck(_)) {
+            return Err(Error::argument("method", "one with a covariance", method.name()));
+        }
+        let sink = Egomotion::open(plan)?;
+        if in_double(self.compute.precision, &opened.first, false) {
+            self.run::<f64>(opened, prepared.estimator, sink, watch)
+        } else {
+            self.run::<f32>(opened, prepared.estimator, sink, watch)
+        }
+    }
+
+    /// What is estimated and where it goes, checked before any work.
+    fn plan(&self) -> Result<EgomotionPlan> {
+        let method = match self.estimator.as_str() {
+            "auto" => motion3d::Method::Auto,
+            "ml" => motion3d::Method::MaximumLikelihood,
+            "efficient" => motion3d::Method::Efficient,
+            other => return Err(Error::argument("estimator", "auto, ml or efficient", other)),
+        };
+        if let Some(folder) = &self.picture {
+            let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+            if occupied && !self.force {
+                let wanted = "an empty or new folder (--force writes into it)";
+                return Err(Error::argument("picture", wanted, folder.display()));
+            }
+        }
+        let threads = compute(&self.compute)?.0;
+        Ok(EgomotionPlan {
+            camera: intrinsics(&self.intrinsics)?,
+            field: FieldOptions { spacing: self.spacing, most: self.max_points, region: None },
+            motion: MotionOptions {
+                method,
+                robust: !self.no_robust,
+                seed: self.seed,
+                threads,
+                ..MotionOptions::default()
+            },
+            target: self.target()?,
+            pictures: self.picture.clone(),
+        })
+    }
+
+    fn target(&self) -> Result<TableTarget> {
+        match &self.output {
+            Some(path) if path != Path::new("-") => {
+                if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("csv")) {
+                    return Err(Error::argument("output", "a .csv file, or - for standard output", path.display()));
+                }
+                check_target(path, self.force)?;
+                Ok(TableTarget::File(path.clone()))
+            }
+            _ if self.tell.json => {
+                Err(Error::argument("output", "a .csv file, as --json needs standard output", "standard output"))
+            }
+            _ => Ok(TableTarget::StandardOutput),
+        }
+    }
+
+    fn run<T: SimdReal>(&self, opened: Opened, estimator: Estimator, sink: Egomotion, watch: &Watch) -> Result<Report> {
+        let mut details = input_details(&opened, &self.sites);
+        if let Value::Object(details) = &mut details {
+            details.insert("method".into(), estimator.method().name().into());
+            details.insert("estimator".into(), json!(self.estimator));
+        }
+        let steps = preprocess_for(&estimator, &self.input)?;
+        let stage = EstimatorStage::recursive(estimator, self.method.recursive()?)?;
+        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
+            .with_preprocess(steps)
+            .with_threads(compute(&self.compute)?.0)
+            .with_numbering(opened.numbering)
+            .with_sink(Box::new(sink));
+        let telling = Telling { command: "egomotion", tell: &self.tell, output: self.output.as_deref(), details };
+        let (summary, failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
+        Ok(report(&summary, failure, telling))
+    }
+}
+
+/// `FX,FY,CX,CY[,SKEW]`, or a file with the 9 numbers of K or the 12 of a projection matrix; words in it (as `P0:`) are skipped, and only its first line counts where that has enough numbers.
+fn intrinsics(text: &str) -> Result<Intrinsics> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[fx, fy, cx, cy]) => return Intrinsics::new([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+        Some(&[fx, fy, cx, cy, skew]) => return Intrinsics::new([[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+        Some(_) => return Err(Error::argument("intrinsics", "FX,FY,CX,CY[,SKEW] or a file", text)),
+        None => {}
+    }
+    let path = Path::new(text);
+    let content = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    let read = |text: &str| -> Vec<f64> {
+        text.split(|c: char| c.is_whitespace() || c == ',').filter_map(|word| word.parse().ok()).collect()
+    };
+    let first = read(content.lines().next().unwrap_or_default());
+    let all = if first.len() >= 9 { first } else { read(&content) };
+    match all[..] {
+        [a, b, c, d, e, f, g, h, i] | [a, b, c, _, d, e, f, _, g, h, i, _] => {
+            Intrinsics::new([[a, b, c], [d, e, f], [g, h, i]])
+        }
+        _ => Err(Error::format(path, format!("expected 9 numbers (K) or 12 (a projection matrix), got {}", all.len()))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_come_as_words_and_as_files() {
+        let want = [[500.0, 0.0, 320.0], [0.0, 490.0, 240.0], [0.0, 0.0, 1.0]];
+        assert_eq!(intrinsics("500,490,320,240").unwrap().matrix(), want);
+        assert_eq!(intrinsics("500,490,320,240,2").unwrap().matrix()[0][1], 2.0);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("calib.txt");
+        for content in ["500 0 320\n0 490 240\n0 0 1\n", "P0: 500 0 320 0 0 490 240 0 0 0 1 0\nP1: 1 2 3\n"] {
+            std::fs::write(&file, content).unwrap();
+            assert_eq!(intrinsics(file.to_str().unwrap()).unwrap().matrix(), want);
+        }
+        std::fs::write(&file, "1 2 3").unwrap();
+        assert!(intrinsics(file.to_str().unwrap()).unwrap_err().to_string().contains("got 3"));
+        assert!(intrinsics("1,2,3").unwrap_err().to_string().starts_with("intrinsics: "));
+        assert!(intrinsics("0,500,3,4").unwrap_err().to_string().starts_with("K: "));
+        assert!(intrinsics("no/such/file").is_err());
+    }
+}

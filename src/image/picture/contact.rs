@@ -1,0 +1,89 @@
+//! What comes near, over a frame: points in the colours of their rates of approach, and the focus of expansion.
+
+use super::diverging::{SignedMap, symmetric_range};
+use super::{Picture, Rgb};
+
+/// A point and how fast it comes nearer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactMark {
+    /// Where, px.
+    pub at: [f64; 2],
+    /// `nu u_z`, 1/frame: negative where it comes nearer.
+    pub rate: f64,
+}
+
+/// How much of the frame the colours hide.
+const COVERAGE: f64 = 0.55;
+
+/// Percentile of the rates that has the strongest colour.
+const STRONGEST: f64 = 95.0;
+
+/// The focus of expansion's colour, half of its cross, px, and the strokes of its ellipse.
+const FOCUS: Rgb = [255, 220, 0];
+const CROSS: isize = 9;
+const STROKES: usize = 720;
+
+/// Largest half axis of an ellipse that is drawn, px.
+const LARGEST: f64 = 4000.0;
+
+/// Draws squares of half size `half` px, red where a point comes nearer and blue where it recedes, and the focus of expansion as a cross with its 95 % ellipse from `(place, covariance)`.
+pub fn draw_contacts(
+    picture: &mut Picture,
+    marks: &[ContactMark],
+    half: f64,
+    focus: Option<([f64; 2], [[f64; 2]; 2])>,
+) {
+    let rates: Vec<f64> = marks.iter().map(|mark| -mark.rate).collect();
+    let map = SignedMap::new(Some(symmetric_range(&rates, STRONGEST)));
+    let half = half.max(1.0);
+    for (mark, &rate) in marks.iter().zip(&rates) {
+        let Some(colour) = map.colour_of(rate) else { continue };
+        let range = |c: f64| (c - half).ceil() as isize..(c + half).ceil() as isize;
+        for y in range(mark.at[1]) {
+            for x in range(mark.at[0]) {
+                picture.blend(x, y, colour, COVERAGE);
+            }
+        }
+    }
+    if let Some((at, covariance)) = focus.filter(|(at, _)| at.iter().all(|c| c.is_finite() && c.abs() < 1e6)) {
+        draw_focus(picture, at, &covariance);
+    }
+}
+
+fn draw_focus(picture: &mut Picture, at: [f64; 2], covariance: &[[f64; 2]; 2]) {
+    let (cx, cy) = (at[0].round() as isize, at[1].round() as isize);
+    for d in -CROSS..=CROSS {
+        picture.blend(cx + d, cy, FOCUS, 1.0);
+        picture.blend(cx, cy + d, FOCUS, 1.0);
+    }
+    // The lower factor of the covariance turns a circle into the ellipse; 5.99 is chi-squared's 95 % for two numbers.
+    let first = covariance[0][0].sqrt();
+    let second = covariance[0][1] / first;
+    let third = (covariance[1][1] - second * second).max(0.0).sqrt();
+    let scale = 5.991_464_547_107_979f64.sqrt();
+    if !(first > 0.0 && first.is_finite() && scale * first.max(third) < LARGEST) {
+        return;
+    }
+    for k in 0..STROKES {
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / STROKES as f64).sin_cos();
+        let x = at[0] + scale * first * cos;
+        let y = at[1] + scale * (second * cos + third * sin);
+        picture.blend(x.round() as isize, y.round() as isize, FOCUS, 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_points_are_red_far_ones_blue_and_the_focus_is_a_cross() {
+        let mut picture = Picture::filled(60, 40, [100; 3]);
+        let marks = [ContactMark { at: [10.0, 10.0], rate: -0.1 }, ContactMark { at: [40.0, 10.0], rate: 0.1 }];
+        draw_contacts(&mut picture, &marks, 3.0, Some(([30.0, 25.0], [[4.0, 0.0], [0.0, 1.0]])));
+        let (near, far) = (picture.pixel(10, 10), picture.pixel(40, 10));
+        assert!(near[0] > near[2] && far[2] > far[0], "{near:?} {far:?}");
+        assert_eq!((picture.pixel(30, 20), picture.pixel(35, 25), picture.pixel(1, 1)), (FOCUS, FOCUS, [100; 3]));
+        draw_contacts(&mut picture, &[], 3.0, Some(([f64::NAN, 0.0], [[1.0, 0.0], [0.0, 1.0]])));
+    }
+}

@@ -1,0 +1,62 @@
+//! Covariances of a motion: maximum likelihood's and the bound.
+
+use super::kernels::Equations;
+use nalgebra::{Matrix2, SMatrix, SymmetricEigen};
+
+/// Covariance of `(psi, w)`.
+pub(super) type Matrix5 = SMatrix<f64, 5, 5>;
+
+/// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still known to be positive.
+const LEAST_INFORMATION: f64 = 1e-3;
+
+/// What the data say about the covariance of maximum likelihood and the bound.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plugged {
+    /// (17): `M^-1 H M^-1` with `M = H - P`.
+    pub likelihood: Matrix5,
+    /// `M^-1`.
+    pub bound: Matrix5,
+}
+
+/// A symmetric positive definite matrix's inverse.
+pub(super) fn inverse(matrix: &Matrix5) -> Option<Matrix5> {
+    let inverse = matrix.cholesky()?.inverse();
+    inverse.iter().all(|value| value.is_finite()).then_some(inverse)
+}
+
+/// The covariances that the equations at a minimum give; `None` where noise makes up nearly all of the information.
+///
+/// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1` lies below the bound.
+pub(super) fn plugged(equations: &Equations) -> Option<Plugged> {
+    plugged_in(&equations.h, &equations.p)
+}
+
+pub(super) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<Plugged> {
+    let factor = h.cholesky()?.l();
+    let whiten = factor.try_inverse()?;
+    let noise = whiten * p * whiten.transpose();
+    let most = SymmetricEigen::new(noise).eigenvalues.max();
+    // Not a number is not enough either.
+    let enough = 1.0 - most >= LEAST_INFORMATION;
+    if !enough {
+        return None;
+    }
+    let bound = inverse(&(h - p))?;
+    let likelihood = bound * h * bound;
+    Some(Plugged { likelihood: 0.5 * (likelihood + likelihood.transpose()), bound })
+}
+
+/// The 2 x 2 block of the direction.
+pub(super) fn direction_block(covariance: &Matrix5) -> Matrix2<f64> {
+    covariance.fixed_view::<2, 2>(0, 0).into_owned()
+}
+
+/// Standard deviation of the direction, `sqrt(tr psi)`, degrees.
+pub(super) fn direction_deviation(covariance: &Matrix5) -> f64 {
+    direction_block(covariance).trace().max(0.0).sqrt().to_degrees()
+}
+
+/// The larger variance of the direction, rad^2.
+pub(super) fn direction_spread(covariance: &Matrix5) -> f64 {
+    SymmetricEigen::new(direction_block(covariance)).eigenvalues.max()
+}

@@ -1,0 +1,131 @@
+//! The estimating equation with smoothed depths in its weights.
+
+use super::covariance::{Matrix5, direction_spread, inverse};
+use super::kernels::{Bilinear, depths, information};
+use super::motion::{Motion, tangents};
+use super::observations::Observations;
+use super::smoothing::DepthSmoother;
+use nalgebra::Matrix2x3;
+
+/// Times that depths are smoothed and the equation is solved.
+const ROUNDS: usize = 3;
+
+/// A change of the direction, degrees, that is not worth another round.
+const SETTLED: f64 = 0.001;
+
+/// The farthest that the direction may come from where it began, degrees.
+const FARTHEST: f64 = 30.0;
+
+/// Most Newton steps, and the length of one that is the last.
+const STEPS: usize = 30;
+const STEP: f64 = 1e-11;
+
+/// The solution of the estimating equation.
+#[derive(Debug, Clone)]
+pub(super) struct Efficient {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    /// `(sum W^t W)^-1`.
+    pub covariance: Matrix5,
+    /// The depths in the weights, `nu~`; as long as the planes.
+    pub smooth: Vec<f64>,
+}
+
+/// Where weights have their depths from.
+#[derive(Debug)]
+pub(super) enum WeightDepths<'a> {
+    /// Smoothed anew at each motion.
+    Smoothed(&'a mut DepthSmoother),
+    /// Known from elsewhere, as long as the planes.
+    Known(Vec<f64>),
+}
+
+/// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.
+///
+/// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes no bias.
+pub(super) fn efficient(
+    observations: &Observations,
+    start: &Motion,
+    mut weights: WeightDepths<'_>,
+) -> Option<Efficient> {
+    let mut motion = *start;
+    let mut smooth = Vec::new();
+    for _ in 0..ROUNDS {
+        smooth = match &mut weights {
+            WeightDepths::Smoothed(smoother) => smoother.smooth(&depths(observations, &motion)),
+            WeightDepths::Known(nu) => nu.clone(),
+        };
+        let before = motion;
+        motion = solve(observations, &before, &smooth)?;
+        if motion.angle_to(start).to_degrees() > FARTHEST {
+            return None;
+        }
+        if motion.angle_to(&before).to_degrees() < SETTLED {
+            break;
+        }
+    }
+    let tangent = tangents(&motion.u());
+    let covariance = inverse(&information(observations, &motion, &tangent, &smooth))?;
+    Some(Efficient { motion, tangent, covariance, smooth })
+}
+
+/// The root of the equation whose weights are frozen at `start`.
+fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
+    let tangent = tangents(&start.u());
+    let covariance = inverse(&information(observations, start, &tangent, nu))?;
+    let equation = Bilinear::new(observations, start, &tangent, nu, direction_spread(&covariance));
+    let mut motion = *start;
+    for _ in 0..STEPS {
+        let tangent = tangents(&motion.u());
+        let (value, slope) = equation.at(&motion, &tangent);
+        let step = slope.lu().solve(&-value)?;
+        if !step.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        motion = motion.stepped(&tangent, &step);
+        if step.norm() < STEP {
+            return Some(motion);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::scenes::Scene;
+    use super::*;
+    use nalgebra::SMatrix;
+
+    #[test]
+    fn the_slope_of_the_equation_is_its_own() {
+        let scene = Scene::oblique(40, 0.1, 5);
+        let observations = scene.observations();
+        let tangent = tangents(&scene.motion.u());
+        let mut nu = scene.inverse_depth.clone();
+        nu.resize(observations.stride, 0.0);
+        let equation = Bilinear::new(&observations, &scene.motion, &tangent, &nu, 0.01);
+        let at = Motion::new([0.5, 0.1, 0.8], [0.01, -0.02, 0.03]);
+        let axes = tangents(&at.u());
+        let (_, slope) = equation.at(&at, &axes);
+        for axis in 0..5 {
+            let value = |by: f64| {
+                let mut step = SMatrix::<f64, 5, 1>::zeros();
+                step[axis] = by;
+                equation.at(&at.stepped(&axes, &step), &axes).0
+            };
+            let numeric = (value(1e-6) - value(-1e-6)) / 2e-6;
+            let error = (numeric - slope.column(axis)).norm();
+            assert!(error < 1e-6 * slope.column(axis).norm(), "{axis}: {error}");
+        }
+    }
+
+    #[test]
+    fn true_depths_with_exact_flow_leave_the_truth_alone() {
+        let scene = Scene::oblique(40, 0.0, 5);
+        let observations = scene.observations();
+        let mut nu = scene.inverse_depth.clone();
+        nu.resize(observations.stride, 0.0);
+        let found = efficient(&observations, &scene.motion, WeightDepths::Known(nu)).unwrap();
+        assert!(found.motion.angle_to(&scene.motion) < 1e-10);
+    }
+}

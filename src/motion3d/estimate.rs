@@ -1,0 +1,282 @@
+//! The whole way from flow to motion.
+
+use super::covariance::{direction_deviation, plugged};
+use super::efficient::{Efficient, WeightDepths, efficient};
+use super::grid::reach_of_plausible;
+use super::intake::whiten;
+use super::kernels::{depths, equations};
+use super::likelihood::{Candidate, choose, minima};
+use super::motion::{Motion, tangents};
+use super::observations::{Known, Observations};
+use super::options::{Flow, Method, MotionOptions, Noise};
+use super::refine::{Effort, refine};
+use super::report::{Solution, report, rotation_report};
+use super::result::{Alternative, MotionEstimate, Status};
+use super::robust;
+use super::smoothing::DepthSmoother;
+use super::special::{RotationOnly, by_chance, rotation_only, twin};
+use crate::error::{Error, Result};
+use crate::math::random::CounterRng;
+
+/// Least number of points for a motion, and for one that is nearly unique.
+const LEAST: usize = 5;
+const FEW: usize = 12;
+
+/// Number of points from which on [`Method::Auto`] smooths depths.
+const SMOOTHED: usize = 30;
+
+/// Standard deviation of the direction, degrees, beyond which it is not known.
+const WIDE: f64 = 20.0;
+
+/// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
+const EXCLUDED: f64 = 25.0;
+
+/// Residuals below this share of the flow are rounding.
+const ROUNDING: f64 = 1e-11;
+
+/// The rigid motion that explains a flow field, with covariance and depths.
+///
+/// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights (see the module). Units: with a camera flow is in px/frame and `sigma` in px. Rows that are
+/// not finite are left out and come back as NaN. Scenes that do not determine a motion are told by [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
+///
+/// # Errors
+/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`.
+pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
+    flow.check(noise)?;
+    check(flow, options)?;
+    Ok(options.threads.check()?.install(|| estimate(flow, noise, options)))
+}
+
+fn check(flow: &Flow<'_>, options: &MotionOptions) -> Result<()> {
+    if let Some(depths) = options.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
+        let expected = format!("{} values, one for each point", flow.len());
+        return Err(Error::argument("weight_inv_depth", expected, depths.len()));
+    }
+    if let Some(prior) = options.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
+        let expected = "a finite rotation with a positive definite covariance";
+        return Err(Error::argument("rotation_prior", expected, format!("{prior:?}")));
+    }
+    match &options.initial {
+        Some(_) if options.robust => {
+            Err(Error::argument("initial", "none, as a robust search looks everywhere", "a motion"))
+        }
+        Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
+            Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Points in units of their noise, and that in the flow's unit.
+pub(super) struct Scaled {
+    pub observations: Observations,
+    pub sigma: f64,
+    /// Whether `sigma` has to be estimated.
+    pub unknown: bool,
+}
+
+impl Scaled {
+    /// Takes `sigma` in units of the present noise to be the noise.
+    pub fn take(&mut self, sigma: f64) {
+        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(f64::MIN_POSITIVE);
+        if sigma.is_finite() {
+            self.observations.rescale(1.0 / sigma);
+            self.sigma *= sigma;
+        }
+    }
+}
+
+fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
+    let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
+    let mut scaled = Scaled {
+        observations: whiten(flow, noise, options.placement),
+        sigma,
+        unknown: matches!(noise, Noise::Unknown),
+    };
+    if scaled.observations.n < LEAST {
+        let sigma = if scaled.unknown { f64::NAN } else { sigma };
+        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
+    }
+    scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
+    let rng = CounterRng::new(options.seed);
+    if options.robust {
+        let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
+            return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+        };
+        let inliers = scaled.observations.subset(&kept.inliers);
+        on(flow, options, &mut scaled, inliers, Some(kept.motion), rng)
+    } else {
+        if !scaled.unknown
+            && let Some(rotation) = turning(&scaled.observations)
+        {
+            return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma);
+        }
+        let inliers = scaled.observations.clone();
+        on(flow, options, &mut scaled, inliers, None, rng)
+    }
+}
+
+/// The rotation alone, where chance explains what it leaves.
+fn turning(observations: &Observations) -> Option<RotationOnly> {
+    let rotation = rotation_only(observations)?;
+    by_chance(rotation.chi2, (2 * observations.n - 3) as f64).then_some(rotation)
+}
+
+/// The same where the noise is to be estimated: `cost` is what the best motion leaves.
+///
+/// If there were no translation, that would take no more away than the same share of any noise, and what the choice of a direction takes.
+fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
+    let rotation = rotation_only(observations)?;
+    let n = observations.n as f64;
+    let sigma2 = rotation.chi2 / (2.0 * n - 3.0);
+    let left = cost / (n - 5.0).max(1.0);
+    let none = rotation.chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
+    (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
+}
+
+/// Standard deviations by which the best of all directions explains pure noise better than any one would, and a margin.
+const SEARCHED: f64 = 5.5;
+/// What few points add to that.
+const FEW_POINTS: f64 = 12.0;
+
+/// Estimates on the points that obey one motion.
+fn on(
+    flow: &Flow<'_>,
+    options: &MotionOptions,
+    scaled: &mut Scaled,
+    mut inliers: Observations,
+    known: Option<Motion>,
+    rng: CounterRng,
+) -> MotionEstimate {
+    let mut found = match (&options.initial, known) {
+        (Some(initial), _) => {
+            let initial = Motion::new(initial.translation, initial.rotation);
+            vec![refine(&inliers, initial, None, Effort::FULL)]
+        }
+        (None, None) => minima(&inliers, rng.stream(2)),
+        (None, Some(known)) => vec![refine(&inliers, known, None, Effort::FULL)],
+    };
+    let Some(best) = found.first().map(|minimum| minimum.equations.cost) else {
+        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+    };
+    if scaled.unknown {
+        if let Some(rotation) = turning_in_unknown_noise(&inliers, best) {
+            let sigma = (rotation.chi2 / (2 * inliers.n - 3) as f64).sqrt();
+            let factor = rescaled(scaled, &mut inliers, sigma);
+            return rotation_report(flow, &scaled.observations, &inliers, &rotation.in_units(factor), scaled.sigma);
+        }
+        let sigma = (best / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
+        rescaled(scaled, &mut inliers, sigma);
+        found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::FULL)).collect();
+    } else if options.robust
+        && let Some(rotation) = turning(&inliers)
+    {
+        return rotation_report(flow, &scaled.observations, &inliers, &rotation, scaled.sigma);
+    }
+    let smoother = || DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
+    let (candidates, made) = if options.initial.is_some() {
+        (found.into_iter().map(|minimum| Candidate { cost: minimum.equations.cost, minimum }).collect(), None)
+    } else {
+        choose(&inliers, &found, smoother)
+    };
+    let chosen = candidates[0];
+    let wanted = match options.method {
+        Method::Auto => inliers.n >= SMOOTHED,
+        Method::Efficient => true,
+        Method::MaximumLikelihood => false,
+    };
+    let plugged = plugged(&chosen.minimum.equations);
+    let low = plugged.is_none();
+    let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
+    solution.alternatives = close(&candidates, inliers.n)[1..]
+        .iter()
+        .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
+        .collect();
+    let distinct = (3.0 * solution.covariance.map_or(0.0, |c| direction_deviation(&c))).to_radians().max(1e-6);
+    let mut planar = false;
+    if let Some(twin) = twin(&inliers, &solution.motion, distinct) {
+        planar = twin.behind - chosen.minimum.equations.behind < EXCLUDED;
+        if planar {
+            solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
+            let excess = twin.behind - chosen.minimum.equations.behind;
+            solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
+        }
+    }
+    let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
+    solution.status = if inliers.n < FEW {
+        Status::FewPoints
+    } else if planar {
+        Status::Ambiguous
+    } else if deviation.is_nan()
+        || deviation > WIDE
+        || far(&inliers, &[solution.motion, *chosen.motion()], deviation, rng.stream(4))
+    {
+        Status::IllConditioned
+    } else if low {
+        Status::LowSnr
+    } else {
+        Status::Ok
+    };
+    report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
+}
+
+/// Whether directions beyond three deviations and [`WIDE`] degrees explain the flow as well as the estimate.
+fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
+    reach_of_plausible(inliers, motions, rng) > WIDE + 3.0 * deviation
+}
+
+/// Most minima from which smoothed weights are tried.
+const TRIED: usize = 3;
+
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a
+/// motion is easier to judge.
+fn smoothed(
+    inliers: &Observations,
+    options: &MotionOptions,
+    candidates: &[Candidate],
+    made: Option<DepthSmoother>,
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> Option<Efficient> {
+    let starts = close(candidates, inliers.n);
+    if let Some(depths) = &options.weight_depths {
+        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
+        nu.resize(inliers.stride, 0.0);
+        return starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
+    }
+    let mut smoother = made.unwrap_or_else(smoother);
+    let mut found: Vec<Efficient> = starts
+        .iter()
+        .take(TRIED)
+        .filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
+        .collect();
+    if found.len() > 1 {
+        let cost = |found: &Efficient| cost_of(inliers, &smoother, &found.motion);
+        let costs: Vec<f64> = found.iter().map(cost).collect();
+        let best = (1..found.len()).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
+        return Some(found.swap_remove(best));
+    }
+    found.pop()
+}
+
+/// `J`, the depths behind the camera and the depth map's roughness.
+fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
+    let at = equations(observations, motion, &tangents(&motion.u()), None);
+    at.cost + at.behind + smoother.cost(&depths(observations, motion))
+}
+
+/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
+fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
+    let before = scaled.sigma;
+    scaled.take(sigma);
+    let factor = before / scaled.sigma;
+    inliers.rescale(factor);
+    factor
+}
+
+/// The chosen minimum and those that come close to it.
+fn close(candidates: &[Candidate], n: usize) -> &[Candidate] {
+    let limit = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
+    let count = candidates.iter().take_while(|other| other.cost < limit).count();
+    &candidates[..count.max(1)]
+}

@@ -1,0 +1,144 @@
+//! The search over directions: where on the half sphere the residuals are small.
+
+use super::kernels::{best_rotation, equations};
+use super::motion::{Motion, tangents};
+use super::observations::Observations;
+use crate::math::random::CounterRng;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Directions on the half sphere, about 8 degrees apart.
+const DIRECTIONS: usize = 300;
+
+/// Most points that the search looks at.
+const SEARCHED: usize = 1000;
+
+/// Starts that are refined, and the least angle between them, degrees.
+const STARTS: usize = 5;
+const APART: f64 = 12.0;
+
+/// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
+const TOGETHER: usize = 20;
+
+/// Evenly spread directions with `z > 0`: a Fibonacci lattice.
+pub(super) fn half_sphere() -> Vec<Vector3<f64>> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let direction = |i: usize| {
+        let z = (i as f64 + 0.5) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let radius = (1.0 - z * z).sqrt();
+        Vector3::new(radius * cos, radius * sin, z)
+    };
+    (0..DIRECTIONS).map(direction).collect()
+}
+
+/// `count` different indices below `n`, ascending, at random: the same for the same seed.
+pub(super) fn sample(n: usize, count: usize, rng: CounterRng) -> Vec<u32> {
+    if count >= n {
+        return (0..n as u32).collect();
+    }
+    // Those with the smallest random keys.
+    let mut keyed: Vec<(u64, u32)> = (0..n as u32).map(|k| (rng.bits(u64::from(k)), k)).collect();
+    keyed.select_nth_unstable(count - 1);
+    let mut chosen: Vec<u32> = keyed[..count].iter().map(|&(_, k)| k).collect();
+    chosen.sort_unstable();
+    chosen
+}
+
+/// Evaluates every direction, in groups that threads share.
+pub(super) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
+    let directions = half_sphere();
+    let groups: Vec<Vec<R>> =
+        directions.par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
+    groups.into_iter().flatten().collect()
+}
+
+/// The best of the motions, cheapest first, no two within `apart` degrees of each other (or of each other's opposite).
+pub(super) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -> Vec<(Motion, f64)> {
+    motions.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let limit = apart.to_radians().cos();
+    let mut kept: Vec<(Motion, f64)> = Vec::with_capacity(count);
+    for candidate in motions {
+        if kept.iter().all(|(other, _)| other.u().dot(&candidate.0.u()).abs() < limit) {
+            kept.push(candidate);
+            if kept.len() == count {
+                break;
+            }
+        }
+    }
+    kept
+}
+
+/// The most promising motions of the whole half sphere, by `J` on at most 1000 random points.
+pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
+    let fewer;
+    let searched = if observations.n > SEARCHED {
+        fewer = observations.subset(&sample(observations.n, SEARCHED, rng));
+        &fewer
+    } else {
+        observations
+    };
+    let found = evaluate(|u| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost)));
+    apart(found, APART, STARTS).into_iter().map(|(motion, _)| motion).collect()
+}
+
+/// The 0.95 quantile of chi-squared with five degrees of freedom.
+const PLAUSIBLE: f64 = 11.07;
+
+/// The largest angle, degrees, between the direction of one of `motions` (the first: the estimate) and any direction of the half sphere that explains the flow as well as the best of them, depth signs included.
+///
+/// A covariance is that of one minimum; a valley of minima shows here.
+pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion], rng: CounterRng) -> f64 {
+    let fewer;
+    let searched = if observations.n > SEARCHED {
+        fewer = observations.subset(&sample(observations.n, SEARCHED, rng));
+        &fewer
+    } else {
+        observations
+    };
+    let cost = |u: &Vector3<f64>| {
+        let (w, cost) = best_rotation(searched, u)?;
+        let behind = |u: &Vector3<f64>| {
+            let motion = Motion::of(u, &w);
+            equations(searched, &motion, &tangents(u), None).behind
+        };
+        Some((w, cost, behind(u).min(behind(&-u))))
+    };
+    let Some(least) = motions.iter().filter_map(|m| cost(&m.u())).map(|(_, j, b)| j + b).reduce(f64::min) else {
+        return 0.0;
+    };
+    let limit = least + PLAUSIBLE * searched.n as f64 / observations.n as f64;
+    let first = motions[0].u();
+    let angles = evaluate(|u| {
+        // Signs are looked at only where the residuals alone would do.
+        let (_, j) = best_rotation(searched, u)?;
+        let plausible = j < limit && cost(u).is_some_and(|(_, j, behind)| j + behind < limit);
+        plausible.then(|| first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees())
+    });
+    angles.into_iter().fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_cover_the_half_sphere() {
+        let directions = half_sphere();
+        assert!(directions.iter().all(|d| (d.norm() - 1.0).abs() < 1e-14 && d.z > 0.0));
+        let rng = CounterRng::new(1);
+        for k in 0..500 {
+            let any = Vector3::new(rng.normal(3 * k), rng.normal(3 * k + 1), rng.normal(3 * k + 2)).normalize();
+            let nearest = directions.iter().map(|d| d.dot(&any).abs()).fold(0.0, f64::max);
+            assert!(nearest.acos().to_degrees() < 8.5, "{any}: {}", nearest.acos().to_degrees());
+        }
+    }
+
+    #[test]
+    fn samples_are_different_indices() {
+        let chosen = sample(100, 30, CounterRng::new(4));
+        assert!(chosen.len() == 30 && chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[29] < 100);
+        assert_ne!(chosen, sample(100, 30, CounterRng::new(5)));
+        assert_eq!(sample(3, 30, CounterRng::new(5)), [0, 1, 2]);
+    }
+}

@@ -1,0 +1,105 @@
+//! Sums of one Gauss-Newton step.
+
+use super::super::motion::Motion;
+use super::super::observations::Observations;
+use super::{Everywhere, Planes, UPPER, add_to_rotation, both_axes, dot, over_chunks, see, total, turn};
+use crate::simd::{Kernel, Lanes, dispatch};
+use nalgebra::{Matrix2x3, SMatrix};
+use std::ops::AddAssign;
+
+/// The sums of one Gauss-Newton step at a motion.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Equations {
+    /// `H = sum D(nu^)^t D(nu^)`.
+    pub h: SMatrix<f64, 5, 5>,
+    /// `sum D(nu^)^t e`.
+    pub gradient: SMatrix<f64, 5, 1>,
+    /// `P = sum P_k`, the noise of the depths in `H`.
+    pub p: SMatrix<f64, 5, 5>,
+    /// `J = sum e^2`, or Tukey's loss where there is a cut.
+    pub cost: f64,
+    /// `sum (nu^ / sd)^2` over the points behind the camera.
+    pub behind: f64,
+}
+
+struct EquationSums<'a> {
+    planes: Planes<'a>,
+    motion: &'a Motion,
+    tangent: &'a Matrix2x3<f64>,
+    floor: f64,
+    inverse_cut: f64,
+}
+
+const EQUATION_SUMS: usize = 26;
+
+impl Kernel<f64> for EquationSums<'_> {
+    type Output = [f64; EQUATION_SUMS];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; EQUATION_SUMS] {
+        let motion = Everywhere::<V>::new(self.motion);
+        let [first, second] = both_axes::<V>(self.tangent);
+        let (floor, cut, one) = (V::splat(self.floor), V::splat(self.inverse_cut), V::constant(1.0));
+        let mut sums = [V::zero(); EQUATION_SUMS];
+        for i in (0..self.planes[0].len()).step_by(V::LANES) {
+            let seen = see(&self.planes, i, &motion, floor);
+            let e2 = seen.across * seen.across * seen.inverse;
+            // Tukey's weight (1 - (e / cut)^2)^2, 1 without a cut.
+            let rest = one - (e2 * cut).min(one);
+            let weight = rest * rest * seen.inverse;
+            let nu = seen.along * seen.inverse;
+            let a = turn(&seen.t, dot(&self.planes, 0, i, &first), dot(&self.planes, 3, i, &first));
+            let b = turn(&seen.t, dot(&self.planes, 0, i, &second), dot(&self.planes, 3, i, &second));
+            let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
+            let mut k = 0;
+            for row in 0..5 {
+                let weighted = d[row] * weight;
+                for column in row..5 {
+                    sums[k] = weighted.mul_add(d[column], sums[k]);
+                    k += 1;
+                }
+                sums[15 + row] = weighted.mul_add(seen.across, sums[15 + row]);
+            }
+            let twice = weight * seen.inverse;
+            sums[20] = (a * twice).mul_add(a, sums[20]);
+            sums[21] = (a * twice).mul_add(b, sums[21]);
+            sums[22] = (b * twice).mul_add(b, sums[22]);
+            sums[23] = sums[23] + e2;
+            sums[24] = sums[24] + (one - rest * rest * rest);
+            let behind = seen.along.min(V::zero());
+            sums[25] = (behind * behind).mul_add(seen.inverse, sums[25]);
+        }
+        sums.map(total)
+    }
+}
+
+/// The equations at a motion, `theta = (psi, w)` with `psi` along the rows of `tangent`; with `cut`, Tukey's weights that end there, in units of noise.
+pub(in super::super) fn equations(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    cut: Option<f64>,
+) -> Equations {
+    let inverse_cut = cut.map_or(0.0, |cut| 1.0 / (cut * cut));
+    let sums = over_chunks(observations, |range| {
+        let planes = observations.slices(&range);
+        dispatch(observations.level, EquationSums { planes, motion, tangent, floor: observations.floor, inverse_cut })
+    });
+    let (mut h, mut p) = (SMatrix::<f64, 5, 5>::zeros(), SMatrix::<f64, 5, 5>::zeros());
+    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
+        h[(i, j)] = *value;
+        h[(j, i)] = *value;
+    }
+    let mut gradient = SMatrix::<f64, 5, 1>::from_column_slice(&sums[15..20]);
+    let mut cost = cut.map_or(sums[23], |cut| cut * cut / 3.0 * sums[24]);
+    if let Some(known) = &observations.prior {
+        let (pull, square) = known.pull(&motion.w());
+        add_to_rotation(&mut h, &known.information, 1.0);
+        gradient.fixed_rows_mut::<3>(2).add_assign(&pull);
+        cost += square;
+    }
+    p[(0, 0)] = sums[20];
+    p[(0, 1)] = sums[21];
+    p[(1, 0)] = sums[21];
+    p[(1, 1)] = sums[22];
+    Equations { h, gradient, p, cost, behind: sums[25] }
+}

@@ -1,0 +1,181 @@
+//! The estimating equation with given depths in its weights.
+
+use super::super::motion::Motion;
+use super::super::observations::{Known, Observations};
+use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
+use crate::simd::{Kernel, Lanes, dispatch};
+use nalgebra::{Matrix2x3, SMatrix};
+use std::ops::AddAssign;
+
+/// `sum W^t W` for given depths in the weights, as the upper triangle.
+struct WeightSums<'a> {
+    planes: Planes<'a>,
+    nu: &'a [f64],
+    motion: &'a Motion,
+    tangent: &'a Matrix2x3<f64>,
+    floor: f64,
+}
+
+impl WeightSums<'_> {
+    /// `s D(nu)` and what else the points' equations need.
+    #[inline(always)]
+    fn row<V: Lanes<Scalar = f64>>(
+        planes: &Planes<'_>,
+        nu: &[f64],
+        i: usize,
+        motion: &Everywhere<V>,
+        axes: &[[V; 3]; 2],
+        floor: V,
+    ) -> (Seen<V>, [V; 5]) {
+        let seen = see(planes, i, motion, floor);
+        let nu = V::load(&nu[i..]);
+        let a = turn(&seen.t, dot(planes, 0, i, &axes[0]), dot(planes, 3, i, &axes[0]));
+        let b = turn(&seen.t, dot(planes, 0, i, &axes[1]), dot(planes, 3, i, &axes[1]));
+        let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
+        (seen, d)
+    }
+}
+
+impl Kernel<f64> for WeightSums<'_> {
+    type Output = [f64; 15];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 15] {
+        let motion = Everywhere::<V>::new(self.motion);
+        let axes = both_axes(self.tangent);
+        let floor = V::splat(self.floor);
+        let mut sums = [V::zero(); 15];
+        for i in (0..self.planes[0].len()).step_by(V::LANES) {
+            let (seen, d) = Self::row(&self.planes, self.nu, i, &motion, &axes, floor);
+            let mut k = 0;
+            for row in 0..5 {
+                let weighted = d[row] * seen.inverse;
+                for column in row..5 {
+                    sums[k] = weighted.mul_add(d[column], sums[k]);
+                    k += 1;
+                }
+            }
+        }
+        sums.map(total)
+    }
+}
+
+/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights.
+pub(in super::super) fn information(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> SMatrix<f64, 5, 5> {
+    let sums = over_chunks(observations, |range| {
+        let planes = observations.slices(&range);
+        let nu = &nu[range];
+        dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor })
+    });
+    let mut h = SMatrix::<f64, 5, 5>::zeros();
+    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
+        h[(i, j)] = *value;
+        h[(j, i)] = *value;
+    }
+    if let Some(known) = &observations.prior {
+        add_to_rotation(&mut h, &known.information, 1.0);
+    }
+    h
+}
+
+/// `sum V^t h` of the bilinear residual `s e = sum_i u_i (h_i0 + sum_j h_ij w_j)`.
+struct BilinearSums<'a> {
+    weights: WeightSums<'a>,
+    /// `kappa^2`, the largest variance of the direction.
+    spread: f64,
+}
+
+const BILINEAR_SUMS: usize = 60;
+
+impl Kernel<f64> for BilinearSums<'_> {
+    type Output = [f64; BILINEAR_SUMS];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; BILINEAR_SUMS] {
+        let WeightSums { planes, nu, motion, tangent, floor } = self.weights;
+        let motion = Everywhere::<V>::new(motion);
+        let axes = both_axes(tangent);
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * self.spread));
+        let mut sums = [[V::zero(); 12]; 5];
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let (seen, d) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
+            let mut g = [V::zero(); 6];
+            let mut size = V::zero();
+            for p in 0..6 {
+                g[p] = at(&planes, p, i);
+                size = g[p].mul_add(g[p], size);
+            }
+            // V = W s / (s^2 + g kappa^2), and nothing at the epipole.
+            let damped = size.mul_add(half_spread, seen.s2);
+            let scale = V::select(floor.lt(seen.s2), V::constant(1.0) / damped, V::zero());
+            for c in 0..3 {
+                let column = [g[c], g[3 + c]];
+                let mut h = [turn(&column, at(&planes, 12, i), at(&planes, 13, i)) * scale; 4];
+                for j in 0..3 {
+                    h[1 + j] = -turn(&column, at(&planes, 6 + j, i), at(&planes, 9 + j, i)) * scale;
+                }
+                for row in 0..5 {
+                    for j in 0..4 {
+                        sums[row][4 * c + j] = h[j].mul_add(d[row], sums[row][4 * c + j]);
+                    }
+                }
+            }
+        }
+        let mut out = [0.0; BILINEAR_SUMS];
+        for (to, lanes) in out.iter_mut().zip(sums.into_iter().flatten()) {
+            *to = total(lanes);
+        }
+        out
+    }
+}
+
+/// The frozen estimating equation `sum V^t (s e)(u, w)`: five values, each bilinear in `u` and `(1, w)`.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Bilinear {
+    sums: [f64; BILINEAR_SUMS],
+    prior: Option<Known>,
+}
+
+impl Bilinear {
+    /// With `D(nu)` at a motion as weights, damped within `kappa^2 = spread` of the epipole.
+    pub fn new(
+        observations: &Observations,
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        nu: &[f64],
+        spread: f64,
+    ) -> Self {
+        let sums = over_chunks(observations, |range| {
+            let planes = observations.slices(&range);
+            let weights = WeightSums { planes, nu: &nu[range], motion, tangent, floor: observations.floor };
+            dispatch(observations.level, BilinearSums { weights, spread })
+        });
+        Self { sums, prior: observations.prior }
+    }
+
+    /// Its value at a motion, and its slopes along `tangent` and `w`.
+    pub fn at(&self, motion: &Motion, tangent: &Matrix2x3<f64>) -> (SMatrix<f64, 5, 1>, SMatrix<f64, 5, 5>) {
+        let (u, w) = (motion.translation, motion.rotation);
+        let (mut value, mut slope) = (SMatrix::<f64, 5, 1>::zeros(), SMatrix::<f64, 5, 5>::zeros());
+        for row in 0..5 {
+            let h = |i: usize, j: usize| self.sums[12 * row + 4 * i + j];
+            for i in 0..3 {
+                let along = h(i, 0) + (0..3).map(|j| h(i, 1 + j) * w[j]).sum::<f64>();
+                value[row] += u[i] * along;
+                slope[(row, 0)] += tangent[(0, i)] * along;
+                slope[(row, 1)] += tangent[(1, i)] * along;
+                for j in 0..3 {
+                    slope[(row, 2 + j)] += u[i] * h(i, 1 + j);
+                }
+            }
+        }
+        if let Some(known) = &self.prior {
+            value.fixed_rows_mut::<3>(2).add_assign(&known.pull(&motion.w()).0);
+            add_to_rotation(&mut slope, &known.information, -1.0);
+        }
+        (value, slope)
+    }
+}

@@ -1,0 +1,99 @@
+//! Maximum likelihood over all motions, and which of several minima it was.
+
+use super::grid::{sample, starts};
+use super::kernels::depths;
+use super::motion::Motion;
+use super::observations::Observations;
+use super::refine::{Effort, Minimum, refine};
+use super::smoothing::DepthSmoother;
+use crate::math::random::CounterRng;
+use rayon::prelude::*;
+
+/// From here on starts are refined on fewer points first.
+const MANY: usize = 4000;
+const FEWER: usize = 2000;
+
+/// Starts that are then refined on all points.
+const FINALISTS: usize = 2;
+
+/// Directions nearer than this, degrees, are one minimum.
+const SAME: f64 = 0.5;
+
+/// A minimum of the likelihood with what speaks against it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    pub minimum: Minimum,
+    /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared units of noise.
+    pub cost: f64,
+}
+
+impl Candidate {
+    /// With the sign that has fewer depths behind the camera.
+    pub fn signed(observations: &Observations, minimum: &Minimum) -> Self {
+        let reversed = minimum.reversed(observations);
+        let better = if reversed.equations.behind < minimum.equations.behind { reversed } else { *minimum };
+        // J is of the minimum in both signs; taken from one of them, so that a cut does not matter.
+        Self { minimum: better, cost: reversed.equations.cost + better.equations.behind }
+    }
+
+    pub fn motion(&self) -> &Motion {
+        &self.minimum.motion
+    }
+}
+
+/// The minima of `J`, the cheapest first, with the best sign each.
+pub(super) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimum> {
+    let starts = starts(observations, rng.stream(0));
+    let refined = if observations.n > MANY {
+        let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
+        let rough: Vec<Minimum> =
+            starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
+        let mut rough: Vec<Candidate> =
+            different(rough).into_iter().map(|minimum| Candidate::signed(&fewer, &minimum)).collect();
+        rough.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        rough.truncate(FINALISTS);
+        rough.iter().map(|candidate| refine(observations, *candidate.motion(), None, Effort::FULL)).collect()
+    } else {
+        starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()
+    };
+    different(refined)
+}
+
+/// Sorted by cost, each minimum once, whatever its sign.
+fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
+    minima.retain(|minimum| minimum.equations.cost.is_finite());
+    minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
+    let limit = SAME.to_radians().cos();
+    let mut kept: Vec<Minimum> = Vec::with_capacity(minima.len());
+    for minimum in minima {
+        if kept.iter().all(|other| other.motion.u().dot(&minimum.motion.u()).abs() < limit) {
+            kept.push(minimum);
+        }
+    }
+    kept
+}
+
+/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness of their depths, too.
+///
+/// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and differ by about `2 sqrt(n)` by chance.
+pub(super) fn choose(
+    observations: &Observations,
+    minima: &[Minimum],
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> (Vec<Candidate>, Option<DepthSmoother>) {
+    let mut candidates: Vec<Candidate> =
+        minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
+    candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
+    let close = best + 8.0 * (observations.n as f64).sqrt() + 25.0;
+    let rivals = candidates.iter().take_while(|candidate| candidate.cost < close).count();
+    if rivals < 2 {
+        return (candidates, None);
+    }
+    let smoother = smoother();
+    for candidate in &mut candidates[..rivals] {
+        candidate.cost += smoother.cost(&depths(observations, &candidate.minimum.motion));
+    }
+    candidates[..rivals].sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    (candidates, Some(smoother))
+}

@@ -1,0 +1,179 @@
+//! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
+
+use super::kernels::PLANES;
+use super::motion::Rows;
+use super::options::RotationPrior;
+use crate::simd::Level;
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+
+/// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
+pub(super) const CHUNK: usize = 4096;
+
+/// Lanes are filled up with points of weight 0 to a multiple of this.
+const ALIGN: usize = 8;
+
+/// `|G u| / |G|` below which a point sits on the epipole and says nothing.
+const EPIPOLE: f64 = 1e-9;
+
+/// One point: `f = nu G u + R w + noise` with unit covariance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub g: Matrix2x3<f64>,
+    pub r: Matrix2x3<f64>,
+    pub f: Vector2<f64>,
+}
+
+/// Whitened points as planes: `g` (6), `r` (6), `f` (2), each of `stride` values, of which those after `n` are zero.
+#[derive(Debug, Clone)]
+pub(super) struct Observations {
+    pub n: usize,
+    pub stride: usize,
+    planes: Vec<f64>,
+    /// Where the points lie, for neighbourhoods: `(x, y, 0)` on the plane, the bearing on the sphere.
+    pub position: Vec<[f64; 3]>,
+    /// Whether `position` are bearings.
+    pub spherical: bool,
+    /// Index of each point in what was given.
+    pub source: Vec<u32>,
+    /// `|G u|^2` below which a point gets weight 0.
+    pub floor: f64,
+    /// The instruction set of the kernels.
+    pub level: Level,
+    /// What is known of the rotation beforehand.
+    pub prior: Option<Known>,
+}
+
+/// A rotation known beforehand, with the inverse of its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub rotation: Vector3<f64>,
+    pub information: Matrix3<f64>,
+}
+
+impl Known {
+    /// `None` unless everything is finite and the covariance positive definite.
+    pub fn new(prior: &RotationPrior) -> Option<Self> {
+        let covariance = Matrix3::from_fn(|i, j| 0.5 * (prior.covariance[i][j] + prior.covariance[j][i]));
+        let known = Self { rotation: prior.rotation.into(), information: covariance.cholesky()?.inverse() };
+        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
+    }
+
+    /// `(w0 - w)` times the information, and the square of the difference in its units.
+    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let off = self.rotation - w;
+        let pull = self.information * off;
+        (pull, off.dot(&pull))
+    }
+}
+
+impl Row {
+    /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None` unless all is finite and `S` positive definite.
+    pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
+        let l = covariance.cholesky()?.l();
+        let whiten = l.try_inverse()?;
+        let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
+        row.values().iter().all(|value| value.is_finite()).then_some(row)
+    }
+
+    fn values(&self) -> [f64; PLANES] {
+        std::array::from_fn(|p| match p {
+            0..6 => self.g[(p / 3, p % 3)],
+            6..12 => self.r[((p - 6) / 3, p % 3)],
+            _ => self.f[p - 12],
+        })
+    }
+}
+
+impl Observations {
+    /// Usable points in the order given; `source` tells where they come from.
+    pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
+        let n = rows.len();
+        let stride = n.next_multiple_of(ALIGN);
+        let mut planes = vec![0.0; PLANES * stride];
+        let mut size = 0.0;
+        for (k, row) in rows.iter().enumerate() {
+            for (p, value) in row.values().into_iter().enumerate() {
+                planes[p * stride + k] = value;
+            }
+            size += row.g.norm_squared();
+        }
+        let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
+        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect(), prior: None }
+    }
+
+    /// The points `chosen`, by index among these.
+    pub fn subset(&self, chosen: &[u32]) -> Self {
+        let (n, stride) = (chosen.len(), chosen.len().next_multiple_of(ALIGN));
+        let mut planes = vec![0.0; PLANES * stride];
+        for (p, plane) in planes.chunks_exact_mut(stride.max(1)).enumerate() {
+            let from = self.plane(p);
+            for (to, &k) in plane.iter_mut().zip(chosen) {
+                *to = from[k as usize];
+            }
+        }
+        let pick = |k: &u32| *k as usize;
+        Self {
+            n,
+            stride,
+            planes,
+            position: chosen.iter().map(|k| self.position[pick(k)]).collect(),
+            spherical: self.spherical,
+            source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
+            floor: self.floor,
+            level: self.level,
+            prior: self.prior,
+        }
+    }
+
+    /// Measures in other units of noise: everything times `factor`.
+    pub fn rescale(&mut self, factor: f64) {
+        self.planes.iter_mut().for_each(|value| *value *= factor);
+        self.floor *= factor * factor;
+    }
+
+    /// One plane, `stride` values.
+    pub fn plane(&self, p: usize) -> &[f64] {
+        &self.planes[p * self.stride..(p + 1) * self.stride]
+    }
+
+    /// The planes of the points `range`, whose start is a multiple of the lane count.
+    pub fn slices(&self, range: &std::ops::Range<usize>) -> [&[f64]; PLANES] {
+        std::array::from_fn(|p| &self.plane(p)[range.clone()])
+    }
+
+    /// The chunks, the last one up to the filling points.
+    pub fn chunks(&self) -> impl ExactSizeIterator<Item = std::ops::Range<usize>> + Clone + '_ {
+        let stride = self.stride;
+        (0..stride.div_ceil(CHUNK)).map(move |c| c * CHUNK..((c + 1) * CHUNK).min(stride))
+    }
+
+    /// Point `k`.
+    pub fn row(&self, k: usize) -> Row {
+        let at = |p: usize| self.planes[p * self.stride + k];
+        Row {
+            g: Matrix2x3::from_fn(|i, j| at(3 * i + j)),
+            r: Matrix2x3::from_fn(|i, j| at(6 + 3 * i + j)),
+            f: Vector2::new(at(12), at(13)),
+        }
+    }
+
+    /// The median of `|f|`, in units of noise.
+    pub fn median_flow(&self) -> f64 {
+        let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
+        median(&mut lengths)
+    }
+}
+
+/// The median (the upper one of two), 0 of nothing; reorders the values.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value at a share of the sorted values, 0 of nothing; reorders the values.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = ((values.len() as f64 * share) as usize).min(values.len() - 1);
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}

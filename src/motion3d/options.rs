@@ -1,0 +1,143 @@
+//! What is given and how it is worked on.
+
+use super::camera::Intrinsics;
+use super::motion::{Motion, Projection};
+use super::smoothing::Smoother;
+use crate::error::{Error, Result};
+use crate::parallel::Threads;
+
+/// Points with their flow, N of each.
+#[derive(Debug, Clone, Copy)]
+pub enum Flow<'a> {
+    /// On the picture.
+    Plane {
+        /// Where, px with a camera, else on the plane at distance 1.
+        points: &'a [[f64; 2]],
+        /// Displacement over one frame, in the same unit.
+        flow: &'a [[f64; 2]],
+        /// The camera; `None`: everything is on the plane at distance 1.
+        camera: Option<&'a Intrinsics>,
+    },
+    /// On the unit sphere.
+    Sphere {
+        /// Bearings of length 1.
+        bearings: &'a [[f64; 3]],
+        /// Their rates of change, rad/frame; parts along the bearings do not count.
+        flow: &'a [[f64; 3]],
+    },
+}
+
+/// Noise of the flow.
+#[derive(Debug, Clone, Copy, Default)]
+pub enum Noise<'a> {
+    /// The same everywhere; its size is estimated from the residuals.
+    #[default]
+    Unknown,
+    /// Standard deviation of each component, in the unit of the flow.
+    Sigma(f64),
+    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not positive definite are left out.
+    Covariances(&'a [f64]),
+}
+
+/// Which estimator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// [`Method::Efficient`] from 30 points on, [`Method::MaximumLikelihood`] below.
+    #[default]
+    Auto,
+    /// The least residuals across the epipolar lines: (3), (4).
+    MaximumLikelihood,
+    /// The estimating equation whose weights have smoothed depths: (19), (25).
+    Efficient,
+}
+
+/// Where on its path a displacement is taken to be the instantaneous flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Placement {
+    /// Half way: exact to second order.
+    #[default]
+    Midpoint,
+    /// Where the point was: for flow that is instantaneous already.
+    Start,
+}
+
+/// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a thing that moves by itself.
+///
+/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotationPrior {
+    /// Rotation rate `w`, rad/frame.
+    pub rotation: [f64; 3],
+    /// Its covariance, row by row.
+    pub covariance: [[f64; 3]; 3],
+}
+
+/// Options of [`estimate_motion`](super::estimate_motion).
+#[derive(Debug, Clone, Default)]
+pub struct MotionOptions {
+    /// Which estimator; default: by the number of points.
+    pub method: Method,
+    /// Whether points that do not obey the motion are found and left out; default: no.
+    pub robust: bool,
+    /// Where displacements belong on the plane; default: half way. Bearings and their flow are taken as given.
+    pub placement: Placement,
+    /// Which predictors smooth depths for the weights; default: the better one.
+    pub smoother: Smoother,
+    /// Inverse depths for the weights, one for each point, known from elsewhere up to a common factor's noise; default: smoothed from the flow.
+    pub weight_depths: Option<Vec<f64>>,
+    /// A motion near which the minimum is looked for, instead of everywhere; not with `robust`.
+    pub initial: Option<Motion>,
+    /// What is known of the rotation beforehand; default: nothing.
+    pub rotation_prior: Option<RotationPrior>,
+    /// Seed of the random choices; default: 0.
+    pub seed: u64,
+    /// Number of threads; the result does not depend on it.
+    pub threads: Threads,
+}
+
+impl Flow<'_> {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Plane { points, .. } => points.len(),
+            Self::Sphere { bearings, .. } => bearings.len(),
+        }
+    }
+    /// No point at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// The screen.
+    pub fn projection(&self) -> Projection {
+        match self {
+            Self::Plane { .. } => Projection::Plane,
+            Self::Sphere { .. } => Projection::Sphere,
+        }
+    }
+
+    pub(super) fn check(&self, noise: &Noise<'_>) -> Result<()> {
+        let (points, flow, values) = match self {
+            Self::Plane { points, flow, .. } => (points.len(), flow.len(), 4),
+            Self::Sphere { bearings, flow } => (bearings.len(), flow.len(), 9),
+        };
+        if points != flow {
+            return Err(Error::argument("flow", format!("{points} values, one for each point"), flow));
+        }
+        if let Self::Sphere { bearings, .. } = self {
+            let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
+            if let Some(wrong) = bearings.iter().find(off) {
+                return Err(Error::argument("points", "bearings of length 1", format!("{wrong:?}")));
+            }
+        }
+        match noise {
+            Noise::Sigma(sigma) if !(sigma.is_finite() && *sigma > 0.0) => {
+                Err(Error::argument("sigma", "a positive number", sigma))
+            }
+            Noise::Covariances(c) if c.len() != values * points => {
+                let expected = format!("{points} matrices of {values} values");
+                Err(Error::argument("cov", expected, format!("{} values", c.len())))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! The equations of whitened patches.
+
+use super::super::covariance::Matrix5;
+use super::super::motion::{AffineRows, Motion, tangents};
+use super::super::special::by_chance;
+use nalgebra::{Matrix2x3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+
+type Matrix6x3 = SMatrix<f64, 6, 3>;
+
+/// Share of the trace that keeps `A^t A` invertible where the translation points at the patch.
+const RIDGE: f64 = 1e-12;
+
+/// Most steps to a minimum, and the length of one that is the last.
+const STEPS: usize = 60;
+const STEP: f64 = 1e-10;
+
+/// One patch: `f = A(u) lambda + R w + noise` with unit covariance, `A` linear in `u`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Patch {
+    point: [f64; 2],
+    rows: AffineRows,
+    whiten: Matrix6<f64>,
+    pub r: Matrix6x3,
+    pub f: Vector6<f64>,
+}
+
+/// A patch seen with one motion.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeenPatch {
+    /// `lambda^ = (nu, nu_x, nu_y)` by least squares, and its covariance.
+    pub surface: Vector3<f64>,
+    pub covariance: Matrix3<f64>,
+    /// `I - A (A^t A)^-1 A^t`.
+    pub across: Matrix6<f64>,
+    /// `f - R w`.
+    pub rest: Vector6<f64>,
+    /// What no surface explains of it.
+    pub cost: f64,
+}
+
+/// Usable patches and where they come from.
+#[derive(Debug, Clone)]
+pub(super) struct System {
+    pub patches: Vec<Patch>,
+    pub source: Vec<u32>,
+}
+
+/// The sums of one step, as those of points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PatchEquations {
+    pub h: Matrix5,
+    pub gradient: SMatrix<f64, 5, 1>,
+    pub p: Matrix5,
+    pub cost: f64,
+    pub behind: f64,
+}
+
+impl Patch {
+    /// From `(u, v, u_x, v_x, u_y, v_y)` at a place on the plane at distance 1; `None` unless all is finite and the covariance positive definite.
+    pub fn new(point: [f64; 2], m: &Vector6<f64>, covariance: &Matrix6<f64>) -> Option<Self> {
+        let symmetric = 0.5 * (covariance + covariance.transpose());
+        let whiten = symmetric.cholesky()?.l().try_inverse()?;
+        let rows = AffineRows::new(point);
+        let patch = Self { point, rows, whiten, r: whiten * rows.rotation, f: whiten * m };
+        let finite = patch.r.iter().chain(patch.f.iter()).chain(whiten.iter()).all(|value| value.is_finite());
+        finite.then_some(patch)
+    }
+
+    /// `A(u)`, whitened.
+    fn depth(&self, u: &Vector3<f64>) -> Matrix6x3 {
+        self.whiten * self.rows.depth(u)
+    }
+
+    pub fn seen(&self, motion: &Motion) -> SeenPatch {
+        let a = self.depth(&motion.u());
+        let mut normal = a.transpose() * a;
+        normal += Matrix3::identity() * (RIDGE * normal.trace()).max(f64::MIN_POSITIVE);
+        let covariance = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let rest = self.f - self.r * motion.w();
+        let surface = covariance * a.transpose() * rest;
+        let across = Matrix6::identity() - a * covariance * a.transpose();
+        let cost = rest.dot(&(across * rest)).max(0.0);
+        SeenPatch { surface, covariance, across, rest, cost }
+    }
+
+    /// `[sum_j lambda_j G_j E_u, R]`.
+    fn slopes(&self, tangent: &Matrix2x3<f64>, surface: &Vector3<f64>) -> SMatrix<f64, 6, 5> {
+        let mut slopes = SMatrix::<f64, 6, 5>::zeros();
+        for axis in 0..2 {
+            slopes.set_column(axis, &(self.depth(&tangent.row(axis).transpose()) * surface));
+        }
+        slopes.fixed_columns_mut::<3>(2).copy_from(&self.r);
+        slopes
+    }
+
+    /// `sum_ij C_ij (G_i E)^t X (G_j E)`, what noise of the surface adds to products of slopes.
+    fn surface_noise(&self, tangent: &Matrix2x3<f64>, covariance: &Matrix3<f64>, x: &Matrix6<f64>) -> Matrix5 {
+        let along = [0, 1].map(|axis| self.depth(&tangent.row(axis).transpose()));
+        let mut noise = Matrix5::zeros();
+        for i in 0..2 {
+            for j in 0..2 {
+                noise[(i, j)] = (covariance * along[i].transpose() * x * along[j]).trace();
+            }
+        }
+        noise
+    }
+}
+
+impl System {
+    pub fn subset(&self, chosen: &[u32]) -> Self {
+        Self {
+            patches: chosen.iter().map(|&k| self.patches[k as usize]).collect(),
+            source: chosen.iter().map(|&k| self.source[k as usize]).collect(),
+        }
+    }
+
+    /// The sums at a motion, with the surfaces' own estimates or with `surfaces` in the weights.
+    pub fn equations(
+        &self,
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        surfaces: Option<&[Vector3<f64>]>,
+    ) -> PatchEquations {
+        let mut sums = PatchEquations {
+            h: Matrix5::zeros(),
+            gradient: SMatrix::zeros(),
+            p: Matrix5::zeros(),
+            cost: 0.0,
+            behind: 0.0,
+        };
+        for (k, patch) in self.patches.iter().enumerate() {
+            let seen = patch.seen(motion);
+            let slopes = patch.slopes(tangent, &surfaces.map_or(seen.surface, |surfaces| surfaces[k]));
+            let weighted = slopes.transpose() * seen.across;
+            sums.h += weighted * slopes;
+            sums.gradient += weighted * seen.rest;
+            sums.p += patch.surface_noise(tangent, &seen.covariance, &seen.across);
+            sums.cost += seen.cost;
+            sums.behind += seen.surface[0].min(0.0).powi(2) / seen.covariance[(0, 0)];
+        }
+        sums
+    }
+
+    /// The best rotation for a direction, and what it leaves.
+    pub fn best_rotation(&self, direction: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+        let still = Motion::of(direction, &Vector3::zeros());
+        let (mut normal, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+        for patch in &self.patches {
+            let across = patch.seen(&still).across;
+            let weighted = patch.r.transpose() * across;
+            normal += weighted * patch.r;
+            right += weighted * patch.f;
+            square += patch.f.dot(&(across * patch.f));
+        }
+        let w = normal.cholesky()?.solve(&right);
+        let cost = (square - right.dot(&w)).max(0.0);
+        (w.iter().all(|value| value.is_finite()) && cost.is_finite()).then_some((w, cost))
+    }
+
+    /// The minimum that is reached from `start`, by Levenberg-Marquardt.
+    pub fn refine(&self, start: &Motion) -> Motion {
+        let mut motion = *start;
+        let mut tangent = tangents(&motion.u());
+        let mut here = self.equations(&motion, &tangent, None);
+        let mut damping = 1e-4;
+        for _ in 0..STEPS {
+            let mut h = here.h;
+            for i in 0..5 {
+                h[(i, i)] *= 1.0 + damping;
+            }
+            let Some(step) = h.cholesky().map(|factor| factor.solve(&here.gradient)) else { break };
+            let next = motion.stepped(&tangent, &step);
+            let axes = tangents(&next.u());
+            let there = self.equations(&next, &axes, None);
+            if there.cost <= here.cost {
+                (motion, tangent, here) = (next, axes, there);
+                damping *= 0.1;
+            } else {
+                damping *= 10.0;
+            }
+            if step.norm() < STEP || damping > 1e12 {
+                break;
+            }
+        }
+        motion
+    }
+
+    /// `sum (Pi G_i E)^t B M^-1 B^t (Pi G_j E) C_ij`: the noise that is left with ideal weights (25).
+    pub fn weighted_noise(
+        &self,
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        surfaces: &[Vector3<f64>],
+        bound: &Matrix5,
+    ) -> Matrix5 {
+        let mut sum = Matrix5::zeros();
+        for (patch, surface) in self.patches.iter().zip(surfaces) {
+            let seen = patch.seen(motion);
+            let across = seen.across * patch.slopes(tangent, surface);
+            sum += patch.surface_noise(tangent, &seen.covariance, &(across * bound * across.transpose()));
+        }
+        sum
+    }
+
+    /// The other motion, where all patches lie in one plane `nu = n . eta` as far as their noise lets tell and that has them before the camera.
+    pub fn twin(&self, motion: &Motion) -> Option<Motion> {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let plane = |patch: &Patch| Matrix3::new(patch.point[0], patch.point[1], 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+        let seen: Vec<_> = self.patches.iter().map(|patch| (plane(patch), patch.seen(motion))).collect();
+        for (at, seen) in &seen {
+            let weight = seen.covariance.try_inverse()?;
+            normal += at.transpose() * weight * at;
+            right += at.transpose() * weight * seen.surface;
+        }
+        let n = normal.cholesky()?.solve(&right);
+        let chi2: f64 = seen
+            .iter()
+            .map(|(at, seen)| {
+                let rest = seen.surface - at * n;
+                seen.covariance.try_inverse().map_or(0.0, |weight| (rest.transpose() * weight * rest)[0])
+            })
+            .sum();
+        if self.patches.len() < 2 || !by_chance(chi2, (3 * self.patches.len() - 3) as f64) || n.norm() <= 0.0 {
+            return None;
+        }
+        let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
+        let behind = |motion: &Motion| self.equations(motion, &tangents(&motion.u()), None).behind;
+        let own = behind(motion);
+        let (one, two) = (behind(&other), behind(&other.reversed()));
+        let (twin, least) = if two < one { (other.reversed(), two) } else { (other, one) };
+        (least - own < 25.0).then_some(twin)
+    }
+}

@@ -1,0 +1,118 @@
+//! Levenberg-Marquardt on the five unknowns of a motion.
+
+use super::kernels::{Equations, equations};
+use super::motion::{Motion, tangents};
+use super::observations::Observations;
+use nalgebra::{Matrix2x3, SMatrix};
+
+/// When to stop.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    /// Most steps.
+    pub steps: usize,
+    /// Length of a step `(psi, w)`, rad, that is not worth another.
+    pub tolerance: f64,
+}
+
+impl Effort {
+    /// For a start that will be refined again.
+    pub const ROUGH: Self = Self { steps: 15, tolerance: 1e-4 };
+    /// To the minimum.
+    pub const FULL: Self = Self { steps: 60, tolerance: 1e-10 };
+}
+
+/// A minimum with the equations there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Minimum {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    pub equations: Equations,
+}
+
+impl Minimum {
+    fn at(observations: &Observations, motion: Motion, cut: Option<f64>) -> Self {
+        let tangent = tangents(&motion.u());
+        Self { motion, tangent, equations: equations(observations, &motion, &tangent, cut) }
+    }
+
+    /// The same with all depths of the other sign: `e` and `J` stay, `D` at the depths changes its sign with the axes.
+    pub fn reversed(&self, observations: &Observations) -> Self {
+        Self::at(observations, self.motion.reversed(), None)
+    }
+}
+
+/// The step that solves the damped equations; `None` where they have no solution.
+fn step(equations: &Equations, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
+    let mut h = equations.h;
+    for i in 0..5 {
+        h[(i, i)] += damping * h[(i, i)];
+    }
+    let step = h.cholesky()?.solve(&equations.gradient);
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along with it.
+///
+/// The slope of `e` is `-D(nu^)` exactly, so that these are Gauss-Newton steps.
+pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64>, effort: Effort) -> Minimum {
+    let mut here = Minimum::at(observations, start, cut);
+    let mut damping = 1e-4;
+    for _ in 0..effort.steps {
+        let Some(change) = step(&here.equations, damping) else {
+            damping = (damping * 10.0f64).max(1e-6);
+            if damping > 1e12 {
+                break;
+            }
+            continue;
+        };
+        let there = Minimum::at(observations, here.motion.stepped(&here.tangent, &change), cut);
+        let settled = change.norm() < effort.tolerance;
+        if there.equations.cost <= here.equations.cost {
+            here = there;
+            damping *= 0.1;
+        } else {
+            damping *= 10.0;
+        }
+        if settled || damping > 1e12 {
+            break;
+        }
+    }
+    here
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::scenes::Scene;
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn the_gradient_is_that_of_the_cost() {
+        let scene = Scene::oblique(60, 0.05, 3);
+        let observations = scene.observations();
+        for cut in [None, Some(2.0)] {
+            let at = Motion::new([0.5, 0.3, 0.8], [0.03, -0.02, 0.0]);
+            let here = Minimum::at(&observations, at, cut);
+            for axis in 0..5 {
+                let h = 1e-6;
+                let cost = |by: f64| {
+                    let mut step = SMatrix::<f64, 5, 1>::zeros();
+                    step[axis] = by;
+                    Minimum::at(&observations, at.stepped(&here.tangent, &step), cut).equations.cost
+                };
+                let slope = (cost(h) - cost(-h)) / (2.0 * h);
+                let want = -2.0 * here.equations.gradient[axis];
+                assert!((slope - want).abs() < 1e-4 * want.abs().max(1.0), "{cut:?} {axis}: {slope} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn exact_flow_gives_the_exact_motion() {
+        let scene = Scene::oblique(60, 0.0, 3);
+        let near = Motion::of(&(scene.motion.u() + Vector3::new(0.05, -0.04, 0.02)).normalize(), &Vector3::zeros());
+        let found = refine(&scene.observations(), near, None, Effort::FULL);
+        assert!(found.motion.angle_to(&scene.motion) < 1e-9);
+        assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
+    }
+}

@@ -1,0 +1,191 @@
+//! From a solution on the inliers to what is told about every point that was given.
+
+use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
+use super::efficient::Efficient;
+use super::kernels::{Depths, depths, equations};
+use super::likelihood::Candidate;
+use super::motion::Motion;
+use super::observations::{Observations, Row};
+use super::options::Flow;
+use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
+use super::special::RotationOnly;
+use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+
+/// A motion found on the inliers.
+pub(super) struct Solution {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    /// `None` where nothing is known.
+    pub covariance: Option<Matrix5>,
+    pub status: Status,
+    pub alternatives: Vec<Alternative>,
+    likelihood: Likelihood,
+    /// Depths in the weights, where they were smoothed.
+    smooth: Option<Vec<f64>>,
+    fell_back: bool,
+}
+
+fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
+    std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
+}
+
+impl Solution {
+    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for a covariance.
+    pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
+        let minimum = &chosen.minimum;
+        let likelihood = Likelihood {
+            motion: minimum.motion,
+            covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
+            tangent: axes(&minimum.tangent),
+            cost: minimum.equations.cost,
+        };
+        let plain = Self {
+            motion: minimum.motion,
+            tangent: minimum.tangent,
+            covariance: plugged.map(|plugged| plugged.likelihood),
+            status: Status::Ok,
+            alternatives: Vec::new(),
+            likelihood,
+            smooth: None,
+            fell_back: wanted && improved.is_none(),
+        };
+        match improved {
+            Some(improved) if wanted => Self {
+                motion: improved.motion,
+                tangent: improved.tangent,
+                covariance: Some(improved.covariance),
+                smooth: Some(improved.smooth),
+                ..plain
+            },
+            // The axes belong to the covariance; the motions are as good as the same.
+            Some(improved) if plugged.is_none() => {
+                Self { tangent: improved.tangent, covariance: Some(improved.covariance), ..plain }
+            }
+            _ => plain,
+        }
+    }
+}
+
+/// Puts the results of usable points where they came from; others stay as they are.
+fn scatter(to: &mut [f64], observations: &Observations, from: impl Fn(usize) -> f64) {
+    for (k, &source) in observations.source.iter().enumerate() {
+        to[source as usize] = from(k);
+    }
+}
+
+/// Everything that is told about a motion.
+pub(super) fn report(
+    flow: &Flow<'_>,
+    all: &Observations,
+    inliers: &Observations,
+    solution: &Solution,
+    sigma: f64,
+) -> MotionEstimate {
+    let mut out = MotionEstimate::nothing(flow.len(), solution.status, sigma);
+    let motion = &solution.motion;
+    out.motion = *motion;
+    out.likelihood = solution.likelihood;
+    out.alternatives.clone_from(&solution.alternatives);
+    out.efficient = solution.smooth.is_some();
+    out.fell_back = solution.fell_back;
+    out.tangent = axes(&solution.tangent);
+    if let Some(covariance) = &solution.covariance {
+        out.covariance = nested(covariance);
+        out.direction_std = direction_deviation(covariance);
+        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
+    }
+    if let Some(plugged) = plugged(&equations(inliers, motion, &solution.tangent, None)) {
+        out.bound = nested(&plugged.bound);
+    }
+    let seen = depths(all, motion);
+    scatter(&mut out.inverse_depth, all, |k| seen.nu[k]);
+    scatter(&mut out.inverse_depth_std, all, |k| 1.0 / seen.s2[k].sqrt());
+    scatter(&mut out.residuals, all, |k| seen.e[k]);
+    if let Some(smooth) = &solution.smooth {
+        scatter(&mut out.inverse_depth_smooth, inliers, |k| smooth[k]);
+    } else {
+        let own = &out.inverse_depth;
+        scatter(&mut out.inverse_depth_smooth, inliers, |k| own[inliers.source[k] as usize]);
+    }
+    for &source in &inliers.source {
+        out.inliers[source as usize] = true;
+    }
+    contact(&mut out, all, &seen, solution);
+    out
+}
+
+/// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`.
+fn rate_slopes(row: &Row, nu: f64, inverse: f64, u: &Vector3<f64>, tangent: &Matrix2x3<f64>) -> SMatrix<f64, 5, 1> {
+    let t = row.g * u;
+    let turn: Vector2<f64> = tangent * row.g.transpose() * t * (-nu * inverse);
+    let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
+    SMatrix::<f64, 5, 1>::from_column_slice(&[
+        u.z * turn.x + nu * tangent[(0, 2)],
+        u.z * turn.y + nu * tangent[(1, 2)],
+        u.z * spin.x,
+        u.z * spin.y,
+        u.z * spin.z,
+    ])
+}
+
+/// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
+fn contact(out: &mut MotionEstimate, all: &Observations, seen: &Depths, solution: &Solution) {
+    let (u, tangent) = (solution.motion.u(), &solution.tangent);
+    let covariance = solution.covariance.unwrap_or_else(|| Matrix5::from_element(f64::NAN));
+    let (mut weights, mut rates, mut common) = (0.0, 0.0, SMatrix::<f64, 5, 1>::zeros());
+    for (k, &source) in all.source.iter().enumerate() {
+        let source = source as usize;
+        let smooth = out.inverse_depth_smooth[source];
+        let nu = if smooth.is_finite() { smooth } else { seen.nu[k] };
+        let rate = nu * u.z;
+        out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
+        let inverse = if seen.s2[k] > 0.0 { 1.0 / seen.s2[k] } else { f64::INFINITY };
+        let slopes = rate_slopes(&all.row(k), nu, inverse, &u, tangent);
+        let variance = u.z * u.z * inverse + (slopes.transpose() * covariance * slopes)[0];
+        out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
+        if out.inliers[source] && seen.s2[k] > 0.0 {
+            weights += seen.s2[k];
+            rates += seen.s2[k] * seen.nu[k] * u.z;
+            common += seen.s2[k] * slopes;
+        }
+    }
+    let common = common / weights;
+    let variance = u.z * u.z / weights + (common.transpose() * covariance * common)[0];
+    out.approach = (rates / weights, variance.sqrt());
+}
+
+/// What is told about a camera that only turns, or stands still.
+pub(super) fn rotation_report(
+    flow: &Flow<'_>,
+    all: &Observations,
+    inliers: &Observations,
+    rotation: &RotationOnly,
+    sigma: f64,
+) -> MotionEstimate {
+    let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, sigma);
+    out.motion.rotation = rotation.rotation.into();
+    for i in 0..3 {
+        for j in 0..3 {
+            out.covariance[2 + i][2 + j] = rotation.covariance[(i, j)];
+        }
+        out.rotation_std[i] = rotation.covariance[(i, i)].sqrt();
+    }
+    out.bound = out.covariance;
+    let rest = |k: usize| {
+        let row = all.row(k);
+        (row.f - row.r * rotation.rotation).norm()
+    };
+    scatter(&mut out.residuals, all, rest);
+    scatter(&mut out.inverse_depth, all, |_| 0.0);
+    scatter(&mut out.inverse_depth_smooth, all, |_| 0.0);
+    scatter(&mut out.inverse_depth_std, all, |_| f64::INFINITY);
+    scatter(&mut out.time_to_contact, all, |_| f64::INFINITY);
+    scatter(&mut out.time_to_contact_std, all, |_| f64::INFINITY);
+    for &source in &inliers.source {
+        out.inliers[source as usize] = true;
+    }
+    out.approach = (0.0, f64::INFINITY);
+    out.likelihood.motion = out.motion;
+    out.likelihood.cost = rotation.chi2;
+    out
+}

@@ -1,0 +1,182 @@
+//! Points that obey one motion among points that do not.
+
+mod gate;
+mod search;
+
+use super::estimate::Scaled;
+use super::grid::{apart, sample};
+use super::kernels::{consensus as truncated, depths};
+use super::motion::Motion;
+use super::observations::Observations;
+use super::refine::{Effort, refine};
+use crate::math::random::CounterRng;
+use gate::Gate;
+use rayon::prelude::*;
+
+/// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
+const INLIER: f64 = 3.0;
+
+/// Starts that are refined, and the least angle between them, degrees.
+const STARTS: usize = 5;
+const APART: f64 = 10.0;
+
+/// The bound of the search in shares of the flow: the spacing of the directions itself leaves residuals.
+const SPACING: f64 = 0.06;
+
+/// What the cut of Tukey's weights is divided by from one refinement to the next.
+const NARROWING: f64 = 1.6;
+
+/// From here on starts are refined on fewer points.
+const MANY: usize = 4000;
+const FEWER: usize = 2000;
+
+/// Rounds towards a fixed set of inliers.
+const ROUNDS: usize = 10;
+
+/// Times that the depth gate closes.
+const GATES: usize = 2;
+
+/// Fewest points that a motion is found from.
+const LEAST: usize = 5;
+
+/// Unknown noise: the first guess, in shares of the median flow; residuals that estimate it, in units of it; their mean square
+/// relative to the variance, for a normal distribution cut there; most rounds.
+const FIRST_SHARE: f64 = 0.05;
+const CUT: f64 = 2.5;
+const CUT_VARIANCE: f64 = 0.911;
+const SIGMA_ROUNDS: usize = 4;
+const SIGMA_STEPS: usize = 50;
+
+/// A motion and the points that obey it.
+#[derive(Debug, Clone)]
+pub(super) struct Consensus {
+    pub motion: Motion,
+    /// Indices among the observations, ascending.
+    pub inliers: Vec<u32>,
+}
+
+/// The motion that most points obey. Where the noise is not known it is estimated, and the points are measured in it afterwards.
+pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    if !scaled.unknown {
+        return in_known_noise(&scaled.observations, rng);
+    }
+    scaled.take(FIRST_SHARE * scaled.observations.median_flow());
+    let mut found = in_known_noise(&scaled.observations, rng)?;
+    for _ in 0..SIGMA_ROUNDS {
+        let sigma = noise(&depths(&scaled.observations, &found.motion).e[..scaled.observations.n]);
+        scaled.take(sigma);
+        found = in_known_noise(&scaled.observations, rng)?;
+        if (sigma - 1.0).abs() < 0.02 {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution".
+fn noise(residuals: &[f64]) -> f64 {
+    let mut sigma = 1.0;
+    for _ in 0..SIGMA_STEPS {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for e in residuals.iter().filter(|e| e.abs() < CUT * sigma) {
+            sum += e * e;
+            count += 1;
+        }
+        if count == 0 || sum <= 0.0 {
+            break;
+        }
+        let next = (sum / (CUT_VARIANCE * count as f64)).sqrt();
+        let settled = (next - sigma).abs() < 1e-6 * sigma;
+        sigma = next;
+        if settled {
+            break;
+        }
+    }
+    sigma
+}
+
+fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
+    let bound = INLIER.max(SPACING * observations.median_flow());
+    let starts = apart(search::search(observations, bound, rng), APART, STARTS);
+    let fewer;
+    let on = if observations.n > MANY {
+        fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
+        &fewer
+    } else {
+        observations
+    };
+    let narrowed: Vec<Motion> = starts.into_par_iter().map(|(start, _)| narrow(on, start, bound)).collect();
+    let best = narrowed
+        .into_iter()
+        .map(|motion| cheaper_sign(on, motion))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(motion, _)| motion)?;
+    let mut found = settle(observations, best)?;
+    let gate = Gate::new(observations);
+    for _ in 0..GATES {
+        let kept = gate.passed(&found);
+        if kept.len() < LEAST {
+            break;
+        }
+        let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
+        let obeying = obeying(observations, &motion);
+        found = Consensus { motion, inliers: obeying };
+    }
+    let inliers = gate.passed(&found);
+    if inliers.len() >= LEAST {
+        found.inliers = inliers;
+    }
+    (found.inliers.len() >= LEAST).then_some(found)
+}
+
+/// Refines with Tukey's weights, which narrow from `bound` to the inliers'.
+fn narrow(observations: &Observations, start: Motion, bound: f64) -> Motion {
+    let (mut motion, mut cut) = (start, bound);
+    while cut > INLIER {
+        motion = refine(observations, motion, Some(cut), Effort::ROUGH).motion;
+        cut /= NARROWING;
+    }
+    refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7 }).motion
+}
+
+/// The sign with the lower truncated cost, and that.
+fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
+    let signs = [motion, motion.reversed()].map(|motion| (motion, truncated(observations, &motion, INLIER)));
+    if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
+}
+
+/// Points within three deviations of their epipolar line and of the half space before the camera.
+fn obeying(observations: &Observations, motion: &Motion) -> Vec<u32> {
+    let seen = depths(observations, motion);
+    let obeys = |&k: &u32| {
+        let k = k as usize;
+        seen.e[k].abs() < INLIER && seen.nu[k] * seen.s2[k].sqrt() > -INLIER
+    };
+    (0..observations.n as u32).filter(obeys).collect()
+}
+
+/// Of many points the minimum is found again with all effort afterwards.
+fn effort(observations: &Observations) -> Effort {
+    if observations.n > MANY { Effort { steps: 15, tolerance: 1e-6 } } else { Effort::FULL }
+}
+
+/// Maximum likelihood on the points that obey, until these stay the same.
+fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
+    let mut motion = start;
+    let mut inliers = obeying(observations, &motion);
+    for _ in 0..ROUNDS {
+        if inliers.len() < LEAST {
+            return None;
+        }
+        motion = refine(&observations.subset(&inliers), motion, None, effort(observations)).motion;
+        let next = obeying(observations, &motion);
+        // Of many points a few always lie on the border.
+        let settled =
+            next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
+        inliers = next;
+        if settled {
+            break;
+        }
+    }
+    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers })
+}

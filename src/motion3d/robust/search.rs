@@ -1,0 +1,115 @@
+//! For every direction the best rotation of many small samples, by a truncated cost.
+
+use super::super::grid::{evaluate, sample};
+use super::super::motion::Motion;
+use super::super::observations::Observations;
+use crate::math::random::CounterRng;
+use crate::simd::{Kernel, Lanes, dispatch};
+use nalgebra::{Matrix3, Vector3};
+
+/// Points that the search looks at, and samples of three of them.
+const SEARCHED: usize = 400;
+const SAMPLES: usize = 100;
+
+/// Lanes are filled up to a multiple of this.
+const ALIGN: usize = 16;
+
+/// Residuals `(c - q . w)` of one direction, in units of noise, as planes `q_x, q_y, q_z, c`.
+struct TruncatedCost<'a> {
+    rows: &'a [Vec<f64>; 4],
+    rotations: &'a [Vector3<f64>],
+    cut2: f64,
+}
+
+impl Kernel<f64> for TruncatedCost<'_> {
+    type Output = Option<(usize, f64)>;
+    /// The rotation with the least `sum min(e^2, cut^2)`, and that.
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> Option<(usize, f64)> {
+        let [x, y, z, c] = self.rows;
+        let cut2 = V::splat(self.cut2);
+        let mut best: Option<(usize, f64)> = None;
+        for (index, w) in self.rotations.iter().enumerate() {
+            let (wx, wy, wz) = (V::splat(w.x), V::splat(w.y), V::splat(w.z));
+            let mut sum = V::zero();
+            for i in (0..c.len()).step_by(V::LANES) {
+                let rest = V::load(&x[i..]).neg_mul_add(wx, V::load(&c[i..]));
+                let rest = V::load(&y[i..]).neg_mul_add(wy, rest);
+                let rest = V::load(&z[i..]).neg_mul_add(wz, rest);
+                sum = sum + (rest * rest).min(cut2);
+            }
+            let mut lanes = [0.0; 16];
+            sum.store(&mut lanes[..V::LANES]);
+            let cost: f64 = lanes[..V::LANES].iter().sum();
+            if best.is_none_or(|(_, least)| cost < least) {
+                best = Some((index, cost));
+            }
+        }
+        best
+    }
+}
+
+/// Three different indices below `n`.
+fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
+    let draw = |place: u64, from: usize| (rng.uniform(place) * from as f64) as usize;
+    // Each is drawn among those left: indices not below an earlier one move up.
+    let first = draw(0, n);
+    let second = draw(1, n - 1);
+    let second = second + usize::from(second >= first);
+    let third = draw(2, n - 2);
+    let (low, high) = (first.min(second), first.max(second));
+    let third = third + usize::from(third >= low);
+    [first, second, third + usize::from(third >= high)]
+}
+
+/// Every direction with its best rotation and cost `sum min(e^2, bound^2)`.
+pub(super) fn search(observations: &Observations, bound: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
+    let chosen = sample(observations.n, SEARCHED, rng.stream(0));
+    let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
+    let draws = rng.stream(1);
+    let triples: Vec<[usize; 3]> = (0..SAMPLES as u64).map(|i| triple(few.len(), draws.stream(i))).collect();
+    let (floor, level, cut2) = (observations.floor, observations.level, bound * bound);
+    evaluate(|u| {
+        let length = few.len().next_multiple_of(ALIGN);
+        let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; length]);
+        for (k, row) in few.iter().enumerate() {
+            let t = row.g * u;
+            let s2 = t.norm_squared();
+            if s2 > floor {
+                let scale = 1.0 / s2.sqrt();
+                for j in 0..3 {
+                    rows[j][k] = (t.y * row.r[(0, j)] - t.x * row.r[(1, j)]) * scale;
+                }
+                rows[3][k] = (t.y * row.f.x - t.x * row.f.y) * scale;
+            }
+        }
+        let rotation = |three: &[usize; 3]| {
+            let a = Matrix3::from_fn(|i, j| rows[j][three[i]]);
+            let b = Vector3::from_fn(|i, _| rows[3][three[i]]);
+            let w = a.try_inverse()? * b;
+            w.iter().all(|value| value.is_finite()).then_some(w)
+        };
+        let known = observations.prior.map(|known| known.rotation);
+        let rotations: Vec<Vector3<f64>> = triples.iter().filter_map(rotation).chain(known).collect();
+        let (best, cost) = dispatch(level, TruncatedCost { rows: &rows, rotations: &rotations, cut2 })?;
+        Some((Motion::of(u, &rotations[best]), cost))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triples_are_different_and_reach_every_index() {
+        let mut seen = [false; 7];
+        for i in 0..200 {
+            let [a, b, c] = triple(7, CounterRng::new(i));
+            assert!(a != b && b != c && a != c);
+            for index in [a, b, c] {
+                seen[index] = true;
+            }
+        }
+        assert!(seen.iter().all(|&seen| seen));
+    }
+}

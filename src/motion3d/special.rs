@@ -1,0 +1,161 @@
+//! Scenes that do not determine a motion: no translation, one plane.
+
+use super::kernels::{Depths, depths};
+use super::motion::Motion;
+use super::observations::Observations;
+use nalgebra::{Matrix3, Vector3};
+
+/// Least squares for the rotation alone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RotationOnly {
+    pub rotation: Vector3<f64>,
+    /// Covariance of `w`, in squared units of noise.
+    pub covariance: Matrix3<f64>,
+    /// Squared residuals, in squared units of noise.
+    pub chi2: f64,
+}
+
+impl RotationOnly {
+    /// The same after all measurements were multiplied by `factor`.
+    pub fn in_units(self, factor: f64) -> Self {
+        let square = factor * factor;
+        Self { covariance: self.covariance / square, chi2: self.chi2 * square, ..self }
+    }
+}
+
+/// Deviations of a standard normal that a share of 0.001 lies beyond.
+const RARE: f64 = 3.0902;
+
+/// How far, in standard deviations, a chi-squared value of `degrees` degrees of freedom lies from its expectation (E. Wilson, M. Hilferty 1931: its cube root is nearly normal).
+pub(super) fn chi2_deviation(chi2: f64, degrees: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees);
+    ((chi2 / degrees).cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// Whether chance gives so large a value or a larger one more often than once in a thousand times.
+pub(super) fn by_chance(chi2: f64, degrees: f64) -> bool {
+    chi2_deviation(chi2, degrees) < RARE
+}
+
+/// The rotation that explains the flow best without a translation; `None` where the points do not determine it.
+pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let plane = |p: usize| observations.plane(p);
+    for (component, first) in [6, 9].into_iter().enumerate() {
+        let r = [plane(first), plane(first + 1), plane(first + 2)];
+        let f = plane(12 + component);
+        let mut sums = [0.0; 9];
+        for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(f) {
+            for (sum, value) in sums.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z, x * f, y * f, z * f]) {
+                *sum += value;
+            }
+        }
+        let [xx, xy, xz, yy, yz, zz, xf, yf, zf] = sums;
+        normal += Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        right += Vector3::new(xf, yf, zf);
+    }
+    if let Some(known) = &observations.prior {
+        normal += known.information;
+        right += known.pull(&Vector3::zeros()).0;
+    }
+    let factor = normal.cholesky()?;
+    let rotation = factor.solve(&right);
+    let mut chi2 = observations.prior.map_or(0.0, |known| known.pull(&rotation).1);
+    for (component, first) in [6, 9].into_iter().enumerate() {
+        let r = [plane(first), plane(first + 1), plane(first + 2)];
+        for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(plane(12 + component)) {
+            let rest = f - (x * rotation.x + y * rotation.y + z * rotation.z);
+            chi2 += rest * rest;
+        }
+    }
+    let covariance = factor.inverse();
+    rotation.iter().chain(covariance.iter()).all(|value| value.is_finite()).then_some(RotationOnly {
+        rotation,
+        covariance,
+        chi2,
+    })
+}
+
+/// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n| u`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Twin {
+    pub motion: Motion,
+    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a known rotation.
+    pub behind: f64,
+}
+
+/// The other motion where the depths at `motion` are one plane as far as their noise lets tell; `None` where they are not, or where both motions are the same.
+///
+/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate.
+pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
+    let Depths { nu, s2, .. } = depths(observations, motion);
+    let (mut normal, mut right, mut used) = (Matrix3::zeros(), Vector3::zeros(), 0usize);
+    let eta = |k: usize| {
+        let [x, y, z] = observations.position[k];
+        Vector3::new(x, y, if observations.spherical { z } else { 1.0 })
+    };
+    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
+        let eta = eta(k);
+        normal += s2[k] * eta * eta.transpose();
+        right += s2[k] * nu[k] * eta;
+        used += 1;
+    }
+    if used < 4 {
+        return None;
+    }
+    let n = normal.cholesky()?.solve(&right);
+    let rest = |k: usize| nu[k] - n.dot(&eta(k));
+    let chi2: f64 = (0..observations.n).map(|k| s2[k] * rest(k).powi(2)).sum();
+    if !by_chance(chi2, (used - 3) as f64) || n.norm() <= 0.0 || bent(observations, &s2, rest) {
+        return None;
+    }
+    let u = motion.u();
+    let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&u)));
+    let behind = |motion: &Motion| -> f64 {
+        let at = depths(observations, motion);
+        let behind: f64 = (0..observations.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
+        behind + observations.prior.map_or(0.0, |known| known.pull(&motion.w()).1)
+    };
+    let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
+    let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });
+    let better = if signs[1].behind < signs[0].behind { signs[1] } else { signs[0] };
+    (angle > distinct).then_some(better)
+}
+
+/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the motion would have it: all depths together tell that with less certainty.
+///
+/// `rest`: what a plane leaves of each depth.
+fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {
+    const TERMS: usize = 9;
+    let terms = if observations.spherical { TERMS } else { 6 };
+    let mut sums = nalgebra::SMatrix::<f64, TERMS, { TERMS + 1 }>::zeros();
+    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
+        let [x, y, z] = observations.position[k];
+        let height = if observations.spherical { z } else { 1.0 };
+        let row = [height, x, y, x * x, x * y, y * y, x * z, y * z, z * z, rest(k)];
+        for i in 0..terms {
+            for j in (i..terms).chain([TERMS]) {
+                sums[(i, j)] += s2[k] * row[i] * row[j];
+            }
+        }
+    }
+    let normal = nalgebra::DMatrix::from_fn(terms, terms, |i, j| sums[(i.min(j), i.max(j))]);
+    let right = nalgebra::DVector::from_fn(terms, |i, _| sums[(i, TERMS)]);
+    // Without a solution (points on a line) nothing is known of the bending.
+    let Some(factor) = normal.cholesky() else { return false };
+    let explained = right.dot(&factor.solve(&right));
+    !by_chance(explained, (terms - 3 + 5) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_are_those_of_chi_squared() {
+        // Upper 0.001 quantiles of chi-squared with 7, 100 and 597 degrees of freedom.
+        for (degrees, quantile) in [(7.0, 24.322), (100.0, 149.449), (597.0, 709.5)] {
+            assert!((chi2_deviation(quantile, degrees) - RARE).abs() < 0.05, "{degrees}");
+        }
+    }
+}

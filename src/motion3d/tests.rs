@@ -1,0 +1,6 @@
+//! Published values, degenerate scenes and promises.
+
+mod degenerate;
+mod estimators;
+mod published;
+pub(super) mod scenes;

@@ -1,0 +1,107 @@
+//! Values that the theory gives without chance.
+
+use super::super::*;
+
+fn near(got: f64, want: f64, name: &str) {
+    assert!((got - want).abs() < 6e-4 * want.abs(), "{name}: {got} is not {want}");
+}
+
+/// 21 x 21 points on [-0.6, 0.6]^2 with the depths called smooth.
+fn grid() -> (Vec<[f64; 2]>, Vec<f64>) {
+    let at = |i: usize| -0.6 + 0.06 * i as f64;
+    let points: Vec<[f64; 2]> = (0..441).map(|k| [at(k % 21), at(k / 21)]).collect();
+    let depth = |p: &[f64; 2]| {
+        let (x, y) = (p[0] / 0.6, p[1] / 0.6);
+        1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
+    };
+    let depths = points.iter().map(depth).collect();
+    (points, depths)
+}
+
+fn bound_of(motion: &Motion) -> MotionBound {
+    let (points, depths) = grid();
+    let flow = vec![[0.0; 2]; points.len()];
+    motion_bound(&Flow::Plane { points: &points, flow: &flow, camera: None }, &Noise::Sigma(0.1), motion, &depths)
+        .unwrap()
+}
+
+#[test]
+fn bound_maximum_likelihood_and_ideal_weights_on_the_grid() {
+    let lateral = bound_of(&Motion::new([1.0, 0.0, 0.0], [0.0; 3]));
+    let oblique = bound_of(&Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]));
+    let want = [
+        (&lateral, [1.632, 1.808, 1.634], [[23.71, 36.13, 14.53], [26.71, 36.13, 14.90], [23.74, 36.13, 14.53]]),
+        (&oblique, [2.840, 4.219, 2.873], [[37.05, 41.41, 21.66], [58.46, 57.31, 27.92], [37.53, 41.85, 21.77]]),
+    ];
+    for (got, directions, rotations) in want {
+        for (i, covariance) in [got.bound, got.likelihood, got.ideal].iter().enumerate() {
+            near(got.direction_std[i], directions[i], "direction");
+            for j in 0..3 {
+                near(1e3 * covariance[2 + j][2 + j].sqrt(), rotations[i][j], "rotation");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_bound_is_that_of_pixels_too() {
+    let camera = Intrinsics::new([[500.0, 2.0, 320.0], [0.0, 480.0, 240.0], [0.0, 0.0, 1.0]]).unwrap();
+    let (points, depths) = grid();
+    let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+    let pixels: Vec<[f64; 2]> = points.iter().map(|&p| camera.to_pixel(p)).collect();
+    let flow = vec![[0.0; 2]; points.len()];
+    // The covariance that is 0.1^2 on the plane: K S K^t.
+    let k = camera.matrix();
+    let s = |i: usize, j: usize| (0..2).map(|m| k[i][m] * k[j][m]).sum::<f64>() * 0.01;
+    let covariances: Vec<f64> = points.iter().flat_map(|_| [s(0, 0), s(0, 1), s(1, 0), s(1, 1)]).collect();
+    let there = Flow::Plane { points: &pixels, flow: &flow, camera: Some(&camera) };
+    let got = motion_bound(&there, &Noise::Covariances(&covariances), &motion, &depths).unwrap();
+    let want = bound_of(&motion);
+    for i in 0..3 {
+        assert!((got.direction_std[i] - want.direction_std[i]).abs() < 1e-9 * want.direction_std[i]);
+    }
+}
+
+/// Section 5 of the paper: translation in the image plane, no rotation, one unknown; (29), (31), the bound and where the lines cross.
+#[test]
+fn one_unknown_has_its_closed_forms() {
+    let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
+    let n = 101.0;
+    let (m1, m2) = (depths.iter().sum::<f64>() / n, depths.iter().map(|v| v * v).sum::<f64>() / n);
+    let s2 = 0.09;
+    near(s2 / (n * m2) + s2 * s2 / (n * m2 * m2), 8.8940e-4, "(29)");
+    near(s2 / (n * m1 * m1), 8.9109e-4, "(31)");
+    near(s2 / (n * m2), 8.2128e-4, "bound");
+    near((m2 * (m2 - m1 * m1)).sqrt() / m1, 0.30369, "crossover");
+    // The same from the general forms, whose psi lies in the image plane once the other unknowns are taken out.
+    let at = vec![[0.0; 2]; 101];
+    let observations = super::super::intake::whiten(
+        &Flow::Plane { points: &at, flow: &at, camera: None },
+        &Noise::Sigma(0.3),
+        Placement::Start,
+    );
+    let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
+    let tangent = super::super::motion::tangents(&motion.u());
+    let mut nu = depths.clone();
+    nu.resize(observations.stride, 0.0);
+    let m = super::super::kernels::information(&observations, &motion, &tangent, &nu);
+    let p = super::super::kernels::equations(&observations, &motion, &tangent, None).p;
+    // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
+    let axis = usize::from(tangent[(1, 1)].abs() > 0.5);
+    let (m, p) = (m[(axis, axis)], p[(axis, axis)]);
+    near(1.0 / m, 8.2128e-4, "bound");
+    near(1.0 / m + p / (m * m), 8.8940e-4, "(17)");
+}
+
+#[test]
+fn points_that_determine_nothing_have_no_bound() {
+    let (points, flow) = (vec![[0.1, 0.2]; 4], vec![[0.0; 2]; 4]);
+    let points = Flow::Plane { points: &points, flow: &flow, camera: None };
+    let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
+    let error = motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0; 4]).unwrap_err();
+    assert!(matches!(error, crate::Error::NotObservable(_)), "{error}");
+    assert!(motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 4]).unwrap_err().to_string().starts_with("sigma: "));
+    assert!(
+        motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: ")
+    );
+}

@@ -1,0 +1,141 @@
+//! The camera's motion from every field, one row each, and pictures of what comes near.
+
+use super::table::{Table, TableTarget};
+use super::{Ending, Sink, Step};
+use crate::error::Result;
+use crate::image::picture::{ContactMark, draw_contacts, grey_picture};
+use crate::io::{NumberedFiles, cell, write_picture};
+use crate::math::Real;
+use crate::motion3d::{
+    FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, Status, estimate_motion,
+    field_points, focus_of_expansion,
+};
+use crate::types::AnyFrame;
+use std::path::PathBuf;
+
+/// Columns of the table.
+const HEADER: [&str; 24] = [
+    "frame",
+    "time_s",
+    "status",
+    "method",
+    "points",
+    "inliers",
+    "u_x",
+    "u_y",
+    "u_z",
+    "direction_std_deg",
+    "w_x",
+    "w_y",
+    "w_z",
+    "w_x_std",
+    "w_y_std",
+    "w_z_std",
+    "foe_x",
+    "foe_y",
+    "foe_x_std",
+    "foe_y_std",
+    "approach_rate",
+    "approach_rate_std",
+    "time_to_contact",
+    "time_to_contact_std",
+];
+
+/// What is estimated from fields and where it goes.
+#[derive(Debug, Clone)]
+pub struct EgomotionPlan {
+    /// The camera.
+    pub camera: Intrinsics,
+    /// Which points of a field are taken.
+    pub field: FieldOptions,
+    /// How the motion is estimated.
+    pub motion: MotionOptions,
+    /// Where rows go.
+    pub target: TableTarget,
+    /// A folder for pictures, `egomotion_000000.png`, ...
+    pub pictures: Option<PathBuf>,
+}
+
+/// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame) and time
+/// to contact (frames) of all points together.
+#[derive(Debug)]
+pub struct Egomotion {
+    plan: EgomotionPlan,
+    table: Table,
+    written: usize,
+    latest: Option<PathBuf>,
+}
+
+impl Egomotion {
+    /// Opens the table.
+    ///
+    /// # Errors
+    /// As [`Table::create`].
+    pub fn open(plan: EgomotionPlan) -> Result<Self> {
+        Ok(Self { table: Table::create(&plan.target, &HEADER)?, plan, written: 0, latest: None })
+    }
+
+    fn row(&mut self, frame: usize, time: Option<f64>, points: &FieldPoints, found: &MotionEstimate) -> Result<()> {
+        let motion = &found.motion;
+        let focus = focus_of_expansion(motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
+        let (at, spread) = focus.unwrap_or(([f64::NAN; 2], [[f64::NAN; 2]; 2]));
+        let (rate, rate_std) = found.approach;
+        let (contact, contact_std) = time_to_contact(rate, rate_std);
+        let mut cells = vec![
+            frame.to_string(),
+            time.map(cell).unwrap_or_default(),
+            found.status.name().to_string(),
+            if found.efficient { "efficient" } else { "ml" }.to_string(),
+            points.points.len().to_string(),
+            found.inliers.iter().filter(|&&inlier| inlier).count().to_string(),
+        ];
+        cells.extend(motion.translation.map(cell));
+        cells.push(cell(found.direction_std));
+        cells.extend(motion.rotation.map(cell));
+        cells.extend(found.rotation_std.map(cell));
+        cells.extend(at.map(cell));
+        cells.extend([spread[0][0].sqrt(), spread[1][1].sqrt(), rate, rate_std, contact, contact_std].map(cell));
+        self.table.row(cells)?;
+        self.table.flush()
+    }
+
+    /// The frame with its points in the colours of their rates of approach, and the focus of expansion.
+    fn draw<T: Real>(&mut self, step: &Step<'_, T>, points: &FieldPoints, found: &MotionEstimate) -> Result<()> {
+        let Some(folder) = &self.plan.pictures else { return Ok(()) };
+        let mut picture = grey_picture(&AnyFrame::F64(step.frame.map(|value| value.to_f64())));
+        let mark = |(k, at): (usize, &[f64; 2])| ContactMark { at: *at, rate: -1.0 / found.time_to_contact[k] };
+        let marks: Vec<ContactMark> =
+            points.points.iter().enumerate().filter(|(k, _)| found.inliers[*k]).map(mark).collect();
+        let focus = focus_of_expansion(&found.motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
+        draw_contacts(&mut picture, &marks, 0.5 * points.spacing, focus);
+        let path = NumberedFiles::create(folder, "egomotion", "png")?.path(step.field.layout.frame_index);
+        write_picture(&path, &picture)?;
+        self.written += 1;
+        self.latest = Some(path);
+        Ok(())
+    }
+}
+
+/// `-1 / rate` with its deviation; infinite without an approach.
+fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
+    if rate == 0.0 { (f64::INFINITY, f64::INFINITY) } else { (-1.0 / rate, deviation / (rate * rate)) }
+}
+
+impl<T: Real> Sink<T> for Egomotion {
+    fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
+        let points = field_points(step.field, &self.plan.field)?;
+        let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
+        let found = estimate_motion(&flow, &Noise::Covariances(&points.covariances), &self.plan.motion)?;
+        self.row(step.field.layout.frame_index, step.time, &points, &found)?;
+        if found.status == Status::TooFewPoints { Ok(()) } else { self.draw(step, &points, &found) }
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        self.table.finish(ending)
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        let (tables, table) = self.table.files();
+        (tables + self.written, table.or_else(|| self.latest.clone()))
+    }
+}

@@ -1,0 +1,90 @@
+//! `egomotion`: from frames to a table and pictures.
+
+use super::support::{Place, names, temporary};
+use image::{GrayImage, Luma};
+
+/// Growth of the picture from one frame to the next: the plane comes nearer by 1/1.02 of its distance.
+const GROWTH: f64 = 1.02;
+
+/// Frames of a textured plane that is approached, 128 x 96 px.
+fn approach(place: &Place, folder: &str, count: i32) {
+    std::fs::create_dir(place.path(folder)).unwrap();
+    let wave =
+        |k: f64, x: f64, y: f64| (0.11 + 0.3 * (k * 1.7).sin().abs()) * ((k * 2.3).cos() * x + (k * 2.3).sin() * y) + k;
+    for frame in 0..count {
+        let scale = GROWTH.powi(frame);
+        let picture = GrayImage::from_fn(128, 96, |x, y| {
+            let (x, y) = ((f64::from(x) - 64.0) / scale, (f64::from(y) - 48.0) / scale);
+            let shade: f64 = (1..25).map(|k| 12.0 * wave(f64::from(k), x, y).sin()).sum();
+            Luma([(128.0 + shade).clamp(0.0, 255.0).round() as u8])
+        });
+        picture.save(place.path(&format!("{folder}/{frame:02}.png"))).unwrap();
+    }
+}
+
+fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    reader.deserialize().map(|row| row.unwrap()).collect()
+}
+
+#[test]
+fn an_approach_gives_direction_focus_and_time_to_contact() {
+    let place = Place::new();
+    approach(&place, "frames", 4);
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --no-robust -o motion.csv --picture pictures --json";
+    let summary = place.good(line).json();
+    assert_eq!((&summary["command"], &summary["fields"]), (&"egomotion".into(), &3.into()));
+    let rows = rows(&std::fs::read_to_string(place.path("motion.csv")).unwrap());
+    assert_eq!(rows.len(), 3);
+    for row in &rows {
+        let number = |name: &str| row[name].parse::<f64>().unwrap();
+        assert_eq!(row["status"], "ok", "{row:?}");
+        assert!(number("u_z") < -0.98, "{row:?}");
+        assert!((number("foe_x") - 64.0).abs() < 12.0 && (number("foe_y") - 48.0).abs() < 12.0, "{row:?}");
+        let contact = 1.0 / (GROWTH.ln());
+        assert!((number("time_to_contact") / contact - 1.0).abs() < 0.1, "{row:?}");
+        assert!(number("time_to_contact_std") > 0.0 && number("direction_std_deg") > 0.0);
+    }
+    let pictures = names(&place.path("pictures"));
+    assert_eq!(pictures.len(), 3);
+    let picture = image::open(place.path("pictures").join(&pictures[0])).unwrap().to_rgb8();
+    assert!(picture.pixels().any(|p| p[0] > p[2]), "what comes nearer is red");
+    assert!(temporary(&place.path("")).is_empty());
+    // A second run does not write over the first one.
+    let again = place.line(line);
+    assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
+    place.good(&format!("{line} --force"));
+}
+
+#[test]
+fn rows_go_to_standard_output_and_do_not_depend_on_threads() {
+    let place = Place::new();
+    approach(&place, "frames", 3);
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --spacing 10 --quiet";
+    let one = place.good(&format!("{line} --threads 1")).out;
+    assert_eq!(one, place.good(&format!("{line} --threads 3")).out);
+    assert_eq!(rows(&one).len(), 2);
+    let ml = rows(&place.good(&format!("{line} --estimator ml --max-points 40")).out);
+    assert!(ml[0]["method"] == "ml" && ml[0]["points"].parse::<usize>().unwrap() <= 40);
+}
+
+#[test]
+fn mistakes_are_told_before_any_work() {
+    let place = Place::new();
+    approach(&place, "frames", 2);
+    for (line, word) in [
+        ("egomotion frames --intrinsics 1,2,3", "intrinsics"),
+        ("egomotion frames --intrinsics 0,1,2,3", "K:"),
+        ("egomotion frames", "--intrinsics"),
+        ("egomotion frames --intrinsics no.txt", "no.txt"),
+        ("egomotion frames --intrinsics 120,120,64,48 --estimator best", "estimator"),
+        ("egomotion frames --intrinsics 120,120,64,48 --no-covariance", "no_covariance"),
+        ("egomotion frames --intrinsics 120,120,64,48 --json", "output"),
+        ("egomotion frames --intrinsics 120,120,64,48 -o rows.txt", "output"),
+        ("egomotion frames --intrinsics 120,120,64,48 --method horn-schunck --pair", "method"),
+    ] {
+        let ended = place.line(line);
+        assert!(ended.code != 0 && ended.err.contains(word), "{line}: {} {}", ended.code, ended.err);
+        assert_eq!(names(&place.path("")), ["frames"], "{line}");
+    }
+}

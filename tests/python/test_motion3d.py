@@ -1,0 +1,311 @@
+"""Rigid 3-D motion: published values, agreement with a plain reference, conventions, statuses, errors."""
+
+import pickle
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import jacoflow
+from jacoflow import motion3d
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import motion3d_rivals as rivals
+import motion3d_scenes as scenes
+import motion3d_scores as scores
+
+U, W = scenes.motion("oblique")
+
+
+def scene(n=300, sigma=0.01, seed=0, depth="uniform", name="oblique"):
+    return scenes.differential(depth, name, n, sigma, seed)
+
+
+def start(make, **options):
+    return motion3d.estimate_motion(make.points, make.flow, **{"sigma": make.sigma, "placement": "start", **options})
+
+
+def test_published_values():
+    flow = motion3d.predict_flow([[0.2, -0.1]], U, W, [0.8])
+    assert_allclose(flow, [[0.337146, 0.206645]], atol=5e-7)
+    around = motion3d.predict_flow([[0.48, -0.6, 0.64]], U, W, [0.8], projection="sphere")
+    assert_allclose(around, [[0.222428, 0.472128, 0.275799]], atol=5e-7)
+    for row in scores.fixed_values():
+        assert row["got"] == pytest.approx(row["asked"], rel=6e-4), row
+
+
+def test_the_bound_is_that_of_a_plain_computation():
+    """M and P written out from (18)."""
+    make = scene(60)
+    g, r = scenes.rows(make.points)
+    t = g @ U
+    s = np.linalg.norm(t, axis=1)
+    p = np.stack([t[:, 1], -t[:, 0]], 1) / s[:, None]
+    bound = motion3d.motion_bound(make.points, U, W, make.depths, sigma=0.1)
+    along = np.einsum("ni,nij,aj->na", p, g, bound.tangent)
+    d = np.concatenate([make.depths[:, None] * along, np.einsum("ni,nij->nj", p, r)], 1)
+    m, noise = d.T @ d, np.zeros((5, 5))
+    noise[:2, :2] = (along / s[:, None] ** 2).T @ along
+    inverse = np.linalg.inv(m)
+    assert_allclose(bound.crlb, 0.01 * inverse, rtol=1e-9)
+    assert_allclose(bound.ml_covariance, 0.01 * inverse + 1e-4 * inverse @ noise @ inverse, rtol=1e-9)
+    ideal = np.zeros((5, 5))
+    ideal[:2, :2] = ((np.einsum("ni,ij,nj->n", d, inverse, d) / s**2)[:, None] * along).T @ along
+    assert_allclose(bound.ideal_covariance, 0.01 * inverse + 1e-4 * inverse @ ideal @ inverse, rtol=1e-9)
+    assert_allclose(bound.direction_std[0], np.degrees(np.sqrt(np.trace(bound.crlb[:2, :2]))))
+
+
+def test_theory_is_met():
+    """A few of the published rows, with few trials: ML follows (17) and not the bound; section 5's variances."""
+    row = next(row for row in scores.theory(40) if row["case"].startswith("uniform oblique n=5000"))
+    assert row["ML rms"] == pytest.approx(row["ML rms asked"], rel=0.35)
+    assert row["m(CRLB)"] > 1.5 > row["m(17)"] > 0.6
+    for row in scores.one_unknown(1000):
+        for name in ("ML / (29)", "ones / (31)", "shrunk / its formula"):
+            if row["n"] == 1000:
+                assert row[name] == pytest.approx(1, abs=0.15), row
+
+
+@pytest.mark.parametrize("case", [4, 7, 8])
+def test_smoothed_weights_are_worth_their_while(case, monkeypatch):
+    """1.3 times below maximum likelihood on the same noise, and near the published figure."""
+    monkeypatch.setattr(scores, "PRACTICAL", scores.PRACTICAL[case : case + 1])
+    row = scores.practical(40)[0]
+    assert row["ML / efficient"] > 1.3
+    assert row["efficient"] == pytest.approx(row["efficient asked"], rel=0.3)
+    assert row["coverage"] >= 0.8
+
+
+def test_two_views_in_pixels_beat_the_published_figures(monkeypatch):
+    monkeypatch.setattr(scores, "PIXELS", (scores.PIXELS[7], scores.PIXELS[10]))
+    for row in scores.pixels(8):
+        ours = float(str(row["efficient"]).split(" / ")[1])
+        assert ours < 1.6, row
+        assert row["right labels %"] > 97
+        if rivals.cv2 is not None:
+            assert ours < float(str(row["USAC_MAGSAC"]).split(" / ")[1])
+
+
+def test_two_views_in_pixels_make_an_essential_matrix():
+    make = scenes.two_views("uniform", "oblique", 0.0, 4, 3)
+    found = motion3d.estimate_motion(make.points, make.flow, scenes.K)
+    eta = np.column_stack([make.points, np.ones(1000)]) @ np.linalg.inv(scenes.K).T
+    after = np.column_stack([make.points + make.flow, np.ones(1000)]) @ np.linalg.inv(scenes.K).T
+    essential = motion3d.essential_matrix(found)
+    assert np.abs(np.einsum("ni,ij,nj->n", after, essential, eta)).max() < 2e-5
+    turn, mean = scenes.exponential(make.w)
+    shift = mean @ make.u
+    cross = np.array([[0, -shift[2], shift[1]], [shift[2], 0, -shift[0]], [-shift[1], shift[0], 0]])
+    assert_allclose(essential, cross @ turn, atol=2e-3)
+
+
+def test_intrinsics_with_skew_change_nothing_but_the_unit():
+    make = scene(200, 0.002)
+    camera = np.array([[500.0, 7.0, 310.0], [0.0, 420.0, 255.0], [0.0, 0.0, 1.0]])
+    pixels = np.column_stack([make.points, np.ones(200)]) @ camera.T
+    flow = make.flow @ camera[:2, :2].T
+    covariance = np.broadcast_to(make.sigma**2 * camera[:2, :2] @ camera[:2, :2].T, (200, 2, 2))
+    there = motion3d.estimate_motion(pixels[:, :2], flow, camera, cov=covariance, placement="start")
+    here = start(make)
+    assert_allclose(there.translation, here.translation, atol=1e-9)
+    assert_allclose(there.covariance, here.covariance, rtol=1e-6, atol=1e-14)
+    assert_allclose(there.inv_depth, here.inv_depth, rtol=1e-6)
+
+
+def test_covariances_are_worth_their_while():
+    """Aperture-like noise: deviations of 0.2 and 0.04 along random axes."""
+    errors = {"one sigma": [], "covariances": []}
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        make = scene(500, 0.0, seed, "smooth")
+        angle = rng.uniform(0, np.pi, 500)
+        axes = np.stack([np.stack([np.cos(angle), -np.sin(angle)], -1), np.stack([np.sin(angle), np.cos(angle)], -1)], 1)
+        noise = np.einsum("nij,nj->ni", axes, rng.normal(size=(500, 2)) * [0.2, 0.04])
+        covariance = np.einsum("nij,j,nkj->nik", axes, np.array([0.2, 0.04]) ** 2, axes)
+        flow = make.flow + noise
+        errors["one sigma"].append(scores.angle(motion3d.estimate_motion(make.points, flow, placement="start").translation, U))
+        errors["covariances"].append(scores.angle(motion3d.estimate_motion(make.points, flow, cov=covariance, placement="start").translation, U))
+    assert scores.rms(errors["covariances"]) < 0.6 * scores.rms(errors["one sigma"])
+
+
+def test_unknown_noise_is_estimated():
+    make = scenes.two_views("uniform", "oblique", 0.3, 4, 5, outliers=0.4)
+    found = motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True)
+    assert found.sigma == pytest.approx(0.3, rel=0.15)
+    assert np.mean(found.inliers == make.inliers) > 0.97
+    assert motion3d.estimate_motion(make.points[make.inliers], make.flow[make.inliers], scenes.K).sigma == pytest.approx(0.3, rel=0.1)
+
+
+@pytest.mark.parametrize("robust", [False, True])
+def test_arrays_of_any_kind(robust):
+    make = scene(200, 0.01, 3)
+    usual = start(make, robust=robust)
+    wide = np.full((400, 4), np.nan)
+    wide[::2, ::2] = make.points
+    strided = motion3d.estimate_motion(wide[::2, ::2], np.asfortranarray(make.flow), sigma=0.01, placement="start", robust=robust)
+    assert_array_equal(strided.translation, usual.translation)
+    lists = motion3d.estimate_motion(make.points.tolist(), make.flow.tolist(), sigma=0.01, placement="start", robust=robust)
+    assert_array_equal(lists.inv_depth, usual.inv_depth)
+    single = motion3d.estimate_motion(make.points.astype("f4"), make.flow.astype("f4"), sigma=0.01, placement="start", robust=robust)
+    assert_allclose(single.translation, usual.translation, atol=1e-3)
+    again = start(make, robust=robust, threads=1)
+    assert_array_equal(again.covariance, start(make, robust=robust, threads=3).covariance)
+    assert_array_equal(make.points, scene(200, 0.01, 3).points)
+
+
+def test_results_pickle_and_tell_the_camera():
+    found = start(scene())
+    copy = pickle.loads(pickle.dumps(found))
+    assert_array_equal(copy.inv_depth, found.inv_depth)
+    assert copy.status == found.status == "ok" and found.method_used == "efficient" and not found.fell_back
+    assert_array_equal(found.camera_translation, -found.translation)
+    assert found.direction_std == pytest.approx(np.degrees(np.sqrt(np.trace(found.covariance[:2, :2]))))
+    assert_allclose(found.tangent @ found.translation, 0, atol=1e-12)
+    assert start(scene(20)).method_used == "ml"
+
+
+def test_time_to_contact_and_focus():
+    make = scene(800, 0.003, 2, "smooth", "forward")
+    turned = start(scenes.Scene(make.points, make.flow, make.depths, make.u, make.w, make.sigma))
+    truth = -1 / (make.depths * make.u[2])
+    contact, deviation = motion3d.time_to_contact(turned), motion3d.time_to_contact_std(turned)
+    assert np.median(np.abs(contact - truth) / deviation) < 1.2
+    assert np.mean(np.abs(contact - truth) < 3 * deviation) > 0.9
+    focus, covariance = motion3d.focus_of_expansion(turned)
+    off = focus - make.u[:2] / make.u[2]
+    assert off @ np.linalg.solve(covariance, off) < 20
+    camera = np.array([[500.0, 0, 320], [0, 400, 240], [0, 0, 1]])
+    there, spread = motion3d.focus_of_expansion(turned, camera)
+    assert_allclose(there, [500 * focus[0] + 320, 400 * focus[1] + 240])
+    assert_allclose(spread, covariance * np.outer([500, 400], [500, 400]))
+    mean = -1 / turned.approach_rate
+    assert mean == pytest.approx(-1 / np.average(make.depths * make.u[2]), rel=0.2)
+
+
+def test_the_focus_is_nowhere_in_sideways_motion():
+    found = start(scene(sigma=1e-7, name="lateral"), method="ml")
+    sideways = motion3d.MotionEstimate(**{**vars(found), "translation": np.array([1.0, 0.0, 0.0])})
+    assert motion3d.focus_of_expansion(sideways) is None
+
+
+def test_degenerate_scenes_have_their_status():
+    make = scene()
+    few = motion3d.estimate_motion(make.points[:4], make.flow[:4])
+    assert few.status == "too_few_points" and np.isnan(few.translation).all() and few.inv_depth.shape == (4,)
+    assert motion3d.estimate_motion(np.empty((0, 2)), np.empty((0, 2))).status == "too_few_points"
+    rng = np.random.default_rng(0)
+    _, r = scenes.rows(make.points)
+    turning = motion3d.estimate_motion(make.points, r @ W + rng.normal(0, 0.01, (300, 2)), sigma=0.01, placement="start")
+    assert turning.status == "rotation_only" and np.isnan(turning.translation).all()
+    assert_array_equal(turning.inv_depth, 0)
+    assert np.isinf(turning.time_to_contact).all()
+    assert_allclose(turning.rotation, W, atol=4 * turning.rotation_std.max())
+    plane = 0.9 + 0.3 * make.points[:, 0] - 0.2 * make.points[:, 1]
+    g, _ = scenes.rows(make.points)
+    flat = motion3d.estimate_motion(make.points, plane[:, None] * (g @ U) + r @ W + rng.normal(0, 0.005, (300, 2)), sigma=0.005, placement="start")
+    assert flat.status == "ambiguous" and len(flat.alternatives) >= 1
+    both = [flat.translation, flat.alternatives[0].translation]
+    normal = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
+    for truth in (U, normal):
+        assert min(scores.angle(u, truth) for u in both) < 4
+
+
+def test_six_numbers_a_patch():
+    make, jacobian, covariance = scenes.patches("oblique", 60, 60, 0.05, 1, 0.3)
+    found = motion3d.estimate_motion(make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, placement="start")
+    bound = motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, cov=covariance, jacobian=True)
+    flow = motion3d.motion_bound(make.points, make.u, make.w, make.depths[:, 0], scenes.K, cov=covariance[:, :2, :2])
+    assert found.status == "ok" and scores.angle(found.translation, make.u) < 4 * bound.direction_std[0]
+    assert bound.direction_std[0] < flow.direction_std[0]
+    assert found.surface_slopes.shape == (60, 2) and found.inv_depth.shape == (60,)
+    two = [0, 1]
+    pair = motion3d.estimate_motion(make.points[two], make.flow[two], scenes.K, cov=covariance[two], jacobian=jacobian[two], placement="start")
+    assert pair.status == "few_points"
+    one = motion3d.estimate_motion(make.points[:1], make.flow[:1], scenes.K, cov=covariance[:1], jacobian=jacobian[:1])
+    assert one.status == "too_few_points"
+
+
+def test_two_exact_patches_are_enough():
+    """Flow alone needs five points."""
+    errors = []
+    for seed in range(5):
+        make, jacobian, covariance = scenes.patches("oblique", 2, 60, 1e-7, seed, 0.5)
+        found = motion3d.estimate_motion(make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, placement="start")
+        nearest = min([found.translation, *(a.translation for a in found.alternatives)], key=lambda u: scores.angle(u, make.u))
+        errors.append(scores.angle(nearest, make.u))
+    assert np.median(errors) < 1e-2
+
+
+MISTAKES = [
+    ({"points": np.zeros((5, 3))}, "points"),
+    ({"flow": np.zeros((4, 2))}, "flow"),
+    ({"K": np.eye(2)}, "K"),
+    ({"K": np.zeros((3, 3))}, "K"),
+    ({"sigma": 0.0}, "sigma"),
+    ({"sigma": -1.0}, "sigma"),
+    ({"cov": np.ones((5, 2))}, "cov"),
+    ({"sigma": 1.0, "cov": np.ones((5, 2, 2))}, "cov"),
+    ({"method": "best"}, "method"),
+    ({"placement": "end"}, "placement"),
+    ({"projection": "cube"}, "projection"),
+    ({"smoother": "spline"}, "smoother"),
+    ({"seed": -1}, "seed"),
+    ({"threads": 0}, "threads"),
+    ({"weight_inv_depth": np.ones(3)}, "weight_inv_depth"),
+    ({"initial": (np.ones(2), np.zeros(3))}, "initial"),
+    ({"initial": (np.ones(3), np.zeros(3)), "robust": True}, "initial"),
+    ({"rotation_prior": (np.zeros(3), np.zeros((3, 3)))}, "rotation_prior"),
+    ({"rotation_prior": (np.zeros(2), np.eye(3))}, "rotation_prior"),
+    ({"rotation_prior": (np.zeros(3), np.eye(2))}, "rotation_prior"),
+    ({"jacobian": np.zeros((5, 2, 2))}, "cov"),
+    ({"jacobian": np.zeros((5, 2)), "cov": np.zeros((5, 6, 6))}, "jacobian"),
+    ({"jacobian": np.zeros((5, 2, 2)), "sigma": 1.0}, "sigma"),
+]
+
+
+@pytest.mark.parametrize(("change", "word"), MISTAKES, ids=[f"{word}-{k}" for k, (_, word) in enumerate(MISTAKES)])
+def test_mistakes_are_refused_by_name(change, word):
+    arguments = {"points": np.zeros((5, 2)), "flow": np.zeros((5, 2)), **change}
+    with pytest.raises(ValueError, match=rf"^{word}\b"):
+        motion3d.estimate_motion(**arguments)
+
+
+def test_arguments_of_another_kind_are_refused():
+    with pytest.raises(TypeError, match=r"^points\b"):
+        motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
+    with pytest.raises(TypeError, match=r"^sigma\b"):
+        motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
+    with pytest.raises(jacoflow.NotObservableError):
+        motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6), sigma=0.1)
+    with pytest.raises(ValueError, match="^sigma"):
+        motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6))
+
+
+def textured_drive():
+    """Two frames of a textured plane that comes nearer, f = 120 px."""
+    rng = np.random.default_rng(1)
+    height, width = 96, 128
+    y, x = np.mgrid[:height, :width].astype(float)
+    waves = [(rng.uniform(0.05, 0.45, 2), rng.uniform(0, 6.28), rng.uniform(4, 14)) for _ in range(40)]
+    shade = lambda x, y: 128 + sum(a * np.sin(k[0] * x + k[1] * y + p) for k, p, a in waves)
+    scale = 1.02
+    return [shade(x, y), shade(64 + (x - 64) / scale, 48 + (y - 48) / scale)], np.array([[120.0, 0, 64], [0, 120, 48], [0, 0, 1]])
+
+
+def test_a_field_gives_the_motion_and_the_points():
+    frames, camera = textured_drive()
+    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    found, points = motion3d.estimate_field_motion(field, camera, robust=False)
+    assert len(points) == len(found.inv_depth) >= 12
+    assert np.diff(np.unique(points[:, 0])).min() >= max(8, 4 * field.correlation_length) - 1
+    assert found.approach_rate == pytest.approx(-0.02, rel=0.15)
+    coarse, fewer = motion3d.estimate_field_motion(field, camera, max_points=9)
+    assert len(fewer) <= 9 and coarse.inv_depth.shape == (len(fewer),)
+    _, inside = motion3d.estimate_field_motion(field, camera, region=(20, 10, 60, 50), spacing=8, robust=False)
+    assert (inside >= [20, 10]).all() and (inside < [80, 60]).all() and len(inside) > 20
+    with pytest.raises(ValueError, match="^field"):
+        motion3d.estimate_field_motion(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), camera)
+    with pytest.raises(ValueError, match="^spacing"):
+        motion3d.estimate_field_motion(field, camera, spacing=-1)
