@@ -52,15 +52,6 @@ impl Default for Coupling {
     }
 }
 
-/// What a call of [`couple`] did.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Coupled<T> {
-    /// Root mean square over the sites of the change of the flow, px.
-    pub change: f64,
-    /// `s^2`, the energy that data were weighed by, grey^2.
-    pub noise: T,
-}
-
 /// Memory that calls of [`couple`] share.
 #[derive(Debug, Default)]
 pub(super) struct CoupleScratch<T> {
@@ -73,7 +64,7 @@ pub(super) struct CoupleScratch<T> {
 }
 
 /// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the sites. `s^2` is the median over the sites with
-/// data of their residual energy, at least `floor` (positive), grey^2.
+/// data of their residual energy, at least `floor` (positive), grey^2. Returns the root mean square over the sites of the change of the flow, px.
 ///
 /// The flow ends no further than 2 px from where it was. Where neither data nor neighbours say anything the motion stays. The result is the same for any
 /// number of threads; call it inside [`Threads::install`](crate::parallel::Threads::install).
@@ -84,16 +75,16 @@ pub(super) fn couple<T: SimdReal>(
     coupling: &Coupling,
     floor: T,
     scratch: &mut CoupleScratch<T>,
-) -> Coupled<T> {
+) -> f64 {
     let noise = typical_energy(data, floor, &mut scratch.energies);
     let (width, height) = (motion.width, motion.height);
     if width == 0 || height == 0 || coupling.sweeps == 0 {
-        return Coupled { change: 0.0, noise };
+        return 0.0;
     }
     keep_start(motion, &mut scratch.start);
     let bonds = visit::Bonds { data, noise, coupling };
     wave::sweep(level, &bonds, motion, &mut scratch.weights, &mut scratch.rings);
-    Coupled { change: limit(level, motion, &scratch.start), noise }
+    limit(level, motion, &scratch.start)
 }
 
 /// The upper median of the energies of sites with data, at least `floor`.

@@ -1,9 +1,8 @@
 //! From level to level: the iterations.
 
 use super::candidates::Comparison;
-use super::couple::{CoupleScratch, Coupled, Coupling, couple};
+use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
-use super::gaps::Gaps;
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::{Space, Workspace};
@@ -123,23 +122,18 @@ impl Plan {
         let (width, height) = sites(pyramid.levels()[to].size);
         let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
-        let mut step =
-            Step { plan: self, compared, term, data: &mut data, scratch, scale: None, noise: T::from_f64(0.0) };
+        let mut step = Step { plan: self, compared, term, data: &mut data, scratch, scale: None };
         let mut old = space.planes(0, 0, MOTION);
-        let mut above = None;
         for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(to).rev() {
             if k + 1 < limits.len() {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
-                above = Some(copy(space, &old));
             }
             for _ in 0..limit.most {
                 let change = step.advance(level, &limit.coupling, (&mut motion, &mut old));
                 // On the finest level what is left to do is for the coarser ones to have done.
                 let is_calm = || k == self.last || moving(&old, &motion) < OBJECT;
-                let is_done = change <= limit.settled && is_calm();
-                step.fill_gaps(level, above.as_ref(), (&mut motion, &mut old));
-                if is_done {
+                if change <= limit.settled && is_calm() {
                     break;
                 }
             }
@@ -149,11 +143,9 @@ impl Plan {
                 let comparison = Comparison { simd: self.simd, level, compared, scale: step.scale, pool, space };
                 if comparison.take_better(&mut motion, &loose, ANOTHER) {
                     step.repeat(JOINED, level, &limit.coupling, (&mut motion, &mut old));
-                    step.fill_gaps(level, above.as_ref(), (&mut motion, &mut old));
                 }
                 space.keep(loose);
             }
-            above.take().into_iter().for_each(|planes| space.keep(planes));
         }
         space.keep(old);
         let scale = step.scale;
@@ -213,8 +205,6 @@ struct Step<'a, T> {
     scratch: &'a mut CoupleScratch<T>,
     /// Standard deviation of what brightness changes by along the motion, from the iteration before.
     scale: Option<T>,
-    /// Typical residual energy of the last iteration, grey^2.
-    noise: T,
 }
 
 impl<T: SimdReal> Step<'_, T> {
@@ -243,19 +233,6 @@ impl<T: SimdReal> Step<'_, T> {
         }
     }
 
-    /// Gives places without texture what was corrected around them since the motion came from `above`, if it did. The `old` planes are free to be used.
-    fn fill_gaps(
-        &self,
-        level: &PyramidLevel<T>,
-        above: Option<&Planes<T>>,
-        (motion, old): (&mut Planes<T>, &mut Planes<T>),
-    ) {
-        let Some(above) = above else { return };
-        let Some(gaps) = Gaps::find(self.data, self.noise) else { return };
-        finer(self.plan.simd, above, level.size, old);
-        gaps.continue_corrections(old, motion);
-    }
-
     /// Linearises about `motion` and moves it; by how much, px (root mean square).
     fn iterate(&mut self, level: &PyramidLevel<T>, coupling: &Coupling, motion: &mut Planes<T>) -> f64 {
         let views = level.views(self.compared);
@@ -263,9 +240,7 @@ impl<T: SimdReal> Step<'_, T> {
         self.scale = self.spread(residuals);
         let contrast = self.plan.range.contrast;
         let floor = T::from_f64((LEAST_NOISE * contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
-        let Coupled { change, noise } = couple(self.plan.simd, self.data, motion, coupling, floor, self.scratch);
-        self.noise = noise;
-        change
+        couple(self.plan.simd, self.data, motion, coupling, floor, self.scratch)
     }
 
     /// Robust standard deviation of residuals whose magnitudes these are.

@@ -14,7 +14,6 @@ mod couple;
 mod covariance;
 mod data;
 mod descend;
-mod gaps;
 mod grid;
 mod levels;
 mod locking;

@@ -10,7 +10,7 @@ const QUADRATIC: Coupling = Coupling { break_at: f64::INFINITY, ..ROBUST };
 fn run<T: SimdReal>(level: Level, data: &Planes<T>, motion: &mut Planes<T>, c: &Coupling) -> f64 {
     let floor = T::from_f64(0.05);
     let before = motion.clone();
-    let change = couple(level, data, motion, c, floor, &mut CoupleScratch::default()).change;
+    let change = couple(level, data, motion, c, floor, &mut CoupleScratch::default());
     if change < LONGEST / 10.0 {
         let squares = (0..2).flat_map(|k| (0..motion.height).map(move |y| (k, y))).map(|(k, y)| {
             let pairs = motion.line(k, y).iter().zip(before.line(k, y));

@@ -78,12 +78,8 @@ pub(super) fn covariance<T: SimdReal>(
     let seen = seen::Seen::new(&estimate.data, (width, height));
     let data = (&estimate.data, &seen);
     let noise = noise::Noise::new(evidence, data, energy, carried);
-    let textured = known(&noise, &estimate.data, (width, height));
-    let known = textured.as_ref().unwrap_or(&seen);
-    let left = |noise: &noise::Noise<'_, T>, (x, y): (usize, usize)| {
-        let left = noise.at(x, y);
-        if textured.is_some() { left.continued() } else { left }
-    };
+    let known = known(&noise, &estimate.data, (width, height));
+    let known = known.as_ref().unwrap_or(&seen);
     let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, known);
     let change = estimate.change.as_ref();
     let change = change
@@ -95,9 +91,9 @@ pub(super) fn covariance<T: SimdReal>(
         let at = (n % width, n / width);
         let motion = bending::motion_at(&estimate.motion, at);
         let mut noisy = [0.0; ENTRIES];
-        add_noise(&mut noisy, &left(&noise, at), [FLOW_NOISE[kind], SLOPE_NOISE]);
+        add_noise(&mut noisy, &noise.at(at.0, at.1), [FLOW_NOISE[kind], SLOPE_NOISE]);
         if let Some(change) = &change {
-            add_noise(&mut noisy, &left(change, at), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
+            add_noise(&mut noisy, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
         }
         extrapolation.add(place, known.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
         add_locking(place, &motion, &estimate.locking);

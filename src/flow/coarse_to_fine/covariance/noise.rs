@@ -98,21 +98,6 @@ pub(super) struct Noise<'a, T> {
     seen: &'a Seen,
 }
 
-/// Most that noise is taken for where others tell the motion, as variances: of the flow, px^2, and of the slopes.
-const MOST: [f64; 2] = [1.0, 0.01];
-
-impl Left {
-    /// The same where there may be no texture at all, but motion is continued from where there is: not without bounds. What the continuation may miss is told by others.
-    pub fn continued(mut self) -> Self {
-        let [a, b, c] = self.density;
-        let strongest = 0.5 * (a + c) + (0.5 * (a - c)).hypot(b);
-        let bounded = |share: f64, most: f64| share.min(most / strongest.max(f64::MIN_POSITIVE));
-        self.flow = bounded(self.flow, MOST[0]);
-        self.slopes = self.slopes.map(|share| bounded(share, MOST[1]));
-        self
-    }
-}
-
 impl<'a, T: SimdReal> Noise<'a, T> {
     /// For the estimate's last data term.
     pub fn new(evidence: &'a Evidence<T>, (data, seen): (&Planes<T>, &'a Seen), energy: Energy, is_pair: bool) -> Self {
