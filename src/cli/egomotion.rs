@@ -7,11 +7,11 @@ use super::flow::prepare;
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess_for};
 use super::report::Report;
-use super::run::{Telling, input_details, report, run_pipeline};
+use super::run::{Telling, input_details, report, run_pipeline, table_target};
 use crate::error::{Error, Result};
 use crate::flow::{Estimator, Method};
 use crate::motion3d::{self, FieldOptions, Intrinsics, MotionOptions};
-use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline, TableTarget, check_target};
+use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline};
 use crate::simd::SimdReal;
 use clap::Args;
 use serde_json::{Value, json};
@@ -118,25 +118,9 @@ impl EgomotionCommand {
                 threads,
                 ..MotionOptions::default()
             },
-            target: self.target()?,
+            target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
             pictures: self.picture.clone(),
         })
-    }
-
-    fn target(&self) -> Result<TableTarget> {
-        match &self.output {
-            Some(path) if path != Path::new("-") => {
-                if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("csv")) {
-                    return Err(Error::argument("output", "a .csv file, or - for standard output", path.display()));
-                }
-                check_target(path, self.force)?;
-                Ok(TableTarget::File(path.clone()))
-            }
-            _ if self.tell.json => {
-                Err(Error::argument("output", "a .csv file, as --json needs standard output", "standard output"))
-            }
-            _ => Ok(TableTarget::StandardOutput),
-        }
     }
 
     fn run<T: SimdReal>(&self, opened: Opened, estimator: Estimator, sink: Egomotion, watch: &Watch) -> Result<Report> {

@@ -5,15 +5,15 @@ use super::flow::prepare;
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess_for};
 use super::report::Report;
-use super::run::{Telling, input_details, report, run_pipeline};
+use super::run::{Telling, input_details, report, run_pipeline, table_target};
 use crate::error::{Error, Result};
 use crate::flow::derived::Quantity;
 use crate::flow::{Estimator, Method};
-use crate::pipeline::{EstimatorStage, Measurements, Pipeline, TableTarget, check_target};
+use crate::pipeline::{EstimatorStage, Measurements, Pipeline};
 use crate::simd::SimdReal;
 use clap::Args;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Options of `measure`.
 #[derive(Debug, Args)]
@@ -55,7 +55,7 @@ impl MeasureCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let quantities: Vec<Quantity> =
             self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
-        let target = self.target()?;
+        let target = table_target(self.output.as_deref(), self.force, self.tell.json)?;
         let opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
             let expected = format!("frames per second, for {}", quantity.name());
@@ -74,22 +74,6 @@ impl MeasureCommand {
             self.run::<f64>(opened, prepared.estimator, sink, watch)
         } else {
             self.run::<f32>(opened, prepared.estimator, sink, watch)
-        }
-    }
-
-    fn target(&self) -> Result<TableTarget> {
-        match &self.output {
-            Some(path) if path != Path::new("-") => {
-                if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("csv")) {
-                    return Err(Error::argument("output", "a .csv file, or - for standard output", path.display()));
-                }
-                check_target(path, self.force)?;
-                Ok(TableTarget::File(path.clone()))
-            }
-            _ if self.tell.json => {
-                Err(Error::argument("output", "a .csv file, as --json needs standard output", "standard output"))
-            }
-            _ => Ok(TableTarget::StandardOutput),
         }
     }
 

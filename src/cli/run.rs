@@ -5,9 +5,9 @@ use super::interrupt::Watch;
 use super::open::Opened;
 use super::progress::Bar;
 use super::report::{Report, tell};
-use crate::error::Error;
+use crate::error::{Error, Result};
 use crate::io::FrameSource;
-use crate::pipeline::{Pipeline, Summary, is_folder};
+use crate::pipeline::{Pipeline, Summary, TableTarget, check_target, is_folder};
 use crate::simd::SimdReal;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -92,4 +92,19 @@ pub fn input_details(opened: &Opened, sites: &SiteArguments) -> Value {
         "fps": opened.numbering.rate,
         "region": sites.region.map(|r| [r.x, r.y, r.width, r.height]), "stride": sites.stride.unwrap_or(1),
     })
+}
+
+/// Where a table goes: to a `.csv` file that may be written, or to standard output, unless the report as JSON goes there.
+pub(super) fn table_target(output: Option<&Path>, force: bool, json: bool) -> Result<TableTarget> {
+    match output {
+        Some(path) if path != Path::new("-") => {
+            if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("csv")) {
+                return Err(Error::argument("output", "a .csv file, or - for standard output", path.display()));
+            }
+            check_target(path, force)?;
+            Ok(TableTarget::File(path.to_path_buf()))
+        }
+        _ if json => Err(Error::argument("output", "a .csv file, as --json needs standard output", "standard output")),
+        _ => Ok(TableTarget::StandardOutput),
+    }
 }

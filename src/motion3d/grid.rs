@@ -6,6 +6,7 @@ use super::observations::Observations;
 use crate::math::random::CounterRng;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Directions on the half sphere, about 8 degrees apart.
 const DIRECTIONS: usize = 300;
@@ -69,15 +70,18 @@ pub(super) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -
     kept
 }
 
+/// All points, or as many random ones as a search sees.
+fn searched(observations: &Observations, rng: CounterRng) -> Cow<'_, Observations> {
+    if observations.n > SEARCHED {
+        Cow::Owned(observations.subset(&sample(observations.n, SEARCHED, rng)))
+    } else {
+        Cow::Borrowed(observations)
+    }
+}
+
 /// The most promising motions of the whole half sphere, by `J` on at most 1000 random points.
 pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
-    let fewer;
-    let searched = if observations.n > SEARCHED {
-        fewer = observations.subset(&sample(observations.n, SEARCHED, rng));
-        &fewer
-    } else {
-        observations
-    };
+    let searched = &*searched(observations, rng);
     let found = evaluate(|u| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     apart(found, APART, STARTS).into_iter().map(|(motion, _)| motion).collect()
 }
@@ -89,13 +93,7 @@ const PLAUSIBLE: f64 = 11.07;
 ///
 /// A covariance is that of one minimum; a valley of minima shows here.
 pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion], rng: CounterRng) -> f64 {
-    let fewer;
-    let searched = if observations.n > SEARCHED {
-        fewer = observations.subset(&sample(observations.n, SEARCHED, rng));
-        &fewer
-    } else {
-        observations
-    };
+    let searched = &*searched(observations, rng);
     let cost = |u: &Vector3<f64>| {
         let (w, cost) = best_rotation(searched, u)?;
         let behind = |u: &Vector3<f64>| {
