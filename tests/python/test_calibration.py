@@ -153,6 +153,32 @@ def test_the_covariance_is_positive_definite_and_grows_with_noise_and_without_te
     assert deviations[0][1] > 3 * deviations[0][0]
 
 
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+@pytest.mark.parametrize("half", [20, 40])
+def test_what_coarse_levels_leave_beneath_areas_without_texture_is_told(preset, half):
+    """A flat square of 40 or 80 px in a scene that moves as a whole: nothing bends, but only coarse levels see into it. Without their part the intervals of the flow held .2 to .55, those of
+    the divergence .4 along its rim. They may be wide, but not so wide that nothing is told: most deviations stay below a third of the motion."""
+    y, x = np.indices((256, 256)).astype(float)
+    distance = np.maximum(abs(x - 128), abs(y - 128))
+    inside, rim = distance < half - 6, (distance > half - 6) & (distance < half + 12)
+    held, slopes, wide = [], [], []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        smooth = gaussian_filter(rng.standard_normal(x.shape), 1.5, mode="wrap")
+        first = 128 + 35 * smooth / smooth.std() * np.clip((distance - half) / 3 + 0.5, 0, 1)
+        u, v = 1.7 + 0.6 * seed, -0.9 + 0.5 * seed
+        second = map_coordinates(first, [y - v, x - u], order=3, mode="wrap")
+        pair = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in (first, second)]
+        field = jacoflow.estimate(pair, preset=preset)
+        held += [np.mean((abs(field.u - u) < 1.96 * field.std("u"))[inside]), np.mean((abs(field.v - v) < 1.96 * field.std("v"))[inside])]
+        slopes.append(np.mean((abs(field.divergence) < 1.96 * field.std("divergence"))[rim]))
+        wide.append(np.median(field.std("u")[inside]))
+    print(preset, half, np.round(held, 2), np.round(slopes, 2), np.round(wide, 3))
+    assert np.mean(held) > 0.88 and min(held) > 0.6
+    assert np.mean(slopes) > 0.88
+    assert np.median(wide) < 0.6
+
+
 @pytest.mark.parametrize(("preset", "least"), [("fast", 0.7), ("balanced", 0.75)])
 def test_areas_without_texture_are_told_as_uncertain_as_they_are(preset, least):
     """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the intervals say how far motion departs from that. Without this they hold the truth

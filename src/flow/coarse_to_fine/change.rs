@@ -35,7 +35,7 @@ pub(super) fn settle<T: SimdReal>(
 ) -> Option<Evidence<T>> {
     let (simd, last) = (plan.simd, plan.last);
     workspace.give_back_large();
-    let Found { motion: mut ahead, data, scale } = plan.ahead(workspace, &coupled);
+    let Found { motion: mut ahead, data, scale, .. } = plan.ahead(workspace, &coupled);
     let Workspace { pyramid, pool, space, .. } = &*workspace;
     let locking = Locking::measure(simd, (&pyramid.levels()[last], Compared::Ahead), &ahead, scale);
     locking.correct(simd, &mut ahead);

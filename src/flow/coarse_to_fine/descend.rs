@@ -40,6 +40,8 @@ pub(super) struct Plan {
     pub range: Range,
     /// The finest level there is to work on.
     pub last: usize,
+    /// Whether [`Plan::all`] keeps what it finds on the way.
+    pub traced: bool,
 }
 
 /// What there is on the finest level.
@@ -51,6 +53,8 @@ pub(super) struct Found<T> {
     pub data: Planes<T>,
     /// Standard deviation of the residual.
     pub scale: Option<T>,
+    /// The coupled motion on each coarser level, the finest of them first, where it was to be kept.
+    pub above: Vec<Planes<T>>,
 }
 
 impl Plan {
@@ -97,7 +101,7 @@ impl Plan {
         let coarsest = levels.len() - 1;
         let limits: Vec<_> = (0..=coarsest).map(|k| self.effort.on_level(k, levels[k].size, k == coarsest)).collect();
         let start = raised(workspace, motion, level..=coarsest);
-        let Found { motion: above, data, scale } =
+        let Found { motion: above, data, scale, .. } =
             self.descend(workspace, Compared::Ahead, start, (&limits, level + 1));
         let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[level];
@@ -124,6 +128,7 @@ impl Plan {
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
         let mut step = Step { plan: self, compared, term, data: &mut data, scratch, scale: None };
         let mut old = space.planes(0, 0, MOTION);
+        let mut above = Vec::new();
         for (k, (level, limit)) in pyramid.levels().iter().zip(limits).enumerate().skip(to).rev() {
             if k + 1 < limits.len() {
                 std::mem::swap(&mut motion, &mut old);
@@ -146,12 +151,15 @@ impl Plan {
                 }
                 space.keep(loose);
             }
+            if self.traced && k > to {
+                above.insert(0, copy(space, &motion));
+            }
         }
         space.keep(old);
         let scale = step.scale;
         let summary = summary(space, &data);
         space.keep_small(data);
-        Found { motion, data: summary, scale }
+        Found { motion, data: summary, scale, above }
     }
 }
 

@@ -49,7 +49,7 @@ impl CoarseToFine {
             let effort = self.options.preset.effort(frames.len());
             let levels = (self.options.levels, effort.last);
             let last = workspace.pyramid.fill(simd, frames, range, common.mask.as_ref(), levels);
-            let plan = Plan { simd, effort, range, last };
+            let plan = Plan { simd, effort, range, last, traced: field.covariance.is_some() };
             let mut estimate = estimate(&plan, frames.len() == 3, self.options.central, &mut workspace);
             let spread = spread(&mut estimate, &mut workspace, (frames, common), field);
             output::fill((&estimate, spread), &workspace.space, frames, common, field);
@@ -92,14 +92,15 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
         evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
         // The data term and what refinement leaves would be the most memory there ever is.
         workspace.give_back_large();
-        let better = plan.again(workspace, &motion);
+        let mut better = plan.again(workspace, &motion);
+        better.above = found.above;
         for planes in [motion, found.motion, found.data] {
             workspace.space.keep(planes);
         }
         found = better;
         (motion, evidence) = refine(simd, &workspace.space, &Refinement::again(), &found.motion, &found.data);
     }
-    let Found { motion: mut coupled, data, scale } = found;
+    let Found { motion: mut coupled, data, scale, above } = found;
     let locking = Locking::measure(simd, (&workspace.pyramid.levels()[plan.last], Compared::All), &motion, scale);
     locking.correct(simd, &mut motion);
     let mut change = None;
@@ -109,7 +110,7 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
     } else {
         workspace.space.keep(coupled);
     }
-    Estimate { level: plan.last, motion, data, range: plan.range, evidence, change, locking }
+    Estimate { level: plan.last, motion, data, range: plan.range, evidence, change, locking, above }
 }
 
 /// The motion on the sites of the finest level worked on, and what it rests on.
@@ -129,19 +130,22 @@ pub(super) struct Estimate<T> {
     pub change: Option<Evidence<T>>,
     /// How the motion was drawn before it was corrected.
     pub locking: Locking,
+    /// The motion as it was on each coarser level, the finest of them first; none without covariance.
+    pub above: Vec<Planes<T>>,
 }
 
 impl<T: SimdReal> Estimate<T> {
     /// All its planes.
     fn planes_mut(&mut self) -> impl Iterator<Item = &mut Planes<T>> {
         let evidence = self.evidence.iter_mut().chain(&mut self.change).flat_map(Evidence::planes_mut);
-        evidence.chain([&mut self.motion, &mut self.data])
+        evidence.chain(&mut self.above).chain([&mut self.motion, &mut self.data])
     }
 
     /// Gives back what only covariance and diagnostics rest on.
     fn forget_evidence(&mut self, workspace: &Workspace<T>) {
         let evidence = self.evidence.take().into_iter().chain(self.change.take());
-        evidence.flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
+        let above = std::mem::take(&mut self.above);
+        evidence.flat_map(Evidence::into_planes).chain(above).for_each(|planes| workspace.space.keep(planes));
     }
 
     /// Gives its memory back.

@@ -9,7 +9,7 @@
 
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, PITCH, SPACING, TERMS};
-use super::Entries;
+use super::{Entries, soften};
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
@@ -168,25 +168,6 @@ fn gaussians(sigma: f64, (places, spacing): (usize, usize), sites: usize) -> Vec
             weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect()
         })
         .collect()
-}
-
-/// Binomial means over three by three places.
-fn soften(places: &mut [Entries], (width, height): (usize, usize)) {
-    let mean = |a: &Entries, b: &Entries, c: &Entries| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
-    let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
-    for row in places.chunks_exact_mut(width.max(1)) {
-        let old = row.to_vec();
-        for (x, out) in row.iter_mut().enumerate() {
-            let [a, b, c] = around(x, width);
-            *out = mean(&old[a], &old[b], &old[c]);
-        }
-    }
-    let old = places.to_vec();
-    for (n, out) in places.iter_mut().enumerate() {
-        let (x, y) = (n % width, n / width);
-        let [a, b, c] = around(y, height).map(|y| &old[y * width + x]);
-        *out = mean(a, b, c);
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
 //! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it is that of other sites, continued; the field itself tells how fast it departs from that.
+//! * *Inheritance* ([`inherited`]). Where there is no texture, finer levels do not correct what coarser ones left.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
 //! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
 //!
@@ -14,6 +15,7 @@
 mod bending;
 mod carry;
 mod extrapolation;
+mod inherited;
 mod noise;
 mod seen;
 mod spread;
@@ -81,6 +83,8 @@ pub(super) fn covariance<T: SimdReal>(
     let known = known(&noise, &estimate.data, (width, height));
     let known = known.as_ref().unwrap_or(&seen);
     let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, known);
+    let inherited = inherited::Inherited::new(&estimate.motion, &estimate.above, known);
+    let inherited = inherited.at_places([&seen, known], (width, height));
     let change = estimate.change.as_ref();
     let change = change
         .map(|evidence| noise::Noise::new(evidence, data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise));
@@ -96,6 +100,7 @@ pub(super) fn covariance<T: SimdReal>(
             add_noise(&mut noisy, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
         }
         extrapolation.add(place, known.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
+        add_unrelated(place, inherited[n]);
         add_locking(place, &motion, &estimate.locking);
         if !carried {
             add_acceleration(place, &motion);
@@ -133,6 +138,30 @@ fn add_noise(place: &mut Entries, left: &noise::Left, [flow, slopes]: [f64; 2]) 
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             place[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];
         }
+    }
+}
+
+/// Binomial means over three by three places.
+fn soften<const N: usize>(places: &mut [[f64; N]], (width, height): (usize, usize)) {
+    let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
+    let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
+    for row in places.chunks_exact_mut(width.max(1)) {
+        let old = row.to_vec();
+        for (x, out) in row.iter_mut().enumerate() {
+            *out = mean(around(x, width).map(|x| &old[x]));
+        }
+    }
+    let old = places.to_vec();
+    for (n, out) in places.iter_mut().enumerate() {
+        let (x, y) = (n % width, n / width);
+        *out = mean(around(y, height).map(|y| &old[y * width + x]));
+    }
+}
+
+/// Adds variances of the flow and of the slopes, the same in all directions.
+fn add_unrelated(place: &mut Entries, [flow, slopes]: [f64; 2]) {
+    for k in 0..6 {
+        place[upper(k, k)] += if k < 2 { flow } else { slopes };
     }
 }
 
