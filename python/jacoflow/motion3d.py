@@ -199,16 +199,22 @@ def estimate_motion(
     ValueError
         For shapes and values that do not fit; each message names the argument.
     """
-    first, turn = (None, None) if initial is None else initial
-    known, spread = (None, None) if rotation_prior is None else rotation_prior
-    parameters = {
-        "K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "method": method, "robust": bool(robust), "placement": placement,
-        "smoother": smoother, "weight_inv_depth": weight_inv_depth, "initial_translation": first, "initial_rotation": turn, "prior_rotation": known, "prior_covariance": spread, "seed": seed, "threads": threads,
-        "six": jacobian is not None,
+    layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
+    options = {
+        "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "seed": seed, "threads": threads,
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
-    return _estimate(_motion3d_estimate(points, flow, parameters))
+    return _estimate(_motion3d_estimate(points, flow, layout, options))
+
+
+def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLike, ArrayLike] | None:
+    if given is None:
+        return None
+    if len(given) != 2:
+        raise ValueError(f"{name}: expected two arrays, got {len(given)}")
+    return given[0], given[1]
 
 
 def _sigma(sigma: float | None) -> float | None:
@@ -233,12 +239,10 @@ def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
 
 
 def _estimate(told: dict[str, Any]) -> MotionEstimate:
-    rivals = zip(told.pop("alternative_translations"), told.pop("alternative_rotations"), told.pop("alternative_costs").tolist(), strict=True)
-    ml = {name: told.pop(f"ml_{name}") for name in ("translation", "rotation", "covariance", "tangent", "cost")}
     surfaces = told.pop("surfaces")
-    alternatives = tuple(MotionSolution(u, w, cost=cost) for u, w, cost in rivals)
-    slopes = surfaces[:, 1:] if len(surfaces) else None
-    return MotionEstimate(**told, surface_slopes=slopes, alternatives=alternatives, ml=MotionSolution(**ml))
+    told["alternatives"] = tuple(MotionSolution(**other) for other in told["alternatives"])
+    told["ml"] = MotionSolution(**told["ml"])
+    return MotionEstimate(**told, surface_slopes=surfaces[:, 1:] if len(surfaces) else None)
 
 
 def motion_bound(
@@ -281,8 +285,8 @@ def motion_bound(
     NotObservableError
         When the points do not determine the motion.
     """
-    parameters = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": bool(jacobian)}
-    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, parameters))
+    layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": bool(jacobian)}
+    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, layout))
 
 
 def time_to_contact(result: MotionEstimate) -> Array:
