@@ -1,11 +1,10 @@
 //! The whole way from flow to motion.
 
 use super::covariance::plugged;
-use super::efficient::{Efficient, WeightDepths, efficient, unsolved};
+use super::efficient::{WeightDepths, unsolved};
 use super::intake::whiten;
-use super::kernels::{depths, equations};
 use super::likelihood::{Candidate, choose, different, minima};
-use super::motion::{Motion, tangents};
+use super::motion::Motion;
 use super::observations::{Known, Observations};
 use super::options::{Flow, Method, MotionOptions, Noise};
 use super::refine::{Effort, Minimum, refine};
@@ -14,6 +13,7 @@ use super::result::{Alternative, MotionEstimate, Status};
 use super::robust::{self, Consensus, Rival};
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
+use super::trial::{Trial, close, smoothed};
 use super::verdict::{Evidence, judge};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
@@ -24,6 +24,9 @@ const LEAST: usize = 5;
 
 /// Number of points from which on [`Method::Auto`] smooths depths.
 const SMOOTHED: usize = 30;
+
+/// Noise of flow that is exactly zero, in its unit.
+const LEAST_NOISE: f64 = 1e-100;
 
 /// Residuals below this share of the flow are rounding.
 const ROUNDING: f64 = 1e-11;
@@ -72,7 +75,7 @@ pub(super) struct Scaled {
 impl Scaled {
     /// Takes `sigma` in units of the present noise to be the noise.
     pub fn take(&mut self, sigma: f64) {
-        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(f64::MIN_POSITIVE);
+        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(LEAST_NOISE);
         if sigma.is_finite() {
             self.observations.rescale(1.0 / sigma);
             self.sigma *= sigma;
@@ -93,6 +96,14 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
+    if scaled.unknown
+        && options.robust
+        && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
+    {
+        // Nothing is left that noise could be estimated from.
+        let all = &scaled.observations;
+        return rotation_report(flow, all, all, &rotation, 0.0);
+    }
     if options.robust {
         let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
@@ -182,7 +193,8 @@ fn on(
     };
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
-    let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let trial = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let (improved, undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
     let unknown = low && improved.is_none();
     let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
     if unknown {
@@ -194,7 +206,7 @@ fn on(
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
         .collect();
-    let evidence = Evidence { likelihood: (*chosen.motion(), chosen.minimum.equations.behind), low, rivals };
+    let evidence = Evidence { likelihood: (*chosen.motion(), chosen.minimum.equations.behind), low, rivals, undecided };
     judge(&inliers, &mut solution, &evidence, rng.stream(4));
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
@@ -206,45 +218,6 @@ fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())
 }
 
-/// Most minima from which smoothed weights are tried.
-const TRIED: usize = 3;
-
-/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a
-/// motion is easier to judge.
-fn smoothed(
-    inliers: &Observations,
-    options: &MotionOptions,
-    candidates: &[Candidate],
-    made: Option<DepthSmoother>,
-    smoother: impl FnOnce() -> DepthSmoother,
-) -> Option<Efficient> {
-    let starts = close(candidates, inliers.n);
-    if let Some(depths) = &options.weight_depths {
-        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
-        nu.resize(inliers.stride, 0.0);
-        return starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
-    }
-    let mut smoother = made.unwrap_or_else(smoother);
-    let mut found: Vec<Efficient> = starts
-        .iter()
-        .take(TRIED)
-        .filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
-        .collect();
-    if found.len() > 1 {
-        let cost = |found: &Efficient| cost_of(inliers, &smoother, &found.motion);
-        let costs: Vec<f64> = found.iter().map(cost).collect();
-        let best = (1..found.len()).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
-        return Some(found.swap_remove(best));
-    }
-    found.pop()
-}
-
-/// `J`, the depths behind the camera and the depth map's roughness.
-fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
-    let at = equations(observations, motion, &tangents(&motion.u()), None);
-    at.cost + at.behind + smoother.cost(&depths(observations, motion))
-}
-
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
 fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
     let before = scaled.sigma;
@@ -252,11 +225,4 @@ fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 
     let factor = before / scaled.sigma;
     inliers.rescale(factor);
     factor
-}
-
-/// The chosen minimum and those that come close to it.
-fn close(candidates: &[Candidate], n: usize) -> &[Candidate] {
-    let limit = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
-    let count = candidates.iter().take_while(|other| other.cost < limit).count();
-    &candidates[..count.max(1)]
 }

@@ -53,6 +53,7 @@ mod smoothing;
 mod special;
 #[cfg(test)]
 mod tests;
+mod trial;
 mod verdict;
 
 pub use bound::{MotionBound, motion_bound};

@@ -19,6 +19,10 @@ const FEW: usize = 12;
 /// Standard deviation of the direction, degrees, beyond which it is not known.
 const WIDE: f64 = 20.0;
 
+/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are [`SPACING`] degrees apart, half of that from one of them.
+const FAR: f64 = 4.0;
+const SPACING: f64 = 4.0;
+
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
 
@@ -33,6 +37,8 @@ pub(super) struct Evidence<'a> {
     pub low: bool,
     /// Motions that other points obey.
     pub rivals: &'a [Rival],
+    /// Another solution that is about as likely.
+    pub undecided: Option<Alternative>,
 }
 
 /// Finds what else could be true: the status, and the other motions among the alternatives.
@@ -44,6 +50,10 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
+    }
+    if let Some(other) = evidence.undecided {
+        solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
+        solution.alternatives.insert(0, other);
     }
     let others = evidence.rivals.iter().filter(|rival| rival.others);
     for (place, rival) in others.clone().enumerate() {
@@ -59,7 +69,7 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
         Status::Ambiguous
     } else if deviation.is_nan() || deviation > WIDE || far(inliers, &motions, deviation, rng.stream(1)) {
         Status::IllConditioned
-    } else if turned.is_some() {
+    } else if turned.is_some() || evidence.undecided.is_some() {
         Status::Ambiguous
     } else if evidence.low {
         Status::LowSnr
@@ -80,9 +90,9 @@ fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct
     true
 }
 
-/// Whether directions beyond three deviations and [`WIDE`] degrees explain the flow as well as the estimate.
+/// Whether directions explain the flow as well as the estimate that are farther than its covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
 fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
-    reach_of_plausible(inliers, motions, rng) > WIDE + 3.0 * deviation
+    reach_of_plausible(inliers, motions, rng) > FAR * deviation + SPACING
 }
 
 /// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.

@@ -13,7 +13,7 @@ pub fn flat<const D: usize>(rows: &[[f64; D]]) -> Vec<f64> {
 }
 
 /// A vector of space.
-pub fn vector<'py>(py: Python<'py>, values: [f64; 3]) -> PyResult<Array<'py>> {
+pub fn vector(py: Python<'_>, values: [f64; 3]) -> PyResult<Array<'_>> {
     arrays::owned(py, &[3], values.to_vec())
 }
 
