@@ -106,7 +106,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
     if options.robust {
         let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
-            return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inliers = scaled.observations.subset(&kept.inliers);
         on(flow, options, &mut scaled, inliers, Some(&kept), rng)
@@ -163,7 +163,7 @@ fn on(
     };
     let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
     let Some(best) = found.first().map(|minimum| minimum.equations.cost) else {
-        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+        return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
     };
     if scaled.unknown {
         if let Some(rotation) = turning_in_unknown_noise(&inliers, best) {

@@ -195,14 +195,8 @@ fn points_that_do_not_tell_of_all_unknowns() {
             for given in [Noise::Sigma(if sigma > 0.0 { sigma } else { 1e-6 }), Noise::Unknown] {
                 for robust in [false, true] {
                     let found = estimate_motion(&flow, &given, &MotionOptions { robust, ..options() }).unwrap();
-                    let told = matches!(
-                        found.status,
-                        Status::IllConditioned
-                            | Status::Ambiguous
-                            | Status::LowSnr
-                            | Status::TooFewPoints
-                            | Status::RotationOnly
-                    );
+                    let told = matches!(found.status, Status::IllConditioned | Status::Ambiguous);
+                    let told = told || *name == "a field of a millionth" && found.status == Status::RotationOnly;
                     assert!(
                         told,
                         "{name}, sigma {sigma}, {given:?}, robust {robust}: {:?} {}",
