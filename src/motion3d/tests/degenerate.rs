@@ -170,7 +170,7 @@ fn the_opposite_motion_is_told_where_depths_do_not_exclude_it() {
 }
 
 /// Places by number.
-type Layout = Box<dyn Fn(u64) -> [f64; 2]>;
+type Layout<'a> = Box<dyn Fn(u64) -> [f64; 2] + 'a>;
 
 /// Points at one place, at two, on a line through the epipole: fewer than five unknowns are told of, whatever noise seems to add.
 #[test]
@@ -178,7 +178,7 @@ fn points_that_do_not_tell_of_all_unknowns() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
     let epipole = [0.8, 0.2 / 0.75];
     let rng = CounterRng::new(3);
-    let layouts: [(&str, Layout); 4] = [
+    let layouts: [(&str, Layout<'_>); 4] = [
         ("one place", Box::new(|_| [0.2, -0.1])),
         ("two places", Box::new(|k| [[0.2, -0.1], [-0.3, 0.4]][k as usize % 2])),
         ("a line through the epipole", Box::new(|k| [0, 1].map(|i| rng.uniform(k) * epipole[i] * 0.8))),
