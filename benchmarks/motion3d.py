@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import motion3d_fixed as fixed
 import motion3d_recordings as recordings
 import motion3d_rivals as rivals
 import motion3d_scenes as scenes
@@ -54,7 +55,7 @@ def sections(only: list[str] | None = None, factor: float = 1.0, data: Path | No
     out: dict[str, list[Row]] = {}
     wanted = lambda name: only is None or name in only
     if wanted("fixed"):
-        out["3-D motion: values without chance"] = scores.fixed_values()
+        out["3-D motion: values without chance"] = fixed.fixed_values()
     for name, (title, table, trials) in scores.TABLES.items():
         if wanted(name):
             out[f"3-D motion: {title}"] = table(max(4, round(factor * trials)))

@@ -65,7 +65,7 @@ fn the_predicted_deviation_is_met_where_the_design_says_so() {
     let design = Flow::Plane { points: &points, flow: &still, camera: None };
     let bound = motion_bound(&design, &Noise::Sigma(0.05), &oblique(), &depths).unwrap();
     let mut square = 0.0;
-    let trials = 60;
+    let trials = 200;
     for trial in 0..trials {
         let noise = rng.stream(100 + trial);
         let flow: Vec<[f64; 2]> = points
@@ -87,7 +87,7 @@ fn the_predicted_deviation_is_met_where_the_design_says_so() {
         square += found.motion.angle_to(&oblique()).to_degrees().powi(2);
     }
     let rms = (square / f64::from(trials as u32)).sqrt();
-    assert!((rms / bound.direction_std[1] - 1.0).abs() < 0.25, "{rms} {:?}", bound.direction_std);
+    assert!((rms / bound.direction_std[1] - 1.0).abs() < 0.2, "{rms} {:?}", bound.direction_std);
 }
 
 /// Patches with affine flow in pixels and what it was made from.

@@ -70,8 +70,8 @@ class MotionEstimate:
     rotation: Array
     """Rotation rate `w` (3,) of the scene relative to the camera, rad/frame."""
     status: Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
-    """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (a plane: see
-    `alternatives`); "ill_conditioned" (`direction_std` above 20 degrees); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
+    """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (another
+    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees, or directions beyond 4 deviations explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
     method_used: Literal["ml", "efficient"]
     """Whose result `translation` and `rotation` are (no unit)."""
     fell_back: bool
@@ -199,16 +199,22 @@ def estimate_motion(
     ValueError
         For shapes and values that do not fit; each message names the argument.
     """
-    first, turn = (None, None) if initial is None else initial
-    known, spread = (None, None) if rotation_prior is None else rotation_prior
-    parameters = {
-        "K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "method": method, "robust": bool(robust), "placement": placement,
-        "smoother": smoother, "weight_inv_depth": weight_inv_depth, "initial_translation": first, "initial_rotation": turn, "prior_rotation": known, "prior_covariance": spread, "seed": seed, "threads": threads,
-        "six": jacobian is not None,
+    layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
+    options = {
+        "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "seed": seed, "threads": threads,
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
-    return _estimate(_motion3d_estimate(points, flow, parameters))
+    return _estimate(_motion3d_estimate(points, flow, layout, options))
+
+
+def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLike, ArrayLike] | None:
+    if given is None:
+        return None
+    if len(given) != 2:
+        raise ValueError(f"{name}: expected two arrays, got {len(given)}")
+    return given[0], given[1]
 
 
 def _sigma(sigma: float | None) -> float | None:
@@ -233,12 +239,10 @@ def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
 
 
 def _estimate(told: dict[str, Any]) -> MotionEstimate:
-    rivals = zip(told.pop("alternative_translations"), told.pop("alternative_rotations"), told.pop("alternative_costs").tolist(), strict=True)
-    ml = {name: told.pop(f"ml_{name}") for name in ("translation", "rotation", "covariance", "tangent", "cost")}
     surfaces = told.pop("surfaces")
-    alternatives = tuple(MotionSolution(u, w, cost=cost) for u, w, cost in rivals)
-    slopes = surfaces[:, 1:] if len(surfaces) else None
-    return MotionEstimate(**told, surface_slopes=slopes, alternatives=alternatives, ml=MotionSolution(**ml))
+    told["alternatives"] = tuple(MotionSolution(**other) for other in told["alternatives"])
+    told["ml"] = MotionSolution(**told["ml"])
+    return MotionEstimate(**told, surface_slopes=surfaces[:, 1:] if len(surfaces) else None)
 
 
 def motion_bound(
@@ -281,8 +285,8 @@ def motion_bound(
     NotObservableError
         When the points do not determine the motion.
     """
-    parameters = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": bool(jacobian)}
-    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, parameters))
+    layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": bool(jacobian)}
+    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, layout))
 
 
 def time_to_contact(result: MotionEstimate) -> Array:
@@ -335,7 +339,15 @@ def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:
 
 
 def estimate_field_motion(
-    field: FlowField, K: ArrayLike, *, spacing: float | None = None, max_points: int | None = None, region: Sequence[int] | None = None, **options: Any
+    field: FlowField,
+    K: ArrayLike,
+    *,
+    spacing: float | None = None,
+    max_points: int | None = None,
+    region: Sequence[int] | None = None,
+    scene: MotionEstimate | None = None,
+    turning: float = 1e-3,
+    **options: Any,
 ) -> tuple[MotionEstimate, Array]:
     """The rigid motion of the scene in a flow field, from its own covariances, and the points (N, 2), px, that it was estimated from.
 
@@ -351,13 +363,29 @@ def estimate_field_motion(
         Most points; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
         Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
+    scene : MotionEstimate or None
+        The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the thing's in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
+    turning : float, rad/frame
+        Standard deviation of the thing's own rotation, per axis; it matters only with `scene`.
     **options
         Those of `estimate_motion`; `robust` is True unless told otherwise.
 
     Raises
     ------
     ValueError
-        For a stack, a field without a covariance or with a `pixel_pitch`, and for options that do not fit.
+        For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, and for options that do not fit.
     """
     points, flow, covariances, _ = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
+    if scene is not None:
+        options["rotation_prior"] = _turned(scene, turning)
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, **options}), points
+
+
+def _turned(scene: MotionEstimate, turning: float) -> tuple[Array, Array]:
+    """What the scene's rotation says about that of a thing in it."""
+    if not turning > 0:
+        raise ValueError(f"turning: expected a positive number, got {turning!r}")
+    spread = scene.covariance[2:, 2:] + turning**2 * np.eye(3)
+    if not np.isfinite(spread).all():
+        raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
+    return scene.rotation, spread

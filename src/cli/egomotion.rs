@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
     after_help = "Rows: frame, time_s, status, method, points, inliers, direction u (the scene's relative to the camera; the camera moves by -u) with its deviation in\n\
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
     contact (frames) with their deviations. Points are taken as far apart as the errors of the flow go together.\n\
-    status: ok, few_points, too_few_points, rotation_only, ambiguous (a plane), ill_conditioned, low_snr.\n\
+    status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own.\n\n\
     Examples:\n  \
     jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/\n  \

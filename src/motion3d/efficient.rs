@@ -1,11 +1,11 @@
 //! The estimating equation with smoothed depths in its weights.
 
 use super::covariance::{Matrix5, direction_spread, inverse};
-use super::kernels::{Bilinear, depths, information};
+use super::kernels::{Bilinear, depths, information, slope};
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
-use super::smoothing::DepthSmoother;
-use nalgebra::Matrix2x3;
+use super::smoothing::{DepthSmoother, Smoothed};
+use nalgebra::{Matrix2x3, SymmetricEigen};
 
 /// Times that depths are smoothed and the equation is solved.
 const ROUNDS: usize = 3;
@@ -25,7 +25,7 @@ const STEP: f64 = 1e-11;
 pub(super) struct Efficient {
     pub motion: Motion,
     pub tangent: Matrix2x3<f64>,
-    /// `(sum W^t W)^-1`.
+    /// What the weights make of it, see [`sandwich`].
     pub covariance: Matrix5,
     /// The depths in the weights, `nu~`; as long as the planes.
     pub smooth: Vec<f64>,
@@ -40,6 +40,15 @@ pub(super) enum WeightDepths<'a> {
     Known(Vec<f64>),
 }
 
+impl WeightDepths<'_> {
+    fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
+        match self {
+            Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
+            Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()] },
+        }
+    }
+}
+
 /// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.
 ///
 /// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes no bias.
@@ -49,14 +58,13 @@ pub(super) fn efficient(
     mut weights: WeightDepths<'_>,
 ) -> Option<Efficient> {
     let mut motion = *start;
-    let mut smooth = Vec::new();
-    for _ in 0..ROUNDS {
-        smooth = match &mut weights {
-            WeightDepths::Smoothed(smoother) => smoother.smooth(&depths(observations, &motion)),
-            WeightDepths::Known(nu) => nu.clone(),
-        };
+    let mut smooth = weights.at(observations, &motion);
+    for round in 0..ROUNDS {
+        if round > 0 {
+            smooth = weights.at(observations, &motion);
+        }
         let before = motion;
-        motion = solve(observations, &before, &smooth)?;
+        motion = solve(observations, &before, &smooth.nu)?;
         if motion.angle_to(start).to_degrees() > FARTHEST {
             return None;
         }
@@ -64,9 +72,47 @@ pub(super) fn efficient(
             break;
         }
     }
+    told(observations, motion, smooth)
+}
+
+/// The same without a solution: what the weights say about the covariance at `motion`.
+pub(super) fn unsolved(
+    observations: &Observations,
+    motion: &Motion,
+    mut weights: WeightDepths<'_>,
+) -> Option<Efficient> {
+    let smooth = weights.at(observations, motion);
+    told(observations, *motion, smooth)
+}
+
+fn told(observations: &Observations, motion: Motion, smooth: Smoothed) -> Option<Efficient> {
     let tangent = tangents(&motion.u());
-    let covariance = inverse(&information(observations, &motion, &tangent, &smooth))?;
-    Some(Efficient { motion, tangent, covariance, smooth })
+    let covariance = sandwich(observations, &motion, &tangent, &smooth)?;
+    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu })
+}
+
+/// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are too noisy to tell it.
+const SLOPES: std::ops::Range<f64> = 0.25..4.0;
+
+/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation: `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off, depths from elsewhere).
+fn sandwich(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    smooth: &Smoothed,
+) -> Option<Matrix5> {
+    let squares = information(observations, motion, tangent, &smooth.nu);
+    let plain = inverse(&squares)?;
+    let slope = slope(observations, motion, tangent, &smooth.nu, &smooth.share);
+    let whiten = squares.cholesky()?.l().try_inverse()?;
+    let relative = whiten * slope * whiten.transpose();
+    let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
+    if !sizes.iter().all(|size| SLOPES.contains(size)) {
+        return Some(plain);
+    }
+    let Some(back) = slope.try_inverse() else { return Some(plain) };
+    let covariance = back * squares * back.transpose();
+    Some(0.5 * (covariance + covariance.transpose()))
 }
 
 /// The root of the equation whose weights are frozen at `start`.

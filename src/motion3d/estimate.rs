@@ -1,35 +1,32 @@
 //! The whole way from flow to motion.
 
-use super::covariance::{direction_deviation, plugged};
-use super::efficient::{Efficient, WeightDepths, efficient};
-use super::grid::reach_of_plausible;
+use super::covariance::plugged;
+use super::efficient::{WeightDepths, unsolved};
 use super::intake::whiten;
-use super::kernels::{depths, equations};
-use super::likelihood::{Candidate, choose, minima};
-use super::motion::{Motion, tangents};
+use super::likelihood::{Candidate, choose, different, minima};
+use super::motion::Motion;
 use super::observations::{Known, Observations};
 use super::options::{Flow, Method, MotionOptions, Noise};
-use super::refine::{Effort, refine};
+use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
-use super::robust;
+use super::robust::{self, Consensus, Rival};
 use super::smoothing::DepthSmoother;
-use super::special::{RotationOnly, by_chance, rotation_only, twin};
+use super::special::{RotationOnly, by_chance, rotation_only};
+use super::trial::{Trial, close, smoothed};
+use super::verdict::{Evidence, judge};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
+use rayon::prelude::*;
 
-/// Least number of points for a motion, and for one that is nearly unique.
+/// Least number of points for a motion.
 const LEAST: usize = 5;
-const FEW: usize = 12;
 
 /// Number of points from which on [`Method::Auto`] smooths depths.
 const SMOOTHED: usize = 30;
 
-/// Standard deviation of the direction, degrees, beyond which it is not known.
-const WIDE: f64 = 20.0;
-
-/// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
-const EXCLUDED: f64 = 25.0;
+/// Noise of flow that is exactly zero, in its unit.
+const LEAST_NOISE: f64 = 1e-100;
 
 /// Residuals below this share of the flow are rounding.
 const ROUNDING: f64 = 1e-11;
@@ -78,7 +75,7 @@ pub(super) struct Scaled {
 impl Scaled {
     /// Takes `sigma` in units of the present noise to be the noise.
     pub fn take(&mut self, sigma: f64) {
-        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(f64::MIN_POSITIVE);
+        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(LEAST_NOISE);
         if sigma.is_finite() {
             self.observations.rescale(1.0 / sigma);
             self.sigma *= sigma;
@@ -99,12 +96,20 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
+    if scaled.unknown
+        && options.robust
+        && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
+    {
+        // Nothing is left that noise could be estimated from.
+        let all = &scaled.observations;
+        return rotation_report(flow, all, all, &rotation, 0.0);
+    }
     if options.robust {
         let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
-            return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inliers = scaled.observations.subset(&kept.inliers);
-        on(flow, options, &mut scaled, inliers, Some(kept.motion), rng)
+        on(flow, options, &mut scaled, inliers, Some(&kept), rng)
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -145,7 +150,7 @@ fn on(
     options: &MotionOptions,
     scaled: &mut Scaled,
     mut inliers: Observations,
-    known: Option<Motion>,
+    known: Option<&Consensus>,
     rng: CounterRng,
 ) -> MotionEstimate {
     let mut found = match (&options.initial, known) {
@@ -154,10 +159,11 @@ fn on(
             vec![refine(&inliers, initial, None, Effort::FULL)]
         }
         (None, None) => minima(&inliers, rng.stream(2)),
-        (None, Some(known)) => vec![refine(&inliers, known, None, Effort::FULL)],
+        (None, Some(known)) => again(&inliers, known),
     };
+    let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
     let Some(best) = found.first().map(|minimum| minimum.equations.cost) else {
-        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, scaled.sigma);
+        return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
     };
     if scaled.unknown {
         if let Some(rotation) = turning_in_unknown_noise(&inliers, best) {
@@ -187,82 +193,29 @@ fn on(
     };
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
-    let improved = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let trial = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let (improved, undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
+    let unknown = low && improved.is_none();
     let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
+    if unknown {
+        let mut smoother = DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
+        let at = unsolved(&inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
+        solution.covariance = at.map(|at| at.covariance);
+    }
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
         .collect();
-    let distinct = (3.0 * solution.covariance.map_or(0.0, |c| direction_deviation(&c))).to_radians().max(1e-6);
-    let mut planar = false;
-    if let Some(twin) = twin(&inliers, &solution.motion, distinct) {
-        planar = twin.behind - chosen.minimum.equations.behind < EXCLUDED;
-        if planar {
-            solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
-            let excess = twin.behind - chosen.minimum.equations.behind;
-            solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
-        }
-    }
-    let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
-    solution.status = if inliers.n < FEW {
-        Status::FewPoints
-    } else if planar {
-        Status::Ambiguous
-    } else if deviation.is_nan()
-        || deviation > WIDE
-        || far(&inliers, &[solution.motion, *chosen.motion()], deviation, rng.stream(4))
-    {
-        Status::IllConditioned
-    } else if low {
-        Status::LowSnr
-    } else {
-        Status::Ok
-    };
+    let evidence = Evidence { likelihood: (*chosen.motion(), chosen.minimum.equations.behind), low, rivals, undecided };
+    judge(&inliers, &mut solution, &evidence, rng.stream(4));
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
 
-/// Whether directions beyond three deviations and [`WIDE`] degrees explain the flow as well as the estimate.
-fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
-    reach_of_plausible(inliers, motions, rng) > WIDE + 3.0 * deviation
-}
-
-/// Most minima from which smoothed weights are tried.
-const TRIED: usize = 3;
-
-/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a
-/// motion is easier to judge.
-fn smoothed(
-    inliers: &Observations,
-    options: &MotionOptions,
-    candidates: &[Candidate],
-    made: Option<DepthSmoother>,
-    smoother: impl FnOnce() -> DepthSmoother,
-) -> Option<Efficient> {
-    let starts = close(candidates, inliers.n);
-    if let Some(depths) = &options.weight_depths {
-        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
-        nu.resize(inliers.stride, 0.0);
-        return starts.iter().find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
-    }
-    let mut smoother = made.unwrap_or_else(smoother);
-    let mut found: Vec<Efficient> = starts
-        .iter()
-        .take(TRIED)
-        .filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
-        .collect();
-    if found.len() > 1 {
-        let cost = |found: &Efficient| cost_of(inliers, &smoother, &found.motion);
-        let costs: Vec<f64> = found.iter().map(cost).collect();
-        let best = (1..found.len()).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
-        return Some(found.swap_remove(best));
-    }
-    found.pop()
-}
-
-/// `J`, the depths behind the camera and the depth map's roughness.
-fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
-    let at = equations(observations, motion, &tangents(&motion.u()), None);
-    at.cost + at.behind + smoother.cost(&depths(observations, motion))
+/// The minimum that a robust search led to, and those that other minima for the same points lead to.
+fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
+    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
+    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())
 }
 
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
@@ -272,11 +225,4 @@ fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 
     let factor = before / scaled.sigma;
     inliers.rescale(factor);
     factor
-}
-
-/// The chosen minimum and those that come close to it.
-fn close(candidates: &[Candidate], n: usize) -> &[Candidate] {
-    let limit = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
-    let count = candidates.iter().take_while(|other| other.cost < limit).count();
-    &candidates[..count.max(1)]
 }

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 const DIRECTIONS: usize = 300;
 
 /// Most points that the search looks at.
-const SEARCHED: usize = 1000;
+pub(super) const SEARCHED: usize = 1000;
 
 /// Starts that are refined, and the least angle between them, degrees.
 const STARTS: usize = 5;

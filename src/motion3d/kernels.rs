@@ -3,12 +3,14 @@
 //! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar line and `s m = T . d` the part along it (2).
 
 mod equations;
+mod front;
 mod points;
 mod weights;
 
 pub(super) use equations::{Equations, equations};
+pub(super) use front::{FrontEquations, front_equations};
 pub(super) use points::{Depths, best_rotation, consensus, depths};
-pub(super) use weights::{Bilinear, information};
+pub(super) use weights::{Bilinear, information, slope};
 
 use super::motion::Motion;
 use super::observations::Observations;

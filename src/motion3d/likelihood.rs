@@ -60,7 +60,7 @@ pub(super) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimu
 }
 
 /// Sorted by cost, each minimum once, whatever its sign.
-fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
+pub(super) fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
     minima.retain(|minimum| minimum.equations.cost.is_finite());
     minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
     let limit = SAME.to_radians().cos();

@@ -48,10 +48,13 @@ mod regression;
 mod report;
 mod result;
 mod robust;
+mod signs;
 mod smoothing;
 mod special;
 #[cfg(test)]
 mod tests;
+mod trial;
+mod verdict;
 
 pub use bound::{MotionBound, motion_bound};
 pub use camera::Intrinsics;

@@ -15,9 +15,9 @@ pub enum Status {
     TooFewPoints,
     /// The flow is that of a rotation, as far as its noise lets tell: `u` is NaN, inverse depths are 0.
     RotationOnly,
-    /// The points lie in one plane: another motion explains the flow as well; it is among the alternatives.
+    /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite direction where depths do not exclude it, another minimum, that of other points in a robust search.
     Ambiguous,
-    /// The direction's standard deviation exceeds 20 degrees.
+    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees, or directions beyond four deviations explain the flow as well.
     IllConditioned,
     /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed weights is given.
     LowSnr,

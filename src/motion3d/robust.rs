@@ -39,6 +39,9 @@ const GATES: usize = 2;
 /// Fewest points that a motion is found from.
 const LEAST: usize = 5;
 
+/// Two motions of different points of which neither has a tenth of all points more than the other: which is the scene's cannot be told.
+const MAJORITY: f64 = 0.1;
+
 /// Unknown noise: the first guess, in shares of the median flow; residuals that estimate it, in units of it; their mean square
 /// relative to the variance, for a normal distribution cut there; most rounds.
 const FIRST_SHARE: f64 = 0.05;
@@ -53,6 +56,17 @@ pub(super) struct Consensus {
     pub motion: Motion,
     /// Indices among the observations, ascending.
     pub inliers: Vec<u32>,
+    /// Other motions that about as many points obey, and how much more each costs, in squared units of noise; the best first.
+    pub rivals: Vec<Rival>,
+}
+
+/// Another motion of many points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rival {
+    pub motion: Motion,
+    pub excess: f64,
+    /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is another minimum for the same points.
+    pub others: bool,
 }
 
 /// The motion that most points obey. Where the noise is not known it is estimated, and the points are measured in it afterwards.
@@ -97,7 +111,7 @@ fn noise(residuals: &[f64]) -> f64 {
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
     let bound = INLIER.max(SPACING * observations.median_flow());
-    let starts = apart(search::search(observations, bound, rng), APART, STARTS);
+    let starts = apart(search::search(observations, INLIER, SPACING, rng), APART, STARTS);
     let fewer;
     let on = if observations.n > MANY {
         fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
@@ -106,11 +120,10 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         observations
     };
     let narrowed: Vec<Motion> = starts.into_par_iter().map(|(start, _)| narrow(on, start, bound)).collect();
-    let best = narrowed
-        .into_iter()
-        .map(|motion| cheaper_sign(on, motion))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(motion, _)| motion)?;
+    let mut candidates: Vec<(Motion, f64)> = narrowed.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let &(best, _) = candidates.first()?;
+    let rivals = rivals(on, &candidates);
     let mut found = settle(observations, best)?;
     let gate = Gate::new(observations);
     for _ in 0..GATES {
@@ -120,13 +133,32 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         }
         let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
         let obeying = obeying(observations, &motion);
-        found = Consensus { motion, inliers: obeying };
+        found = Consensus { motion, inliers: obeying, rivals: Vec::new() };
     }
     let inliers = gate.passed(&found);
     if inliers.len() >= LEAST {
         found.inliers = inliers;
     }
+    found.rivals = rivals;
     (found.inliers.len() >= LEAST).then_some(found)
+}
+
+/// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey only because others do.
+fn rivals(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<Rival> {
+    let (n, best) = (observations.n as f64, candidates[0]);
+    let obeys_best = obeying(observations, &best.0);
+    let limit = best.1 + INLIER * INLIER * MAJORITY * n;
+    let mut found: Vec<Rival> = Vec::new();
+    for (motion, cost) in candidates.iter().skip(1).take_while(|(_, cost)| *cost < limit) {
+        let same = |other: &Motion| other.angle_to(motion).to_degrees() < APART;
+        if same(&best.0) || found.iter().any(|rival| same(&rival.motion)) {
+            continue;
+        }
+        let obeys = obeying(observations, motion);
+        let new = obeys.iter().filter(|k| obeys_best.binary_search(k).is_err()).count();
+        found.push(Rival { motion: *motion, excess: cost - best.1, others: new as f64 > MAJORITY * n });
+    }
+    found
 }
 
 /// Refines with Tukey's weights, which narrow from `bound` to the inliers'.
@@ -178,5 +210,5 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
             break;
         }
     }
-    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers })
+    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers, rivals: Vec::new() })
 }

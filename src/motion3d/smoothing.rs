@@ -45,6 +45,13 @@ struct Fitted {
     loss: f64,
 }
 
+/// Depths for the weights, and how much of each point's own is in them; as long as the planes.
+#[derive(Debug, Clone)]
+pub(super) struct Smoothed {
+    pub nu: Vec<f64>,
+    pub share: Vec<f64>,
+}
+
 /// Smooths depths of one set of points; the neighbourhoods are found once.
 #[derive(Debug)]
 pub(super) struct DepthSmoother {
@@ -143,7 +150,7 @@ impl DepthSmoother {
     }
 
     /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
-    pub fn smooth(&mut self, depths: &Depths) -> Vec<f64> {
+    pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
         let sites = self.sites(depths);
         let Fitted { kind, prediction, excess, .. } = self.best(&sites, self.which);
         let all = match kind {
@@ -161,13 +168,15 @@ impl DepthSmoother {
                 regress(&sites, &everyone, lists, k, self.spherical, self.level)
             }
         };
-        let mut nu = vec![0.0; depths.nu.len()];
+        let mut out = Smoothed { nu: vec![0.0; depths.nu.len()], share: vec![0.0; depths.nu.len()] };
         for (place, (site, &i)) in sites.iter().zip(self.tree.order()).enumerate() {
             // (t2 + c) / (t2 + c + 1 / s2), which is 0 at the epipole.
             let (q, wide) = (all.q[place], (excess + all.c[place]) * site.s2);
-            nu[i as usize] = q + wide / (wide + 1.0) * (site.nu - q);
+            let share = wide / (wide + 1.0);
+            out.share[i as usize] = share;
+            out.nu[i as usize] = q + share * (site.nu - q);
         }
-        nu
+        out
     }
 }
 

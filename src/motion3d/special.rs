@@ -3,7 +3,7 @@
 use super::kernels::{Depths, depths};
 use super::motion::Motion;
 use super::observations::Observations;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Least squares for the rotation alone.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +22,9 @@ impl RotationOnly {
         Self { covariance: self.covariance / square, chi2: self.chi2 * square, ..self }
     }
 }
+
+/// Least share of the information that is not rounding.
+const DETERMINED: f64 = 1e-12;
 
 /// Deviations of a standard normal that a share of 0.001 lies beyond.
 const RARE: f64 = 3.0902;
@@ -57,6 +60,10 @@ pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
     if let Some(known) = &observations.prior {
         normal += known.information;
         right += known.pull(&Vector3::zeros()).0;
+    }
+    // Points at one place tell of two of three unknowns; what rounding adds is no information.
+    if SymmetricEigen::new(normal).eigenvalues.min() <= DETERMINED * normal.trace() {
+        return None;
     }
     let factor = normal.cholesky()?;
     let rotation = factor.solve(&right);

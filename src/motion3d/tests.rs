@@ -1,5 +1,6 @@
 //! Published values, degenerate scenes and promises.
 
+mod confidence;
 mod degenerate;
 mod estimators;
 mod published;

@@ -16,7 +16,6 @@ mod io;
 mod keywords;
 mod mixture;
 mod motion3d;
-mod motion3d_field;
 mod observability;
 mod options;
 mod progress;
@@ -58,9 +57,9 @@ mod _jacoflow {
     #[pymodule_export]
     use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
-    use super::motion3d::{motion3d_bound, motion3d_estimate, motion3d_focus, motion3d_predict, motion3d_two_views};
-    #[pymodule_export]
-    use super::motion3d_field::motion3d_field_points;
+    use super::motion3d::{
+        motion3d_bound, motion3d_estimate, motion3d_field_points, motion3d_focus, motion3d_predict, motion3d_two_views,
+    };
     #[pymodule_export]
     use super::observability::{classify, observability};
     #[pymodule_export]

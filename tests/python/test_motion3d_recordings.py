@@ -26,9 +26,18 @@ def test_a_drive_is_better_than_five_points_on_tracks():
 @pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
 def test_time_to_contact_agrees_with_the_laser():
     rows = recordings.car(DATA)
-    facing = np.abs([float(str(row["it is off"])) for row in rows])
-    assert facing.max() < 3, rows
-    off = np.array([float(str(row["off, deviations"])) for row in rows])
-    assert np.nanmedian(np.abs(off)) < 3
-    # Where the approach trades against a sideways motion that is told.
-    assert all(row["status"] != "ok" for row, value in zip(rows, off, strict=True) if not abs(value) < 4), rows
+    trusted = [row for row in rows if row["status"] != "ill_conditioned"]
+    assert len(trusted) >= 10
+    off = np.array([row["off these frames, deviations"] for row in trusted], float)
+    assert np.abs(off).max() < 2.5 and np.sqrt(np.mean(off**2)) < 1.4, rows
+    # The speeds in the file are too high where the range jumps before the first frame.
+    assert np.median(np.abs([float(str(row["off the file, deviations"])) for row in rows])) < 1.5
+
+
+@pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
+def test_the_whole_scene_moves_straight_ahead_or_it_is_told():
+    """A tank lorry overtakes on a quarter of the picture: together with the other side it would obey a sideways motion."""
+    for row in recordings.car(DATA):
+        straight = float(str(row["scene off straight ahead, deg"])) < 3
+        assert straight or row["scene's status"] != "ok", row
+        assert straight, row

@@ -127,18 +127,22 @@ impl Kernel<f64> for ConsensusSum<'_> {
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 1] {
         let motion = Everywhere::<V>::new(self.motion);
         let (floor, cut2) = (V::splat(self.floor), V::splat(self.cut2));
+        let half = V::splat(0.5 * self.cut2);
         let mut sum = V::zero();
         for i in (0..self.planes[0].len()).step_by(V::LANES) {
             let seen = see(&self.planes, i, &motion, floor);
             let behind = seen.along.min(V::zero());
-            let both = seen.across.mul_add(seen.across, behind * behind) * seen.inverse;
+            let sign = (behind * behind * seen.inverse).min(half);
+            let both = (seen.across * seen.across).mul_add(seen.inverse, sign);
             sum = sum + both.min(cut2);
         }
         [total(sum)]
     }
 }
 
-/// `sum min(e^2 + [nu^ < 0] (nu^ / sd)^2, cut^2)`: a point that does not obey counts once, for whatever reason.
+/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: a point that does not obey counts once, for whatever reason.
+///
+/// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or overtakes it, obeys the same lines, as no stray does.
 pub(in super::super) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
     let [cost] = over_chunks(observations, |range| {
         let planes = observations.slices(&range);

@@ -82,6 +82,85 @@ pub(in super::super) fn information(
     h
 }
 
+/// `sum W^t D` of weights with given depths and the rows' true depths, of which those of the points' own flow are an estimate.
+struct SlopeSums<'a> {
+    weights: WeightSums<'a>,
+    /// How much of each point's own depth is in that of its weight.
+    share: &'a [f64],
+}
+
+const SLOPES: usize = 21;
+
+impl Kernel<f64> for SlopeSums<'_> {
+    type Output = [f64; SLOPES];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; SLOPES] {
+        let WeightSums { planes, nu, motion, tangent, floor } = self.weights;
+        let motion = Everywhere::<V>::new(motion);
+        let axes = both_axes(tangent);
+        let floor = V::splat(floor);
+        let mut sums = [V::zero(); SLOPES];
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let (seen, [pulled, pushed, ..]) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
+            let a = turn(&seen.t, dot(&planes, 0, i, &axes[0]), dot(&planes, 3, i, &axes[0]));
+            let b = turn(&seen.t, dot(&planes, 0, i, &axes[1]), dot(&planes, 3, i, &axes[1]));
+            // The noise of the own depth is in both factors, as far as it is in the weight.
+            let own = seen.along * seen.inverse;
+            let both = V::load(&nu[i..]).mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
+            let psi = both * seen.inverse;
+            sums[0] = (psi * a).mul_add(a, sums[0]);
+            sums[1] = (psi * a).mul_add(b, sums[1]);
+            sums[2] = (psi * b).mul_add(b, sums[2]);
+            let (own_a, own_b) = (own * a * seen.inverse, own * b * seen.inverse);
+            let (weight_a, weight_b) = (pulled * seen.inverse, pushed * seen.inverse);
+            let mut k = 15;
+            for row in 0..3 {
+                let q = seen.q[row];
+                sums[3 + row] = weight_a.mul_add(q, sums[3 + row]);
+                sums[6 + row] = weight_b.mul_add(q, sums[6 + row]);
+                sums[9 + row] = own_a.mul_add(q, sums[9 + row]);
+                sums[12 + row] = own_b.mul_add(q, sums[12 + row]);
+                let weighted = q * seen.inverse;
+                for column in row..3 {
+                    sums[k] = weighted.mul_add(seen.q[column], sums[k]);
+                    k += 1;
+                }
+            }
+        }
+        sums.map(total)
+    }
+}
+
+/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without bias: true depths are taken from the points' own flow, of which `share` is in `nu`.
+pub(in super::super) fn slope(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+    share: &[f64],
+) -> SMatrix<f64, 5, 5> {
+    let sums = over_chunks(observations, |range| {
+        let planes = observations.slices(&range);
+        let weights = WeightSums { planes, nu: &nu[range.clone()], motion, tangent, floor: observations.floor };
+        dispatch(observations.level, SlopeSums { weights, share: &share[range] })
+    });
+    let mut slope = SMatrix::<f64, 5, 5>::zeros();
+    (slope[(0, 0)], slope[(0, 1)], slope[(1, 0)], slope[(1, 1)]) = (sums[0], sums[1], sums[1], sums[2]);
+    let mut k = 15;
+    for i in 0..3 {
+        (slope[(0, 2 + i)], slope[(1, 2 + i)]) = (sums[3 + i], sums[6 + i]);
+        (slope[(2 + i, 0)], slope[(2 + i, 1)]) = (sums[9 + i], sums[12 + i]);
+        for j in i..3 {
+            (slope[(2 + i, 2 + j)], slope[(2 + j, 2 + i)]) = (sums[k], sums[k]);
+            k += 1;
+        }
+    }
+    if let Some(known) = &observations.prior {
+        add_to_rotation(&mut slope, &known.information, 1.0);
+    }
+    slope
+}
+
 /// `sum V^t h` of the bilinear residual `s e = sum_i u_i (h_i0 + sum_j h_ij w_j)`.
 struct BilinearSums<'a> {
     weights: WeightSums<'a>,

@@ -14,20 +14,19 @@ const SAMPLES: usize = 100;
 /// Lanes are filled up to a multiple of this.
 const ALIGN: usize = 16;
 
-/// Residuals `(c - q . w)` of one direction, in units of noise, as planes `q_x, q_y, q_z, c`.
+/// Residuals `(c - q . w)` of one direction, in units of their bounds, as planes `q_x, q_y, q_z, c`.
 struct TruncatedCost<'a> {
     rows: &'a [Vec<f64>; 4],
     rotations: &'a [Vector3<f64>],
-    cut2: f64,
 }
 
 impl Kernel<f64> for TruncatedCost<'_> {
     type Output = Option<(usize, f64)>;
-    /// The rotation with the least `sum min(e^2, cut^2)`, and that.
+    /// The rotation with the least `sum min(e^2, 1)`, and that.
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> Option<(usize, f64)> {
         let [x, y, z, c] = self.rows;
-        let cut2 = V::splat(self.cut2);
+        let cut2 = V::constant(1.0);
         let mut best: Option<(usize, f64)> = None;
         for (index, w) in self.rotations.iter().enumerate() {
             let (wx, wy, wz) = (V::splat(w.x), V::splat(w.y), V::splat(w.z));
@@ -62,13 +61,16 @@ fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
     [first, second, third + usize::from(third >= high)]
 }
 
-/// Every direction with its best rotation and cost `sum min(e^2, bound^2)`.
-pub(super) fn search(observations: &Observations, bound: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
+/// Every direction with its best rotation and cost `sum min((e / bound)^2, 1)`.
+///
+/// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of its own, at least `least`, else the share `spacing` of its flow.
+pub(super) fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
     let chosen = sample(observations.n, SEARCHED, rng.stream(0));
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
     let draws = rng.stream(1);
     let triples: Vec<[usize; 3]> = (0..SAMPLES as u64).map(|i| triple(few.len(), draws.stream(i))).collect();
-    let (floor, level, cut2) = (observations.floor, observations.level, bound * bound);
+    let (floor, level) = (observations.floor, observations.level);
+    let bounds: Vec<f64> = few.iter().map(|row| least.max(spacing * row.f.norm())).collect();
     evaluate(|u| {
         let length = few.len().next_multiple_of(ALIGN);
         let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; length]);
@@ -76,7 +78,7 @@ pub(super) fn search(observations: &Observations, bound: f64, rng: CounterRng) -
             let t = row.g * u;
             let s2 = t.norm_squared();
             if s2 > floor {
-                let scale = 1.0 / s2.sqrt();
+                let scale = 1.0 / (s2.sqrt() * bounds[k]);
                 for j in 0..3 {
                     rows[j][k] = (t.y * row.r[(0, j)] - t.x * row.r[(1, j)]) * scale;
                 }
@@ -91,7 +93,7 @@ pub(super) fn search(observations: &Observations, bound: f64, rng: CounterRng) -
         };
         let known = observations.prior.map(|known| known.rotation);
         let rotations: Vec<Vector3<f64>> = triples.iter().filter_map(rotation).chain(known).collect();
-        let (best, cost) = dispatch(level, TruncatedCost { rows: &rows, rotations: &rotations, cut2 })?;
+        let (best, cost) = dispatch(level, TruncatedCost { rows: &rows, rotations: &rotations })?;
         Some((Motion::of(u, &rotations[best]), cost))
     })
 }

@@ -1,9 +1,9 @@
 //! Points of a flow field for 3-D motion.
 
-use super::arrays;
-use super::field::{FlowField, Store, each};
-use super::options::{self, Region};
 use crate::motion3d::{FieldOptions, field_points};
+use crate::python::arrays;
+use crate::python::field::{FlowField, Store, each};
+use crate::python::options::{self, Region};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

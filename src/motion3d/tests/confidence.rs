@@ -1,0 +1,112 @@
+//! What is not known must not be told as `ok`.
+
+use super::super::*;
+use super::estimators::mahalanobis;
+use super::scenes::Scene;
+
+fn options() -> MotionOptions {
+    MotionOptions { placement: Placement::Start, ..MotionOptions::default() }
+}
+
+fn run(scene: &Scene, noise: &Noise<'_>) -> MotionEstimate {
+    estimate_motion(&scene.flow(), noise, &options()).unwrap()
+}
+
+const W: [f64; 3] = [0.02, -0.03, 0.01];
+
+fn smooth(x: f64, y: f64) -> f64 {
+    1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
+}
+
+/// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with the truth outside of the ellipsoid that holds 0.999.
+fn silently_wrong(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
+    let (mut confident, mut wrong) = (0u32, 0u32);
+    for seed in 0..trials {
+        let scene = scene(seed);
+        let found = run(&scene, &Noise::Sigma(scene.sigma));
+        if found.status == Status::Ok {
+            let error = found.motion.angle_to(&scene.motion).to_degrees();
+            confident += 1;
+            wrong += u32::from(error > 4.0 * found.direction_std && mahalanobis(&found, &scene.motion) > 20.5);
+        }
+    }
+    (confident, wrong)
+}
+
+#[test]
+fn a_narrow_field_is_not_trusted() {
+    let oblique = Motion::new([0.6, 0.2, 0.75], W);
+    let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
+    let (mut confident, mut wrong) = (0, 0);
+    for (motion, h, n, sigma) in [
+        (oblique, 0.02, 60, 0.1),
+        (oblique, 0.1, 60, 0.01),
+        (oblique, 0.1, 60, 0.03),
+        (oblique, 0.1, 300, 0.01),
+        (oblique, 0.2, 300, 0.03),
+        (lateral, 0.05, 60, 0.01),
+        (lateral, 0.05, 300, 0.03),
+        (lateral, 0.1, 300, 0.1),
+        (lateral, 0.2, 300, 0.1),
+    ] {
+        for depth in [false, true] {
+            let (sure, off) = silently_wrong(40, |seed| {
+                Scene::new(motion, n, h, sigma, seed, |x, y, r| if depth { smooth(x, y) } else { 0.5 + r })
+            });
+            confident += sure;
+            wrong += off;
+            assert!(off <= 3, "{motion:?} {h} {n} {sigma}: {off} of {sure}");
+        }
+    }
+    assert!(confident > 300 && wrong * 100 <= 2 * confident, "{wrong} of {confident}");
+}
+
+/// A rotation that adds the same to all depths turns them round: in a narrow field a sideways motion has its opposite beside it.
+#[test]
+fn the_opposite_motion_is_told_where_depths_do_not_exclude_it() {
+    let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
+    for seed in 0..10 {
+        let narrow = Scene::new(lateral, 300, 0.05, 0.03, seed, |_, _, r| 0.5 + r);
+        let found = run(&narrow, &Noise::Sigma(0.03));
+        assert!(matches!(found.status, Status::Ambiguous | Status::IllConditioned), "{seed}: {:?}", found.status);
+        if found.status == Status::Ambiguous {
+            let both = found.alternatives.iter().map(|other| other.motion).chain([found.motion]);
+            let nearest = both.map(|motion| motion.angle_to(&lateral).to_degrees()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 15.0, "{seed}: {nearest}");
+        }
+        let wide = Scene::new(lateral, 300, 0.6, 0.03, seed, |_, _, r| 0.5 + r);
+        assert_eq!(run(&wide, &Noise::Sigma(0.03)).status, Status::Ok, "{seed}");
+    }
+}
+
+/// Something large that overtakes moves along the camera's epipolar lines: together with the rest of the scene it can look like a sideways motion.
+#[test]
+fn a_robust_search_tells_what_else_many_points_obey() {
+    let ahead = Motion::new([0.0, 0.0, -1.0], [0.0; 3]);
+    let aside = Motion::new([-0.8, 0.1, 0.3], [0.0, 0.05, 0.02]);
+    for seed in 0..10 {
+        let mut scene = Scene::new(ahead, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
+        let other = Scene::new(aside, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
+        for k in 0..290 {
+            scene.flow[k] = other.flow[k];
+        }
+        let found =
+            estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &MotionOptions { robust: true, ..options() }).unwrap();
+        assert_eq!(found.status, Status::Ambiguous, "{seed}");
+        for truth in [ahead, aside] {
+            let both = found.alternatives.iter().map(|other| other.motion).chain([found.motion]);
+            let nearest = both.map(|motion| motion.angle_to(&truth).to_degrees()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 3.0, "{seed}: {nearest}");
+        }
+        // A thing of a quarter of the points that overtakes leaves no doubt.
+        let overtaking = Motion::new([0.0, 0.0, 1.0], [0.0; 3]);
+        let mut scene = Scene::new(ahead, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
+        let truck = Scene::new(overtaking, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
+        for k in (0..600).filter(|&k| scene.points[k][0] > 0.3) {
+            scene.flow[k] = truck.flow[k];
+        }
+        let found =
+            estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &MotionOptions { robust: true, ..options() }).unwrap();
+        assert!(found.motion.angle_to(&ahead).to_degrees() < 2.0, "{seed}: {:?}", found.motion);
+    }
+}

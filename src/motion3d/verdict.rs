@@ -1,0 +1,119 @@
+//! How far a motion can be trusted.
+
+use super::covariance::direction_deviation;
+use super::grid::reach_of_plausible;
+use super::kernels::equations;
+use super::motion::{Motion, tangents};
+use super::observations::Observations;
+use super::report::Solution;
+use super::result::{Alternative, Status};
+use super::robust::Rival;
+use super::signs::opposite;
+use super::special::twin;
+use crate::math::random::CounterRng;
+use nalgebra::{SMatrix, SymmetricEigen};
+
+/// Below so many points several motions may explain them exactly.
+const FEW: usize = 12;
+
+/// Standard deviation of the direction, degrees, beyond which it is not known.
+const WIDE: f64 = 20.0;
+
+/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are [`SPACING`] degrees apart, half of that from one of them.
+const FAR: f64 = 4.0;
+const SPACING: f64 = 4.0;
+
+/// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
+const EXCLUDED: f64 = 25.0;
+
+/// Least eigenvalue of the information, relative to what points all over the screen would give, that is not rounding.
+const DETERMINED: f64 = 1e-12;
+
+/// What else speaks for or against a motion.
+pub(super) struct Evidence<'a> {
+    /// Maximum likelihood's motion, and its depths behind the camera in squared deviations.
+    pub likelihood: (Motion, f64),
+    /// Whether the depths are mostly noise.
+    pub low: bool,
+    /// Motions that other points obey.
+    pub rivals: &'a [Rival],
+    /// Another solution that is about as likely.
+    pub undecided: Option<Alternative>,
+}
+
+/// Finds what else could be true: the status, and the other motions among the alternatives.
+pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &Evidence<'_>, rng: CounterRng) {
+    let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
+    // Where even that is not finite, no other motion is distinct.
+    let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
+    let planar = planar(inliers, solution, evidence.likelihood.1, distinct);
+    let turned = opposite(inliers, &solution.motion, rng.stream(0));
+    if let Some((motion, excess)) = turned {
+        solution.alternatives.insert(0, Alternative { motion, excess });
+    }
+    if let Some(other) = evidence.undecided {
+        solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
+        solution.alternatives.insert(0, other);
+    }
+    let others = evidence.rivals.iter().filter(|rival| rival.others);
+    for (place, rival) in others.clone().enumerate() {
+        solution.alternatives.insert(place, Alternative { motion: rival.motion, excess: rival.excess });
+    }
+    let motions = [solution.motion, evidence.likelihood.0];
+    solution.status = if inliers.n < FEW {
+        Status::FewPoints
+    } else if !determined(inliers, &solution.motion) {
+        solution.covariance = None;
+        Status::IllConditioned
+    } else if planar || others.count() > 0 {
+        Status::Ambiguous
+    } else if deviation.is_nan() || deviation > WIDE || far(inliers, &motions, deviation, rng.stream(1)) {
+        Status::IllConditioned
+    } else if turned.is_some() || evidence.undecided.is_some() {
+        Status::Ambiguous
+    } else if evidence.low {
+        Status::LowSnr
+    } else {
+        Status::Ok
+    };
+}
+
+/// Whether the points are one plane that has another motion, too; that is then the first alternative.
+fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct: f64) -> bool {
+    let Some(twin) = twin(inliers, &solution.motion, distinct) else { return false };
+    let excess = twin.behind - behind;
+    if excess >= EXCLUDED {
+        return false;
+    }
+    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
+    solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
+    true
+}
+
+/// Whether directions explain the flow as well as the estimate that are farther than its covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
+fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
+    reach_of_plausible(inliers, motions, rng) > FAR * deviation + SPACING
+}
+
+/// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.
+pub(super) fn determined(observations: &Observations, motion: &Motion) -> bool {
+    let tangent = tangents(&motion.u());
+    let h = equations(observations, motion, &tangent, None).h;
+    let (mut depth, mut turn) = (0.0, 0.0);
+    for k in 0..observations.n {
+        let row = observations.row(k);
+        let t = row.g * motion.u();
+        let s2 = t.norm_squared();
+        if s2 > observations.floor {
+            let nu = t.dot(&(row.f - row.r * motion.w())) / s2;
+            depth += nu * nu * row.g.norm_squared();
+        }
+        turn += row.r.norm_squared();
+    }
+    let scale = |i: usize| if i < 2 { depth } else { turn };
+    if !(depth > 0.0 && turn > 0.0 && depth.is_finite() && turn.is_finite()) {
+        return false;
+    }
+    let relative = SMatrix::<f64, 5, 5>::from_fn(|i, j| h[(i, j)] / (scale(i) * scale(j)).sqrt());
+    SymmetricEigen::new(relative).eigenvalues.min() > DETERMINED
+}

@@ -1,0 +1,80 @@
+//! What a motion does to points, and where it leads.
+
+use super::given::{camera, rows, triple};
+use super::told::{matrix, vector};
+use crate::error::Error;
+use crate::motion3d::{Motion, focus_of_expansion};
+use crate::python::arrays;
+use pyo3::prelude::*;
+
+/// An array, in or out.
+type Any<'py> = Bound<'py, PyAny>;
+
+fn motion(translation: &Any<'_>, rotation: &Any<'_>) -> PyResult<Motion> {
+    Ok(Motion { translation: triple("translation", translation)?, rotation: triple("rotation", rotation)? })
+}
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_focus")]
+pub fn motion3d_focus<'py>(
+    py: Python<'py>,
+    translation: &Any<'py>,
+    tangent: &Any<'py>,
+    covariance: &Any<'py>,
+    intrinsics: Option<&Any<'py>>,
+) -> PyResult<Option<(Any<'py>, Any<'py>)>> {
+    let camera = camera(intrinsics)?;
+    let motion = Motion { translation: triple("translation", translation)?, rotation: [0.0; 3] };
+    let (_, axes) = arrays::doubles("tangent", tangent)?;
+    let (_, values) = arrays::doubles("covariance", covariance)?;
+    let (Ok(axes), Ok(values)) =
+        (<[[f64; 3]; 2]>::try_from(axes.as_chunks().0), <[[f64; 5]; 5]>::try_from(values.as_chunks().0))
+    else {
+        return Err(Error::argument("covariance", "shapes (2, 3) and (5, 5)", "others").into());
+    };
+    let Some((focus, spread)) = focus_of_expansion(&motion, &axes, &values, camera.as_ref()) else { return Ok(None) };
+    let focus = arrays::owned(py, &[2], focus.to_vec())?;
+    Ok(Some((focus.into_any(), matrix(py, &spread)?.into_any())))
+}
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_two_views")]
+pub fn motion3d_two_views<'py>(
+    py: Python<'py>,
+    translation: &Any<'py>,
+    rotation: &Any<'py>,
+) -> PyResult<(Any<'py>, Any<'py>, Any<'py>)> {
+    let motion = motion(translation, rotation)?;
+    let (essential, turn) = (matrix(py, &motion.essential_matrix())?, matrix(py, &motion.rotation_matrix())?);
+    Ok((essential.into_any(), turn.into_any(), vector(py, motion.displacement())?.into_any()))
+}
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_predict")]
+pub fn motion3d_predict<'py>(
+    py: Python<'py>,
+    points: &Any<'py>,
+    inverse_depth: &Any<'py>,
+    translation: &Any<'py>,
+    rotation: &Any<'py>,
+    intrinsics: Option<&Any<'py>>,
+    spherical: bool,
+) -> PyResult<Any<'py>> {
+    let camera = camera(intrinsics)?;
+    let motion = motion(translation, rotation)?;
+    let (shape, values) = arrays::doubles("points", points)?;
+    let (depth_shape, depths) = arrays::doubles("inv_depth", inverse_depth)?;
+    let count = shape.first().copied().unwrap_or(0);
+    if depth_shape != [count] {
+        return Err(Error::argument("inv_depth", format!("shape ({count},)"), format!("shape {depth_shape:?}")).into());
+    }
+    if spherical {
+        let bearings: Vec<[f64; 3]> = rows("points", &shape, &values)?;
+        let flow: Vec<[f64; 3]> = bearings.iter().zip(&depths).map(|(&b, &nu)| motion.sphere_flow(b, nu)).collect();
+        return Ok(matrix(py, &flow)?.into_any());
+    }
+    let pixels: Vec<[f64; 2]> = rows("points", &shape, &values)?;
+    let flow: Vec<[f64; 2]> =
+        pixels.iter().zip(&depths).map(|(&at, &nu)| motion.picture_flow(at, nu, camera.as_ref())).collect();
+    Ok(matrix(py, &flow)?.into_any())
+}

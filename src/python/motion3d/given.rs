@@ -1,0 +1,174 @@
+//! What is given about points: where they are, what moves there, its noise, the camera; owned.
+
+use crate::error::Error;
+use crate::motion3d::{AffinePatches, Flow, Intrinsics, Noise};
+use crate::python::arrays;
+use pyo3::prelude::*;
+
+/// An argument as Python gave it.
+type Any<'py> = Bound<'py, PyAny>;
+
+/// How points are given, by the keywords of the Python functions.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Layout<'py> {
+    #[pyo3(item("K"))]
+    camera: Option<Any<'py>>,
+    sigma: Option<f64>,
+    cov: Option<Any<'py>>,
+    projection: String,
+    /// Whether six numbers a patch are given.
+    pub six: bool,
+}
+
+/// Points of a screen with `D` coordinates each.
+pub fn rows<const D: usize>(name: &'static str, shape: &[usize], values: &[f64]) -> PyResult<Vec<[f64; D]>> {
+    if shape.len() == 2 && shape[1] == D || shape == [0] {
+        return Ok(values.as_chunks::<D>().0.to_vec());
+    }
+    Err(Error::argument(name, format!("shape (N, {D})"), format!("shape {shape:?}")).into())
+}
+
+/// A vector of space.
+pub fn triple(name: &'static str, given: &Any<'_>) -> PyResult<[f64; 3]> {
+    let (shape, values) = arrays::doubles(name, given)?;
+    match values[..] {
+        [x, y, z] if shape == [3] => Ok([x, y, z]),
+        _ => Err(Error::argument(name, "shape (3,)", format!("shape {shape:?}")).into()),
+    }
+}
+
+/// A matrix of 3 x 3 values.
+pub fn square(name: &'static str, of: &str, given: &Any<'_>) -> PyResult<[[f64; 3]; 3]> {
+    let (shape, values) = arrays::doubles(name, given)?;
+    if shape != [3, 3] {
+        return Err(Error::argument(name, format!("{of}shape (3, 3)"), format!("shape {shape:?}")).into());
+    }
+    Ok(std::array::from_fn(|i| std::array::from_fn(|j| values[3 * i + j])))
+}
+
+/// The camera, where there is one.
+pub fn camera(given: Option<&Any<'_>>) -> PyResult<Option<Intrinsics>> {
+    let matrix = given.map(|matrix| square("K", "", matrix)).transpose()?;
+    Ok(matrix.map(Intrinsics::new).transpose()?)
+}
+
+/// The option's value that a word names.
+pub fn word<T: Copy>(name: &'static str, value: &str, known: &[(&str, T)]) -> PyResult<T> {
+    let found = known.iter().find(|(known, _)| *known == value).map(|(_, result)| *result);
+    let names: Vec<String> = known.iter().map(|(known, _)| format!("{known:?}")).collect();
+    found.ok_or_else(|| Error::argument(name, names.join(" or "), format!("{value:?}")).into())
+}
+
+/// Points with their flow.
+enum Screen {
+    Plane(Vec<[f64; 2]>, Vec<[f64; 2]>),
+    Sphere(Vec<[f64; 3]>, Vec<[f64; 3]>),
+}
+
+/// Points with flow and noise.
+pub struct Given {
+    screen: Screen,
+    camera: Option<Intrinsics>,
+    sigma: Option<f64>,
+    covariances: Option<Vec<f64>>,
+}
+
+impl Given {
+    /// Without `flow`, that of points is zero: bounds do not look at it.
+    pub fn new(points: &Any<'_>, flow: Option<&Any<'_>>, layout: &Layout<'_>) -> PyResult<Self> {
+        let spherical = word("projection", &layout.projection, &[("plane", false), ("sphere", true)])?;
+        let camera = camera(layout.camera.as_ref())?;
+        if spherical && camera.is_some() {
+            return Err(Error::argument("K", "none, as bearings need no camera", "a matrix").into());
+        }
+        let (shape, values) = arrays::doubles("points", points)?;
+        let flow = flow.map(|flow| arrays::doubles("flow", flow)).transpose()?;
+        let (flow_shape, flow) = flow.unwrap_or_else(|| (shape.clone(), vec![0.0; values.len()]));
+        let screen = if spherical {
+            Screen::Sphere(rows("points", &shape, &values)?, rows("flow", &flow_shape, &flow)?)
+        } else {
+            Screen::Plane(rows("points", &shape, &values)?, rows("flow", &flow_shape, &flow)?)
+        };
+        let count = shape.first().copied().unwrap_or(0);
+        let covariances = covariances(layout, count, if spherical { 3 } else { 2 })?;
+        Ok(Self { screen, camera, sigma: layout.sigma, covariances })
+    }
+
+    /// As the core takes it.
+    pub fn flow(&self) -> Flow<'_> {
+        match &self.screen {
+            Screen::Sphere(bearings, flow) => Flow::Sphere { bearings, flow },
+            Screen::Plane(points, flow) => Flow::Plane { points, flow, camera: self.camera.as_ref() },
+        }
+    }
+
+    /// As the core takes it.
+    pub fn noise(&self) -> Noise<'_> {
+        match (&self.covariances, self.sigma) {
+            (Some(values), _) => Noise::Covariances(values),
+            (None, Some(sigma)) => Noise::Sigma(sigma),
+            (None, None) => Noise::Unknown,
+        }
+    }
+}
+
+/// Covariances of `count` flow vectors, where they are given.
+fn covariances(layout: &Layout<'_>, count: usize, size: usize) -> PyResult<Option<Vec<f64>>> {
+    let Some(given) = &layout.cov else { return Ok(None) };
+    let (shape, values) = arrays::doubles("cov", given)?;
+    if layout.sigma.is_some() {
+        return Err(Error::argument("cov", "either sigma or cov", "both").into());
+    }
+    if shape != [count, size, size] {
+        let expected = format!("shape ({count}, {size}, {size})");
+        return Err(Error::argument("cov", expected, format!("shape {shape:?}")).into());
+    }
+    Ok(Some(values))
+}
+
+/// Patches with six numbers each.
+pub struct GivenPatches {
+    points: Vec<[f64; 2]>,
+    motion: Vec<[f64; 6]>,
+    covariances: Vec<f64>,
+    camera: Option<Intrinsics>,
+}
+
+impl GivenPatches {
+    /// Without `affine`, the numbers are zero: bounds do not look at them.
+    pub fn new(points: &Any<'_>, affine: Option<&Any<'_>>, layout: &Layout<'_>) -> PyResult<Self> {
+        if layout.projection != "plane" {
+            return Err(Error::argument("projection", "\"plane\", for six numbers a patch", "another").into());
+        }
+        let (shape, values) = arrays::doubles("points", points)?;
+        let points: Vec<[f64; 2]> = rows("points", &shape, &values)?;
+        let motion = match affine {
+            Some(affine) => {
+                let (shape, values) = arrays::doubles("flow", affine)?;
+                rows("flow", &shape, &values)?
+            }
+            None => vec![[0.0; 6]; points.len()],
+        };
+        let wanted = [points.len(), 6, 6];
+        match layout.cov.as_ref().map(|given| arrays::doubles("cov", given)).transpose()? {
+            Some((shape, covariances)) if shape == wanted => {
+                Ok(Self { points, motion, covariances, camera: camera(layout.camera.as_ref())? })
+            }
+            other => {
+                let got = other.map_or_else(|| "none".into(), |(shape, _)| format!("shape {shape:?}"));
+                Err(Error::argument("cov", format!("shape {wanted:?}, for six numbers a patch"), got).into())
+            }
+        }
+    }
+
+    /// As the core takes them.
+    pub fn patches(&self) -> AffinePatches<'_> {
+        AffinePatches {
+            points: &self.points,
+            motion: &self.motion,
+            covariances: &self.covariances,
+            camera: self.camera.as_ref(),
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Rigid 3-D motion for Python; what a user meets is `jacoflow.motion3d`.
+
+mod field;
+mod flow;
+mod given;
+mod options;
+mod told;
+
+pub use field::motion3d_field_points;
+pub use flow::{motion3d_focus, motion3d_predict, motion3d_two_views};
+
+use crate::motion3d::{Motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
+use given::{Given, GivenPatches, Layout, rows, triple};
+use options::Options;
+use pyo3::prelude::*;
+use told::{ToldBound, ToldEstimate};
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_estimate")]
+pub fn motion3d_estimate<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    flow: &Bound<'py, PyAny>,
+    layout: Layout<'py>,
+    options: Options<'py>,
+) -> PyResult<ToldEstimate<'py>> {
+    let options = options.core()?;
+    if layout.six {
+        let given = GivenPatches::new(points, Some(flow), &layout)?;
+        let found = py.detach(|| estimate_patch_motion(&given.patches(), &options))?;
+        return ToldEstimate::new(py, found);
+    }
+    let given = Given::new(points, Some(flow), &layout)?;
+    let found = py.detach(|| estimate_motion(&given.flow(), &given.noise(), &options))?;
+    ToldEstimate::new(py, found)
+}
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_bound")]
+pub fn motion3d_bound<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    inverse_depth: &Bound<'py, PyAny>,
+    translation: &Bound<'py, PyAny>,
+    rotation: &Bound<'py, PyAny>,
+    layout: Layout<'py>,
+) -> PyResult<ToldBound<'py>> {
+    let motion = Motion::new(triple("translation", translation)?, triple("rotation", rotation)?);
+    let (shape, depths) = super::arrays::doubles("inv_depth", inverse_depth)?;
+    if layout.six {
+        let given = GivenPatches::new(points, None, &layout)?;
+        let surfaces: Vec<[f64; 3]> = rows("inv_depth", &shape, &depths)?;
+        let bound = py.detach(|| patch_motion_bound(&given.patches(), &motion, &surfaces))?;
+        return ToldBound::new(py, &bound);
+    }
+    let given = Given::new(points, None, &layout)?;
+    let bound = py.detach(|| motion_bound(&given.flow(), &given.noise(), &motion, &depths))?;
+    ToldBound::new(py, &bound)
+}

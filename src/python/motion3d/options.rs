@@ -1,0 +1,57 @@
+//! The core's options from the keywords of the Python function.
+
+use super::given::{square, triple, word};
+use crate::error::Error;
+use crate::motion3d::{Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
+use crate::parallel::Threads;
+use crate::python::arrays;
+use crate::python::options::Integer;
+use pyo3::prelude::*;
+
+/// How the motion is looked for.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options<'py> {
+    method: String,
+    robust: bool,
+    placement: String,
+    smoother: String,
+    weight_inv_depth: Option<Bound<'py, PyAny>>,
+    rotation_prior: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+    initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+    seed: Integer,
+    threads: Option<usize>,
+}
+
+impl Options<'_> {
+    /// As the core takes them.
+    pub fn core(&self) -> PyResult<MotionOptions> {
+        let methods = [("auto", Method::Auto), ("ml", Method::MaximumLikelihood), ("efficient", Method::Efficient)];
+        let placements = [("midpoint", Placement::Midpoint), ("start", Placement::Start)];
+        let smoothers = [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
+        let weights = self.weight_inv_depth.as_ref().map(|given| arrays::doubles("weight_inv_depth", given));
+        let wrong_seed = |_| Error::argument("seed", "an integer of at least 0", self.seed.0);
+        Ok(MotionOptions {
+            method: word("method", &self.method, &methods)?,
+            robust: self.robust,
+            placement: word("placement", &self.placement, &placements)?,
+            smoother: word("smoother", &self.smoother, &smoothers)?,
+            weight_depths: weights.transpose()?.map(|(_, values)| values),
+            initial: self.initial()?,
+            rotation_prior: self.rotation_prior()?,
+            seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
+            threads: Threads::new(self.threads)?,
+        })
+    }
+
+    fn initial(&self) -> PyResult<Option<Motion>> {
+        let Some((translation, rotation)) = &self.initial else { return Ok(None) };
+        Ok(Some(Motion { translation: triple("initial", translation)?, rotation: triple("initial", rotation)? }))
+    }
+
+    fn rotation_prior(&self) -> PyResult<Option<RotationPrior>> {
+        let Some((rotation, covariance)) = &self.rotation_prior else { return Ok(None) };
+        let rotation = triple("rotation_prior", rotation)?;
+        Ok(Some(RotationPrior { rotation, covariance: square("rotation_prior", "a covariance of ", covariance)? }))
+    }
+}
