@@ -1,5 +1,7 @@
 """The stereo tracker: scenes whose answer is known, edge cases, the graph there and back."""
 
+import io
+import json
 import pickle
 import sys
 from dataclasses import replace
@@ -169,7 +171,33 @@ def test_networkx_has_nodes_arcs_and_attributes():
     assert set(drawn.nodes) == set(graph.nodes) and set(drawn.edges) == set(graph.arcs)
     for edge in drawn.edges.values():
         assert edge["score"] == pytest.approx(edge["forward"] + edge["backward"])
-    assert next(iter(drawn.nodes.values()))["mean"].shape == (3,)
+    for key, node in drawn.nodes.items():
+        np.testing.assert_array_equal(node["mean"], graph.nodes[key].mean)
+        assert np.shape(node["covariance"]) == (3, 3)
+
+
+def test_networkx_can_write_the_graph():
+    networkx = pytest.importorskip("networkx")
+    graph = followed()[0].graph
+    text = json.dumps(networkx.node_link_data(graph.to_networkx(), edges="edges"))
+    again = networkx.node_link_graph(json.loads(text), edges="edges")
+    assert set(again.nodes) == set(graph.nodes) and set(again.edges) == set(graph.arcs)
+    flat = graph.to_networkx(flat=True)
+    written = io.BytesIO()
+    networkx.write_graphml(flat, written)
+    read = networkx.read_graphml(io.BytesIO(written.getvalue()))
+    assert len(read.nodes) == len(graph.nodes) and len(read.edges) == len(graph.arcs)
+    first = min(graph.nodes)
+    assert read.nodes[str(first)]["mean_2"] == graph.nodes[first].mean[2]
+    assert read.nodes[str(first)]["covariance_0_1"] == graph.nodes[first].covariance[0, 1]
+
+
+@pytest.mark.parametrize("part", ["nodes", "arcs"])
+def test_a_written_graph_says_everything_once(part):
+    graph = json.loads(followed()[0].graph.to_json())
+    graph[part].append(graph[part][0])
+    with pytest.raises(ValueError, match="json: .*twice"):
+        TrackGraph.from_json(json.dumps(graph))
 
 
 def test_known_cameras_give_depth_and_speed():
