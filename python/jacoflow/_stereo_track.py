@@ -38,9 +38,9 @@ class StereoCluster:
     covariance: Array
     """Covariance of (x, y, disparity), (3, 3), px^2."""
     velocity: Array
-    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step."""
+    """Motion (u, v, w) since the last step, medians over the pixels that it had then, (3,), px/step and disparity/step. Of what grows or turns, `affine` says what each pixel does."""
     next_velocity: Array
-    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    """Motion (u, v, w) to the next step, medians over its pixels, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
     middle: Array
     """Medians of its pixels along x and y, (2,), px."""
     affine: Array
@@ -206,7 +206,7 @@ class StereoTracker:
     disparity_range, row_range : (int, int), px
         Least and greatest disparity, and offset of the right view's rows, that are looked for.
     row_offset : float, px
-        Offset of the rows; default: found from the views, once ("improved") or at every pixel ("paper").
+        Offset of the rows; default: found from the views, at the first step that shows enough and again where later ones contradict it ("improved"), or at every pixel ("paper").
     matching : "sgm" or "classes"
         How the views are matched, see `jacoflow.stereo.edge_disparity`; default "sgm" ("paper": "classes").
     grid : (rows, columns, layers)
@@ -290,7 +290,7 @@ class StereoTracker:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
         Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
-        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom).
+        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
         Raises
         ------

@@ -13,12 +13,14 @@ mod classes;
 mod cost;
 mod disparity;
 mod edges;
+mod film_rows;
 mod options;
 mod row_offset;
 mod semi_global;
 mod subpixel;
 
 pub use disparity::{EdgeDisparity, edge_disparity};
+pub use film_rows::FilmRows;
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
 pub use row_offset::estimate_row_offset;

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jacoflow import video
 from jacoflow.track import StereoTracker, TrackGraph
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -198,6 +199,39 @@ def test_a_written_graph_says_everything_once(part):
     graph[part].append(graph[part][0])
     with pytest.raises(ValueError, match="json: .*twice"):
         TrackGraph.from_json(json.dumps(graph))
+
+
+def test_a_compressed_film_that_holds_both_views_is_followed(tmp_path):
+    """As players have it: MPEG-4 of both views side by side, with the losses that go with it."""
+    av = pytest.importorskip("av")
+    path = tmp_path / "film.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=25, options={"qscale": "2"})
+        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 320, 120, "yuv420p", 8_000_000
+        for views in film():
+            picture = av.VideoFrame.from_ndarray(np.hstack(views), format="gray").reformat(format="yuv420p")
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode())
+    tracker = StereoTracker(n_components=6, **SMALL)
+    for both in video.frames(path):
+        step = tracker.update(*np.split(both, 2, axis=1))
+    assert step.time == 4
+    assert np.allclose(biggest(step, -4).velocity, [2, 0, 0], atol=0.1)
+    assert np.allclose(biggest(step, 5).velocity, [-3, 0, 0], atol=0.1)
+
+
+def test_the_rows_of_a_film_are_not_those_of_its_title():
+    card = np.full((240, 320), 20, np.uint8)
+    card[100:104, 60:260] = card[120:150, 80:84] = card[120:150, 200:204] = 230
+    noise = [np.random.default_rng(seed).integers(0, 40, card.shape, dtype=np.uint8) for seed in (1, 2)]
+    film = small().film()[:2]
+    for first in ((card, card), noise, (np.full_like(card, 16),) * 2):
+        tracker = StereoTracker(disparity_range=(-20, 12))
+        tracker.update(*first)
+        for shown in film:
+            step = tracker.update(shown.left, shown.right)
+            wrong = np.abs(step.values - shown.disparity[step.rows, step.cols]) > 1
+            assert len(step.rows) > 4000 and wrong.mean() < 0.04
 
 
 def test_known_cameras_give_depth_and_speed():

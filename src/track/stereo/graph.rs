@@ -23,9 +23,9 @@ pub struct Node {
     pub mean: [f64; 3],
     /// Covariance of `(x, y, d)`, px^2.
     pub covariance: [[f64; 3]; 3],
-    /// Motion `(u, v, w)` since the last step, px/step and disparity/step; none where it was not measured.
+    /// Motion `(u, v, w)` since the last step, medians over its pixels then, px/step and disparity/step; none where it was not measured.
     pub velocity: Option<[f64; 3]>,
-    /// Motion `(u, v, w)` to the next step, as soon as that is known.
+    /// Motion `(u, v, w)` to the next step, medians over its pixels, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
     /// Medians of its pixels along x and y, px.
     pub middle: [f64; 2],

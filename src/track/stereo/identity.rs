@@ -12,33 +12,35 @@ pub(super) struct Identity {
     pub steady: usize,
     /// Steps coasted in a row.
     pub coasted: usize,
-    /// Where it is, cells: its mean, or where it went since while it is mostly covered, which shifts the mean.
+    /// Where it is, cells: its middle, or where it went since while it is mostly covered, which shifts the middle.
     pub position: [f64; 3],
     /// Most edge pixels of late.
     pub peak: f64,
-    /// Standard deviation in depth when it was last mostly seen, layers.
-    pub thickness: f64,
+    /// Median deviations along x, y and in depth when it was last mostly seen, cells and layers.
+    pub spread: [f64; 3],
 }
 
 /// A component that is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sighting {
     pub component: usize,
-    /// Mean, cells.
+    /// Medians, cells.
     pub position: [f64; 3],
     /// Edge pixels.
     pub pixels: usize,
-    /// Standard deviation in depth, layers.
-    pub thickness: f64,
+    /// Median deviations from these along x, y and in depth, cells and layers. Wrong matches that are in every component change neither much.
+    pub spread: [f64; 3],
 }
 
-/// Share of the most pixels of late below which a track counts as partly covered: its mean is then that of what is left.
+/// Share of the most pixels of late below which a track counts as partly covered: its middle is then that of what is left.
 const COVERED: f64 = 0.8;
 /// By how much a thing may be thicker or thinner than a lost one that it is taken for: a factor, and layers. What covers part of a thing does not change its extent in depth.
 const AS_THICK: (f64, f64) = (2.0, 0.5);
 /// How many times as many pixels as the lost one had a thing that is taken for it may have.
 const AS_LARGE: f64 = 1.5;
-/// What the memory of that loses each step.
+/// Half the extent of something even, over its median deviation.
+const HALF_EXTENT: f64 = 2.0;
+/// What the memory of the most pixels loses each step.
 const FORGET: f64 = 0.9;
 
 /// What a component does from one step to the next.
@@ -126,7 +128,7 @@ impl Identities {
     }
 
     /// Gives every component that is seen and has no track one: a lost track that is expected there, the nearest first, if there are at least `least` pixels, or a new one.
-    /// Then all are where they were seen. Tracks lost since the step before are not given back.
+    /// Then all are where they were seen.
     pub fn name_all(&mut self, time: usize, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
         if let Some(limits) = limits {
@@ -149,26 +151,26 @@ impl Identities {
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
         }
-        for &Sighting { component, position, pixels, thickness } in seen {
+        for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
                 let id = self.name();
-                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, thickness };
+                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, spread };
                 self.live[component] = Some(unknown);
             }
             if let Some(identity) = &mut self.live[component] {
-                identity.see(position, pixels as f64, thickness);
+                identity.see(position, pixels as f64, spread);
             }
         }
     }
 }
 
 impl Identity {
-    fn see(&mut self, position: [f64; 3], pixels: f64, thickness: f64) {
+    fn see(&mut self, position: [f64; 3], pixels: f64, spread: [f64; 3]) {
         self.peak = pixels.max(FORGET * self.peak);
         self.position = match self.velocity {
             Some(velocity) if pixels < COVERED * self.peak => std::array::from_fn(|i| self.position[i] + velocity[i]),
             _ => {
-                self.thickness = thickness;
+                self.spread = spread;
                 position
             }
         };
@@ -177,23 +179,26 @@ impl Identity {
     /// Whether a thing may be this one, seen wholly or in part.
     fn resembles(&self, seen: &Sighting) -> bool {
         let (factor, layers) = AS_THICK;
-        let (thinner, thicker) = (self.thickness.min(seen.thickness), self.thickness.max(seen.thickness));
+        let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
         thicker <= factor * thinner + layers && seen.pixels as f64 <= AS_LARGE * self.peak
     }
 }
 
 impl Resting {
-    /// How far a component is from where the track is expected, in tolerances; `None` beyond them, for one that does not resemble it, and for a track just lost.
+    /// How far a component is from where the track is expected, in tolerances; `None` beyond them and for one that does not resemble it.
     fn distance(&self, time: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
         let gap = time - self.since;
-        if gap < 2 || !self.identity.resembles(seen) {
+        if !self.identity.resembles(seen) {
             return None;
         }
         let velocity = self.identity.velocity?;
+        // The middle of what is not covered is as far from that of the whole as the other part allows.
+        let covered = 1.0 - (seen.pixels as f64 / self.identity.peak.max(1.0)).min(1.0);
         let mut sum = 0.0;
         for i in 0..3 {
             let expected = self.identity.position[i] + gap as f64 * velocity[i];
-            let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i];
+            let part = if i < 2 { covered * HALF_EXTENT * self.identity.spread[i] } else { 0.0 };
+            let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i] + part;
             let off = (seen.position[i] - expected).abs() / tolerance;
             if off > 1.0 {
                 return None;
@@ -213,7 +218,7 @@ mod tests {
     const LEAST: f64 = 20.0;
 
     fn at(component: usize, position: [f64; 3]) -> Sighting {
-        Sighting { component, position, pixels: 100, thickness: 0.3 }
+        Sighting { component, position, pixels: 100, spread: [2.0, 4.0, 0.3] }
     }
 
     fn identities() -> Identities {
@@ -238,6 +243,13 @@ mod tests {
         let (mut elsewhere, mut small) = (all.clone(), all.clone());
         small.name_all(5, &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
         assert_eq!(small.live[2].as_ref().unwrap().id, 2);
+        // Half of it, whose middle is farther from the expected one than that of all of it may be.
+        let upper = at(2, [20.5, 1.0, 32.6]);
+        for (pixels, id) in [(100, 2), (40, 0)] {
+            let mut part = all.clone();
+            part.name_all(5, &[Sighting { pixels, ..upper }], LEAST, Some(&limits));
+            assert_eq!(part.live[2].as_ref().unwrap().id, id);
+        }
         all.name_all(5, &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, 0);
         elsewhere.name_all(5, &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
@@ -257,8 +269,8 @@ mod tests {
             (there, true),
             (Sighting { pixels: 40, ..there }, true),
             (Sighting { pixels: 160, ..there }, false),
-            (Sighting { thickness: 1.0, ..there }, true),
-            (Sighting { thickness: 4.0, ..there }, false),
+            (Sighting { spread: [2.0, 4.0, 1.0], ..there }, true),
+            (Sighting { spread: [2.0, 4.0, 4.0], ..there }, false),
         ] {
             let mut all = all.clone();
             all.name_all(3, &[seen], LEAST, Some(&limits));

@@ -64,6 +64,17 @@ impl FineMotion {
         [self.plane.flow.u, self.plane.flow.v, self.depth]
     }
 
+    /// `(u, v, w)` of a cluster as a whole, px and disparity: medians over its pixels `(x, y)`. Of what grows and has more of its pixels on one side, the motion at the centre is another one.
+    pub fn typical(&self, pixels: &[[f64; 2]]) -> [f64; 3] {
+        let flows = pixels.iter().map(|[x, y]| self.plane.flow.at_offset(x - self.plane.centre[0], y - self.plane.centre[1]));
+        let (along_x, along_y): (Vec<f64>, Vec<f64>) = flows.unzip();
+        let [u, v] = [along_x, along_y].map(|mut along| {
+            let half = along.len() / 2;
+            if along.is_empty() { f64::NAN } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+        });
+        [u, v, self.depth]
+    }
+
     /// A translation of a cluster whose pixels have the middle `centre`.
     pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
         let flow = AffineFlow { u, v, ..AffineFlow::default() };
@@ -232,6 +243,18 @@ mod tests {
         assert_eq!(noise(&clusters, &[left(0.5), left(0.8), left(9.0), None]), Some(0.8));
         assert_eq!(noise(&clusters, &[None, None, left(9.0), None]), Some(9.0));
         assert_eq!(noise(&clusters, &[None; 4]), None);
+    }
+
+    #[test]
+    fn the_motion_of_a_cluster_is_that_of_most_of_its_pixels() {
+        let motion = FineMotion::translation([2.0, -1.0, 0.5], [10.0, 10.0]);
+        let growing = AffineFlow { u_x: 0.1, v_y: 0.1, v_x: 0.2, ..motion.plane.flow };
+        let motion = FineMotion { plane: PlaneMotion { flow: growing, ..motion.plane }, ..motion };
+        // The medians along x and along y are no pixel's flow: u is 1, 1.5, 2, 2, 3 and v -3, -2, -2, -1, 2.
+        let pixels = [[0.0, 10.0], [10.0, 10.0], [10.0, 0.0], [5.0, 10.0], [20.0, 20.0]];
+        let [u, v, w] = motion.typical(&pixels);
+        assert!((u - 2.0).abs() < 1e-12 && (v + 2.0).abs() < 1e-12 && w == 0.5, "{u} {v} {w}");
+        assert_eq!(FineMotion::translation([2.0, -1.0, 0.5], [0.0; 2]).typical(&pixels), [2.0, -1.0, 0.5]);
     }
 
     #[test]

@@ -4,13 +4,16 @@ use super::options::StereoTrackerOptions;
 use super::voxels::Voxels;
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
+use nalgebra::Matrix3;
 
 /// Coordinates of a voxel.
 const D: usize = 3;
-/// Standard deviations of a new seed, cells along x, y and disparity.
+/// Standard deviations of a typical seed, cells along x, y and disparity.
 const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
-/// Cells along x, y and disparity round a seed that support it, and in which there is none other.
+/// Voxels no farther apart, along x, y and disparity, are of one blob.
 const SEED_REACH: [i32; D] = [2, 2, 1];
+/// Share of the pixels above which what is not explained is another scene.
+const ANOTHER_SCENE: f64 = 0.5;
 
 /// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole voxels alone moves a flat one.
 const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
@@ -33,10 +36,11 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds every component to which fewer than `reseed_below` pixels belong at the voxel that the others explain worst, among those whose
-/// neighbourhood holds as many pixels that such a seed would explain better. Returns which were seeded anew.
+/// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed would explain better than the others do, the largest blobs first. Tells
+/// which were seeded anew, and what is neither explained nor in such a blob; `None` where most of the pixels are in such blobs: another scene.
 ///
-/// Pixels that are explained already do not count: a seed beside a flat component could take it over, as the sharper of the two, and with it the identity.
+/// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step or two, and then one of them, whichever, would take it over and with it the identity.
+/// Pixels that are explained already do not count: a seed beside a flat component could take that over, as the sharper of the two.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -45,67 +49,137 @@ pub(super) fn reseed(
     voxels: &Voxels,
     points: &Points,
     options: &StereoTrackerOptions,
-) -> Result<Vec<bool>> {
+) -> Result<Option<Seeded>> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
+    let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
+    let least = options.reseed_below.max(1.0);
+    let explained = log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()));
+    let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
+    let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained)
+        .into_iter()
+        .partition(|blob| blob.pixels >= least && blob.explains_itself(all, explained));
+    let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
+    if blobs.iter().map(|blob| blob.pixels).sum::<f64>() > ANOTHER_SCENE * all {
+        return Ok(None);
+    }
+    // The order of those alike is that of the voxels.
+    blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
     let mut pixels = vec![0.0; components];
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
         pixels.iter_mut().zip(row).for_each(|(sum, share)| *sum += share * f64::from(count));
     }
-    let dead: Vec<usize> = (0..components).filter(|&k| pixels[k] < options.reseed_below).collect();
-    let mut seeded = vec![false; components];
-    if dead.is_empty() {
-        return Ok(seeded);
+    let thin = |k: usize| log_density(pixels[k] / all, &covariance(posterior, k)) < explained;
+    let dead: Vec<usize> = (0..components).filter(|&k| pixels[k] < options.reseed_below || thin(k)).collect();
+    let mut seeds = vec![false; components];
+    for (k, blob) in dead.into_iter().zip(&blobs) {
+        blob.place(posterior, k, options);
+        seeds[k] = true;
     }
-    let least = options.reseed_below.max(1.0);
-    let share = least / voxels.counts.iter().map(|&count| f64::from(count)).sum::<f64>().max(least);
-    let explained = share.ln() + seed_log_density();
-    let mut worst: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
-    let unexplained = worst.clone();
-    worst.sort_by(|&a, &b| densities[a].total_cmp(&densities[b]).then(a.cmp(&b)));
-    let mut seeds: Vec<[u16; D]> = Vec::new();
-    let mut candidates = worst.into_iter();
-    for k in dead {
-        let found = candidates.by_ref().map(|n| voxels.cells[n]).find_map(|cell| {
-            let far = !seeds.iter().any(|&seed| near(cell, seed));
-            far.then(|| (cell, support(voxels, &unexplained, cell)))
-                .filter(|(_, support)| *support >= options.reseed_below)
-        });
-        let Some((cell, support)) = found else { break };
-        seeds.push(cell);
-        place(posterior, k, cell, support, options);
-        seeded[k] = true;
-    }
-    Ok(seeded)
+    Ok(Some(Seeded { seeds, strays }))
 }
 
-/// Whether two voxels are neighbours.
-fn near(a: [u16; D], b: [u16; D]) -> bool {
-    (0..D).all(|i| (i32::from(a[i]) - i32::from(b[i])).abs() <= SEED_REACH[i])
+/// Logarithm of the density at one standard deviation along every axis of a component with a share of the pixels.
+fn log_density(share: f64, covariance: &Matrix3<f64>) -> f64 {
+    share.ln() - 0.5 * (D as f64 + (std::f64::consts::TAU.powi(D as i32) * covariance.determinant()).ln())
 }
 
-/// Logarithm of a seed's density at one standard deviation along every axis.
-fn seed_log_density() -> f64 {
-    SEED_SPREAD.iter().map(|spread| -0.5 * (std::f64::consts::TAU * spread * spread).ln() - 0.5).sum()
+/// Covariance of a component, cells^2.
+fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
+    Matrix3::from_row_slice(&posterior.scale_inverses[k * D * D..][..D * D]) / posterior.degrees_of_freedom[k]
 }
 
-/// Pixels in those voxels, of some, that are in the neighbourhood of one.
-fn support(voxels: &Voxels, some: &[usize], cell: [u16; D]) -> f64 {
-    some.iter().filter(|&&n| near(voxels.cells[n], cell)).map(|&n| f64::from(voxels.counts[n])).sum()
+/// What seeding did.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seeded {
+    /// Which components were seeded anew.
+    pub seeds: Vec<bool>,
+    /// Voxels that nothing explains and that are too few or too thinly spread to be something: wrong matches, which are not to be fitted.
+    pub strays: Vec<usize>,
 }
 
-/// Makes component `k` a small one with `pixels` about a voxel.
-fn place(posterior: &mut Posterior, k: usize, cell: [u16; D], pixels: f64, options: &StereoTrackerOptions) {
-    posterior.weight_concentration[k] = options.weight_concentration_prior + pixels;
-    posterior.mean_precision[k] = options.mean_precision_prior + pixels;
-    posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + pixels;
-    for i in 0..D {
-        posterior.means[k * D + i] = f64::from(cell[i]);
-        for j in 0..D {
-            let spread = if i == j { options.covariance_prior + pixels * SEED_SPREAD[i].powi(2) } else { 0.0 };
-            posterior.scale_inverses[(k * D + i) * D + j] = spread;
+/// Neighbouring voxels.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Blob {
+    members: Vec<usize>,
+    pixels: f64,
+    /// `sum f x`, cells.
+    sums: [f64; D],
+    /// `sum f x x^T`.
+    squares: [f64; D * D],
+}
+
+impl Blob {
+    fn add(&mut self, voxel: usize, cell: [u16; D], count: f64) {
+        self.members.push(voxel);
+        self.pixels += count;
+        for i in 0..D {
+            self.sums[i] += count * f64::from(cell[i]);
+            for j in 0..D {
+                self.squares[i * D + j] += count * f64::from(cell[i]) * f64::from(cell[j]);
+            }
         }
     }
+
+    /// Covariance, cells^2, with what counting in whole voxels hides: a twelfth of a cell's square.
+    fn covariance(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| {
+            let counting = if i == j { 1.0 / 12.0 } else { 0.0 };
+            (self.squares[i * D + j] - self.sums[i] * self.sums[j] / self.pixels) / self.pixels + counting
+        })
+    }
+
+    /// Whether its density at one standard deviation is one that explains, among `all` pixels: wrong matches are spread too thinly.
+    fn explains_itself(&self, all: f64, explained: f64) -> bool {
+        log_density(self.pixels / all, &self.covariance()) >= explained
+    }
+
+    /// Makes component `k` what these pixels alone would make it.
+    fn place(&self, posterior: &mut Posterior, k: usize, options: &StereoTrackerOptions) {
+        posterior.weight_concentration[k] = options.weight_concentration_prior + self.pixels;
+        posterior.mean_precision[k] = options.mean_precision_prior + self.pixels;
+        posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + self.pixels;
+        let covariance = self.covariance();
+        for i in 0..D {
+            posterior.means[k * D + i] = self.sums[i] / self.pixels;
+            for j in 0..D {
+                let prior = if i == j { options.covariance_prior } else { 0.0 };
+                posterior.scale_inverses[(k * D + i) * D + j] = prior + self.pixels * covariance[(i, j)];
+            }
+        }
+    }
+}
+
+/// Some of the voxels by who is beside whom, in the order of their first ones.
+fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
+    let lattice = &voxels.lattice;
+    if some.is_empty() {
+        return vec![];
+    }
+    let mut waiting = vec![u32::MAX; lattice.volume()];
+    some.iter().for_each(|&n| waiting[lattice.index(voxels.cells[n])] = n as u32);
+    let mut take = |cell: [u16; D]| {
+        let slot = &mut waiting[lattice.index(cell)];
+        Some(std::mem::replace(slot, u32::MAX)).filter(|&n| n != u32::MAX).map(|n| n as usize)
+    };
+    let mut out = Vec::new();
+    for &first in some {
+        let Some(first) = take(voxels.cells[first]) else { continue };
+        let (mut blob, mut front) = (Blob::default(), vec![first]);
+        while let Some(n) = front.pop() {
+            blob.add(n, voxels.cells[n], f64::from(voxels.counts[n]));
+            let beside = neighbours().filter_map(|by| lattice.shifted(voxels.cells[n], by));
+            front.extend(beside.filter_map(&mut take));
+        }
+        out.push(blob);
+    }
+    out
+}
+
+/// Shifts to the voxels beside one.
+fn neighbours() -> impl Iterator<Item = [i32; D]> {
+    let [x, y, z] = SEED_REACH;
+    (-z..=z).flat_map(move |dz| (-y..=y).flat_map(move |dy| (-x..=x).map(move |dx| [dx, dy, dz])))
 }
 
 #[cfg(test)]
@@ -146,10 +220,41 @@ mod tests {
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, true]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, true]);
         let mean = &posterior.means[3..];
-        assert!((40.0..=42.0).contains(&mean[0]) && (20.0..=22.0).contains(&mean[1]) && mean[2] == 20.0, "{mean:?}");
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+        assert_eq!(mean, [41.0, 21.0, 20.0]);
+        // Its extent: cells 40 to 42 and 20 to 22, each counted five times, one layer.
+        let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - options.covariance_prior - 45.0 / 12.0;
+        assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
+    }
+
+    #[test]
+    fn what_comes_to_light_gets_one_seed_and_another_scene_none() {
+        let block = |at: [u16; 3], width: u16, n: u16| (0..n).map(move |i| ([at[0] + i % width, at[1] + i / width, at[2]], 0));
+        // Explained, a strip far wider than a seed, and two voxels too few to be anything.
+        let cells: Vec<_> = block([10, 10, 30], 3, 9)
+            .flat_map(|cell| [cell; 20])
+            .chain(block([40, 20, 20], 12, 72))
+            .chain(block([70, 5, 60], 2, 2))
+            .collect();
+        let voxels = made_up(&cells, 1).voxels;
+        let (values, weights) = (voxels.centres(), voxels.weights());
+        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+        let mut three = posterior();
+        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
+            of.push(60.0);
+        }
+        three.means.extend([5.0, 55.0, 50.0]);
+        three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
+        let options = StereoTrackerOptions::default();
+        let told = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
+        assert_eq!(told.seeds, [false, true, false]);
+        assert_eq!(told.strays.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
+        // Moved away from what it explained.
+        let mut lost = posterior();
+        lost.means[0] = 30.0;
+        assert_eq!(reseed(&mut lost, &voxels, &points, &options).unwrap(), None);
     }
 
     #[test]
@@ -162,7 +267,7 @@ mod tests {
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
         assert_eq!(posterior.means[3..], [70.0, 50.0, 3.0]);
     }
 }
