@@ -127,7 +127,24 @@ impl Identities {
         }
     }
 
-    /// Gives every component that is seen and has no track one: a lost track that is expected there, the nearest first, if there are at least `least` pixels, or a new one.
+    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component without one that is larger than its own and may be it as well.
+    fn pass_to_larger_parts(&mut self, seen: &[Sighting], least: f64, limits: &Recognition) {
+        for own in seen {
+            let Some(identity) = self.live[own.component].as_ref() else { continue };
+            if own.pixels as f64 >= COVERED * identity.peak {
+                continue;
+            }
+            let larger = seen.iter().filter(|new| {
+                let free = self.live[new.component].is_none() && new.pixels > own.pixels && new.pixels as f64 >= least;
+                free && identity.distance(1, new, limits).is_some()
+            });
+            if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
+                self.live[new.component] = self.live[own.component].take();
+            }
+        }
+    }
+
+    /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one.
     /// Then all are where they were seen.
     pub fn name_all(&mut self, time: usize, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
@@ -135,21 +152,22 @@ impl Identities {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
                 for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
-                    if let Some(distance) = resting.distance(time, new, limits) {
-                        pairs.push((distance, r, new.component));
+                    if let Some(distance) = resting.identity.distance(time - resting.since, new, limits) {
+                        pairs.push((new.pixels, distance, r, new.component));
                     }
                 }
             }
-            pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+            pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
             let mut taken = vec![false; self.resting.len()];
-            for (_, r, k) in pairs {
+            for (_, _, r, k) in pairs {
                 if !taken[r] && self.live[k].is_none() {
                     taken[r] = true;
-                    self.live[k] = Some(Identity { coasted: 0, peak: 0.0, ..self.resting[r].identity.clone() });
+                    self.live[k] = Some(self.resting[r].awake(time));
                 }
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
+            self.pass_to_larger_parts(seen, least, limits);
         }
         for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
@@ -176,6 +194,25 @@ impl Identity {
         };
     }
 
+    /// How far a component is from where the track is expected after so many steps, in tolerances; `None` beyond them, and for one that does not resemble it.
+    fn distance(&self, steps: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
+        let velocity = self.velocity.filter(|_| self.resembles(seen))?;
+        // The middle of what is not covered is as far from that of the whole as the other part allows.
+        let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
+        let mut sum = 0.0;
+        for i in 0..3 {
+            let expected = self.position[i] + steps as f64 * velocity[i];
+            let part = if i < 2 { covered * HALF_EXTENT * self.spread[i] } else { 0.0 };
+            let tolerance = limits.tolerance[i] + steps as f64 * limits.tolerance_per_step[i] + part;
+            let off = (seen.position[i] - expected).abs() / tolerance;
+            if off > 1.0 {
+                return None;
+            }
+            sum += off * off;
+        }
+        Some(sum)
+    }
+
     /// Whether a thing may be this one, seen wholly or in part.
     fn resembles(&self, seen: &Sighting) -> bool {
         let (factor, layers) = AS_THICK;
@@ -185,27 +222,14 @@ impl Identity {
 }
 
 impl Resting {
-    /// How far a component is from where the track is expected, in tolerances; `None` beyond them and for one that does not resemble it.
-    fn distance(&self, time: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
-        let gap = time - self.since;
-        if !self.identity.resembles(seen) {
-            return None;
+    /// The track as it goes on where it is expected; how much there is of it is remembered.
+    fn awake(&self, time: usize) -> Identity {
+        let mut identity = Identity { coasted: 0, ..self.identity.clone() };
+        if let Some(velocity) = identity.velocity {
+            let steps = (time - self.since).saturating_sub(1) as f64;
+            (0..3).for_each(|i| identity.position[i] += steps * velocity[i]);
         }
-        let velocity = self.identity.velocity?;
-        // The middle of what is not covered is as far from that of the whole as the other part allows.
-        let covered = 1.0 - (seen.pixels as f64 / self.identity.peak.max(1.0)).min(1.0);
-        let mut sum = 0.0;
-        for i in 0..3 {
-            let expected = self.identity.position[i] + gap as f64 * velocity[i];
-            let part = if i < 2 { covered * HALF_EXTENT * self.identity.spread[i] } else { 0.0 };
-            let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i] + part;
-            let off = (seen.position[i] - expected).abs() / tolerance;
-            if off > 1.0 {
-                return None;
-            }
-            sum += off * off;
-        }
-        Some(sum)
+        identity
     }
 }
 
@@ -276,6 +300,28 @@ mod tests {
             all.name_all(3, &[seen], LEAST, Some(&limits));
             assert_eq!(all.live[2].as_ref().unwrap().id == 0, known, "{seen:?}");
         }
+    }
+
+    #[test]
+    fn of_the_parts_that_come_to_light_the_largest_is_it() {
+        let limits = Recognition::default();
+        let mut all = identities();
+        for _ in 0..2 {
+            all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
+        }
+        all.rest(0, |k| k == 0);
+        // At step 2 two parts of it, at step 3 another one that is larger; at last it is whole.
+        let part = |component, position, pixels| Sighting { pixels, ..at(component, position) };
+        let ids = |all: &Identities| all.live.iter().map(|live| live.as_ref().map(|live| live.id)).collect::<Vec<_>>();
+        all.name_all(2, &[part(0, [14.5, 5.0, 30.0], 20), part(2, [14.5, 14.0, 30.0], 30)], LEAST, Some(&limits));
+        assert_eq!(ids(&all), [Some(2), Some(1), Some(0)]);
+        all.live[0] = None;
+        all.name_all(3, &[part(0, [16.5, 5.0, 30.0], 60), part(2, [16.5, 14.0, 30.0], 30)], LEAST, Some(&limits));
+        assert_eq!(ids(&all), [Some(0), Some(1), Some(3)]);
+        assert_eq!(all.live[0].as_ref().unwrap().position, [16.0, 10.0, 30.0]);
+        all.live[2] = None;
+        all.name_all(4, &[part(0, [18.5, 10.0, 30.0], 95), part(2, [18.0, 5.0, 30.0], 98)], LEAST, Some(&limits));
+        assert_eq!(ids(&all), [Some(0), Some(1), Some(4)]);
     }
 
     #[test]
