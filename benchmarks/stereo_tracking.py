@@ -5,7 +5,7 @@
 Purity is the share of edge pixels in clusters of their own majority label, recall the share of an object's edge pixels in clusters where it is the majority, path the steps over which the chain of strongest arcs stays on an object until
 it is hidden, index the same for its component, id for its track from the first step on; kept is the share of the steps at which it is visible with one and the same track (of a cluster at least half as large as its largest). Recognised are films in which
 its largest cluster is on the track from before it was hidden by the third step after that, and stays on it. Grouped is the share of its edge pixels in its largest cluster, in its largest group, and the share of that group that is the object's.
-Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of the clusters' `next_velocity` (u, v, w), px and disparity per step, over clusters at least 80 % pure; gross are those off by more than 2 px or 1 disparity.
+Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure: speed of the affine motion at the object's own pixels, velocity of `next_velocity`; gross are those off by more than 2 px or 1 disparity.
 
 Seeds are of the textures, the noise and the mixture's starts, all of them others; the first is the specification's. Everything is the mean over the seeds, paths are the least of them. Times are wall time, medians over steps and films.
 """
@@ -57,8 +57,8 @@ def follow(scene: stereo_scenes.Scene, film: Sequence[stereo_scenes.Step], track
 
 def node_of(cluster: StereoCluster) -> Node:
     """What the scores need of a cluster."""
-    velocity = None if np.isnan(cluster.next_velocity).any() else cluster.next_velocity
-    return Node(cluster.track_id, velocity, cluster.group)
+    velocity, affine = [None if np.isnan(value).any() else value for value in (cluster.next_velocity, cluster.next_affine)]
+    return Node(cluster.track_id, velocity, cluster.group, affine, cluster.middle)
 
 
 def edges_of_truth(shown: stereo_scenes.Step, rng: np.random.Generator) -> NDArray[np.float32]:
@@ -91,13 +91,14 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, from_truth: bool) 
             row[f"recognised {label}"] = f"{sum(map(bool, back))} of {seeds}"
         if mode == "improved":
             row[f"grouped {label}"] = " ".join(f"{np.mean(share):.2f}" for share in zip(*(score.grouped(label) for score in scores), strict=True))
-    errors = [score.motion_errors() for score in scores]
-    for label in [0, *labels]:
-        of_label = [error[label] for error in errors if label in error]
-        if of_label:
-            medians = np.mean([np.median(error, axis=0) for error in of_label], axis=0)
-            share = np.mean([gross(error) for error in of_label])
-            row[f"speed {label}"] = " ".join(f"{value:.3f}" for value in medians) + f" ({100 * share:.1f} %)"
+    for what, told in (("speed", "affine"), ("velocity", "velocity")):
+        errors = [score.motion_errors(told) for score in scores]
+        for label in [0, *labels]:
+            of_label = [error[label] for error in errors if label in error]
+            if of_label:
+                medians = np.mean([np.median(error, axis=0) for error in of_label], axis=0)
+                share = np.mean([gross(error) for error in of_label])
+                row[f"{what} {label}"] = " ".join(f"{value:.3f}" for value in medians) + f" ({100 * share:.1f} %)"
     if mode == "improved":
         row["groups"] = float(np.mean([score.groups() for score in scores]))
     row["short tracks"] = float(np.mean([score.short_tracks() for score in scores]))

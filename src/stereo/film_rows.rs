@@ -123,7 +123,8 @@ mod tests {
 
     /// Views that show nothing, noise, and a title drawn into both alike.
     fn openings() -> [[Frame<f32>; 2]; 3] {
-        let noise = |seed| Frame::from_fn(180, 160, |x, y| 40.0 * CounterRng::new(seed).uniform((1000 * y + x) as u64) as f32);
+        let noise =
+            |seed| Frame::from_fn(180, 160, |x, y| 40.0 * CounterRng::new(seed).uniform((1000 * y + x) as u64) as f32);
         let title = Frame::from_fn(180, 160, |x, y| {
             let bar = (40..46).contains(&y) && (20..160).contains(&x);
             let strokes = (70..100).contains(&y) && (20..160).contains(&x) && x / 6 % 3 == 0;

@@ -20,7 +20,7 @@ mod semi_global;
 mod subpixel;
 
 pub use disparity::{EdgeDisparity, edge_disparity};
-pub use film_rows::FilmRows;
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
+pub use film_rows::FilmRows;
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
 pub use row_offset::estimate_row_offset;

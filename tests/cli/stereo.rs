@@ -112,7 +112,9 @@ fn squeezed(view: &[u8], wide: bool) -> Vec<u8> {
     if wide {
         return view.chunks(2).map(|two| mean(two[0], two[1])).collect();
     }
-    view.chunks(2 * WIDTH).flat_map(|two| (0..WIDTH).map(|x| mean(two[x], two[WIDTH + x])).collect::<Vec<_>>()).collect()
+    view.chunks(2 * WIDTH)
+        .flat_map(|two| (0..WIDTH).map(|x| mean(two[x], two[WIDTH + x])).collect::<Vec<_>>())
+        .collect()
 }
 
 #[test]
@@ -143,7 +145,8 @@ fn squeezed_films_have_the_disparities_of_whole_ones() {
 #[test]
 fn rows_are_found_whatever_a_film_begins_with() {
     let card = |_: usize| -> Vec<u8> {
-        let bar = |i: usize| (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && i % WIDTH / 6 % 3 == 0;
+        let bar =
+            |i: usize| (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && i % WIDTH / 6 % 3 == 0;
         (0..WIDTH * HEIGHT).map(|i| if bar(i) && (8..88).contains(&(i % WIDTH)) { 230 } else { 20 }).collect()
     };
     for title in [false, true] {
@@ -153,7 +156,8 @@ fn rows_are_found_whatever_a_film_begins_with() {
             // The right view is two rows lower.
             _ => {
                 let [left, right] = views(index);
-                let lower = (0..WIDTH * HEIGHT).map(|i| right[(i / WIDTH).max(2) * WIDTH - 2 * WIDTH + i % WIDTH]).collect();
+                let lower =
+                    (0..WIDTH * HEIGHT).map(|i| right[(i / WIDTH).max(2) * WIDTH - 2 * WIDTH + i % WIDTH]).collect();
                 [left, lower]
             }
         });

@@ -6,6 +6,8 @@ use super::options::Recognition;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Identity {
     pub id: u64,
+    /// Step at which it began.
+    pub born: usize,
     /// Last good motion, cells along x, y and disparity per step.
     pub velocity: Option<[f64; 3]>,
     /// Steps of like motion.
@@ -127,19 +129,23 @@ impl Identities {
         }
     }
 
-    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component without one that is larger than its own and may be it as well.
-    fn pass_to_larger_parts(&mut self, seen: &[Sighting], least: f64, limits: &Recognition) {
+    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track or one that has only just begun; which
+    /// its own component gets in exchange.
+    fn pass_to_larger_parts(&mut self, time: usize, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(identity) = self.live[own.component].as_ref() else { continue };
             if own.pixels as f64 >= COVERED * identity.peak {
                 continue;
             }
+            let young = |other: &Identity| other.born > identity.born && time <= other.born + limits.coast;
             let larger = seen.iter().filter(|new| {
-                let free = self.live[new.component].is_none() && new.pixels > own.pixels && new.pixels as f64 >= least;
-                free && identity.distance(1, new, limits).is_some()
+                let free = self.live[new.component].as_ref().is_none_or(young);
+                free && new.pixels > own.pixels
+                    && new.pixels as f64 >= least
+                    && identity.distance(1, new, limits).is_some()
             });
             if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
-                self.live[new.component] = self.live[own.component].take();
+                self.live.swap(own.component, new.component);
             }
         }
     }
@@ -167,12 +173,13 @@ impl Identities {
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
-            self.pass_to_larger_parts(seen, least, limits);
+            self.pass_to_larger_parts(time, seen, least, limits);
         }
         for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
                 let id = self.name();
-                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, spread };
+                let born = time;
+                let unknown = Identity { id, born, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, spread };
                 self.live[component] = Some(unknown);
             }
             if let Some(identity) = &mut self.live[component] {
@@ -319,6 +326,10 @@ mod tests {
         all.name_all(3, &[part(0, [16.5, 5.0, 30.0], 60), part(2, [16.5, 14.0, 30.0], 30)], LEAST, Some(&limits));
         assert_eq!(ids(&all), [Some(0), Some(1), Some(3)]);
         assert_eq!(all.live[0].as_ref().unwrap().position, [16.0, 10.0, 30.0]);
+        // The one that it was taken for is larger after all.
+        let mut other = all.clone();
+        other.name_all(4, &[part(0, [18.5, 5.0, 30.0], 40), part(2, [18.5, 14.0, 30.0], 50)], LEAST, Some(&limits));
+        assert_eq!(ids(&other), [Some(3), Some(1), Some(0)]);
         all.live[2] = None;
         all.name_all(4, &[part(0, [18.5, 10.0, 30.0], 95), part(2, [18.0, 5.0, 30.0], 98)], LEAST, Some(&limits));
         assert_eq!(ids(&all), [Some(0), Some(1), Some(4)]);

@@ -16,7 +16,8 @@ pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2]
     }
     let arc = |from: usize, to: usize| forward[from][to] + backward[to][from];
     let [before, after] = sizes;
-    let score = |from: usize, to: usize| forward[from][to] * before[from] as f64 + backward[to][from] * after[to] as f64;
+    let score =
+        |from: usize, to: usize| forward[from][to] * before[from] as f64 + backward[to][from] * after[to] as f64;
     // Of equals a component's own.
     let strongest = |own: usize, score: &dyn Fn(usize) -> f64| {
         (0..count).fold(own, |best, other| if score(other) > score(best) { other } else { best })

@@ -54,7 +54,7 @@ pub(super) fn reseed(
     let (densities, shares) = posterior.log_densities(points)?;
     let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
     let least = options.reseed_below.max(1.0);
-    let explained = log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()));
+    let explained = explaining(all, options);
     let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
     let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained)
         .into_iter()
@@ -69,14 +69,84 @@ pub(super) fn reseed(
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
         pixels.iter_mut().zip(row).for_each(|(sum, share)| *sum += share * f64::from(count));
     }
-    let thin = |k: usize| log_density(pixels[k] / all, &covariance(posterior, k)) < explained;
-    let dead: Vec<usize> = (0..components).filter(|&k| pixels[k] < options.reseed_below || thin(k)).collect();
+    let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all), options)).collect();
     let mut seeds = vec![false; components];
     for (k, blob) in dead.into_iter().zip(&blobs) {
         blob.place(posterior, k, options);
         seeds[k] = true;
     }
     Ok(Some(Seeded { seeds, strays }))
+}
+
+/// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better components.
+const WORTH_PARTING: f64 = 1.0;
+
+/// Seeds components that fewer than `reseed_below` pixels belong to at the parts of others whose voxels lie far from one another: seeds of a whole scene may put two small things into one component, from which rounds
+/// do not find out. The parts that gain most come first. Tells whether there were any.
+///
+/// # Errors
+/// Those of the mixture.
+pub(super) fn part(
+    posterior: &mut Posterior,
+    voxels: &Voxels,
+    points: &Points,
+    options: &StereoTrackerOptions,
+) -> Result<bool> {
+    let labels = posterior.labels(points)?;
+    let mut members = vec![vec![]; posterior.components()];
+    labels.iter().enumerate().for_each(|(n, &k)| members[k as usize].push(n));
+    let pixels = |some: &[usize]| some.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>();
+    let mut idle =
+        (0..members.len()).filter(|&k| pixels(&members[k]) < options.reseed_below).collect::<Vec<_>>().into_iter();
+    let mut worth: Vec<(f64, usize, Vec<Blob>)> = members
+        .iter()
+        .enumerate()
+        .filter_map(|(k, own)| {
+            let parts: Vec<Blob> =
+                blobs(voxels, own).into_iter().filter(|part| part.pixels >= options.reseed_below.max(1.0)).collect();
+            let gain = gain_of_parting(&parts);
+            (gain >= WORTH_PARTING).then_some((gain, k, parts))
+        })
+        .collect();
+    worth.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut parted = false;
+    for (_, k, mut parts) in worth {
+        parts.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
+        for (i, part) in parts.iter().enumerate() {
+            let Some(at) = (if i == 0 { Some(k) } else { idle.next() }) else { return Ok(parted) };
+            part.place(posterior, at, options);
+            parted |= i > 0;
+        }
+    }
+    Ok(parted)
+}
+
+/// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean logarithm of the density, with their shares.
+fn gain_of_parting(parts: &[Blob]) -> f64 {
+    if parts.len() < 2 {
+        return 0.0;
+    }
+    let mut whole = Blob::default();
+    parts.iter().for_each(|part| whole.join(part));
+    let apart: f64 =
+        parts.iter().map(|part| part.pixels * log_density(part.pixels / whole.pixels, &part.covariance())).sum();
+    apart / whole.pixels - log_density(1.0, &whole.covariance())
+}
+
+/// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains none: what others left over.
+pub(super) fn is_left_over(
+    posterior: &Posterior,
+    k: usize,
+    (pixels, all): (f64, f64),
+    options: &StereoTrackerOptions,
+) -> bool {
+    pixels < options.reseed_below || log_density(pixels / all, &covariance(posterior, k)) < explaining(all, options)
+}
+
+/// Logarithm of the density from which on a voxel counts as explained: what a typical seed with the fewest pixels would make of it, one standard deviation off.
+fn explaining(all: f64, options: &StereoTrackerOptions) -> f64 {
+    let least = options.reseed_below.max(1.0);
+    log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()))
 }
 
 /// Logarithm of the density at one standard deviation along every axis of a component with a share of the pixels.
@@ -119,6 +189,13 @@ impl Blob {
                 self.squares[i * D + j] += count * f64::from(cell[i]) * f64::from(cell[j]);
             }
         }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.members.extend(&other.members);
+        self.pixels += other.pixels;
+        (0..D).for_each(|i| self.sums[i] += other.sums[i]);
+        (0..D * D).for_each(|i| self.squares[i] += other.squares[i]);
     }
 
     /// Covariance, cells^2, with what counting in whole voxels hides: a twelfth of a cell's square.
@@ -231,7 +308,8 @@ mod tests {
 
     #[test]
     fn what_comes_to_light_gets_one_seed_and_another_scene_none() {
-        let block = |at: [u16; 3], width: u16, n: u16| (0..n).map(move |i| ([at[0] + i % width, at[1] + i / width, at[2]], 0));
+        let block =
+            |at: [u16; 3], width: u16, n: u16| (0..n).map(move |i| ([at[0] + i % width, at[1] + i / width, at[2]], 0));
         // Explained, a strip far wider than a seed, and two voxels too few to be anything.
         let cells: Vec<_> = block([10, 10, 30], 3, 9)
             .flat_map(|cell| [cell; 20])
@@ -255,6 +333,26 @@ mod tests {
         let mut lost = posterior();
         lost.means[0] = 30.0;
         assert_eq!(reseed(&mut lost, &voxels, &points, &options).unwrap(), None);
+    }
+
+    #[test]
+    fn two_small_things_in_one_component_are_parted() {
+        let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
+        let told = |second: [u16; 3]| {
+            let cells: Vec<_> = block([10, 10, 30], 45).chain(block(second, 45)).collect();
+            let voxels = made_up(&cells, 1).voxels;
+            let (values, weights) = (voxels.centres(), voxels.weights());
+            let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+            let mut both = posterior();
+            both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
+            (0..3).for_each(|i| both.scale_inverses[4 * i] = 60.0 * 40.0);
+            (part(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
+        };
+        let (parted, means) = told([30, 20, 40]);
+        assert!(parted);
+        assert_eq!(means, [11.0, 11.0, 30.0, 31.0, 21.0, 40.0]);
+        // Beside one another they are one thing.
+        assert!(!told([14, 10, 30]).0);
     }
 
     #[test]

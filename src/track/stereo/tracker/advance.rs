@@ -13,7 +13,7 @@ use super::super::overlap::{Row, moved_overlaps};
 use super::super::step::Step;
 use super::super::succession::successors;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::moved;
+use super::super::warm_start::{is_left_over, moved};
 use super::StereoTracker;
 use super::cluster::Clustered;
 use super::record::{Arrival, Departure};
@@ -83,10 +83,6 @@ impl StereoTracker {
             Some(last) => (0..motions.len()).map(|k| voxel_motion(&last.clusters, k, &motions[k]?.0)).collect(),
             None => vec![],
         };
-        let typical: Vec<Option<[f64; 3]>> = match &last {
-            Some(last) => (0..motions.len()).map(|k| Some(motions[k]?.0.typical(&places(&last.clusters, k)))).collect(),
-            None => vec![],
-        };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
         let (clustered, seeded) = match &last {
@@ -109,11 +105,21 @@ impl StereoTracker {
         let least = self.options.recognition.as_ref().map_or(0.0, |limits| limits.least_overlap);
         let newcomer = |k: usize| seeded.get(k).is_some_and(|seeded| *seeded) && overlap(k) <= least;
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
-        self.name_by_components(&clusters, |k| if newcomer(k) { -1.0 } else { overlap(k) });
+        // What is left over of everything else may be anywhere: it needs no new name each time.
+        let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
+            (Some(last), Some(before), Some(now)) => {
+                self.is_left_over(&last.clusters, before, k)
+                    && self.is_left_over(&clusters, now, k)
+                    && clusters.pixels[k].len() <= 2 * last.clusters.pixels[k].len()
+            }
+            _ => false,
+        };
+        let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
+        self.name_by_components(&clusters, &lost);
         let arrivals: Vec<Arrival> = (0..components)
             .map(|k| match own(k) {
                 Some((motion, Carried { coasting, .. })) => Arrival {
-                    velocity: typical[k],
+                    velocity: Some(motion.typical),
                     affine: Some(motion.affine_after(middle(&places(&clusters, k)))),
                     residual: Some(motion.plane.residual).filter(|residual| residual.is_finite()),
                     coasting,
@@ -143,9 +149,11 @@ impl StereoTracker {
         let step = self.record(&clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
         let departures: Vec<_> = motions
             .iter()
-            .zip(&typical)
-            .map(|(motion, typical)| {
-                Some(Departure { velocity: (*typical)?, affine: Some((*motion)?.0.plane.flow.to_array()) })
+            .map(|motion| {
+                motion.map(|(motion, _)| Departure {
+                    velocity: motion.typical,
+                    affine: Some(motion.plane.flow.to_array()),
+                })
             })
             .collect();
         let arcs = arcs(self.time, &forward, &backward);
@@ -201,8 +209,14 @@ impl StereoTracker {
         if names.iter().enumerate().all(|(k, name)| k == *name) {
             return (clustered, seeded);
         }
-        let newcomers = (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
+        let newcomers =
+            (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
         (clustered.renamed(&names), newcomers)
+    }
+
+    fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
+        let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
+        k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64), &self.options)
     }
 
     /// How each cluster of the last step moves for its overlaps: as measured, and where nothing could be, as it did last or not at all, whichever leads to more of its own component. That it could not be measured

@@ -2,7 +2,7 @@
 
 use super::super::clusters::Clusters;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::{Seeded, reseed};
+use super::super::warm_start::{Seeded, part, reseed};
 use super::StereoTracker;
 use crate::error::Result;
 use crate::mixture::{Points, Posterior, Start, fit};
@@ -40,11 +40,16 @@ impl StereoTracker {
         {
             return Ok((self.cluster_without(points, voxels, Some(&start), &strays)?, seeds));
         }
-        // Seeds of the whole scene miss what is small; components that explain little are better used there.
+        // Seeds of the whole scene miss what is small, or put two such things into one; components that explain little are better used there.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?.posterior;
+        let parted = part(&mut fitted, &voxels, &weighted, &self.options)?;
         let again = reseed(&mut fitted, &voxels, &weighted, &self.options)?;
-        let clustered = match again.filter(|again| again.seeds.contains(&true)) {
-            Some(Seeded { strays, .. }) => self.cluster_without(points, voxels, Some(&fitted), &strays)?,
+        let strays = match again {
+            Some(Seeded { seeds, strays }) if parted || seeds.contains(&true) => Some(strays),
+            _ => parted.then(Vec::new),
+        };
+        let clustered = match strays {
+            Some(strays) => self.cluster_without(points, voxels, Some(&fitted), &strays)?,
             None => self.cluster(points, voxels, None)?,
         };
         let seeds = vec![true; clustered.clusters.components()];

@@ -54,18 +54,10 @@ impl StereoTracker {
         self.identities.name_all(self.time, &seen, 0.0, None);
     }
 
-    /// Tracks of the improved mode: a component is its track, as long as it covers its moved self.
-    pub(super) fn name_by_components(
-        &mut self,
-        clusters: &Clusters,
-        overlap: impl Fn(usize) -> f64,
-    ) {
+    /// Tracks of the improved mode: a component is its track until it is empty or `lost`.
+    pub(super) fn name_by_components(&mut self, clusters: &Clusters, lost: &[bool]) {
         let limits = self.options.recognition.as_ref();
-        let least = limits.map_or(0.0, |limits| limits.least_overlap);
-        let lost = |k: usize| {
-            let empty = clusters.pixels.get(k).is_none_or(Vec::is_empty);
-            empty || overlap(k) < least
-        };
+        let lost = |k: usize| lost.get(k).is_none_or(|lost| *lost) || clusters.pixels[k].is_empty();
         self.identities.rest(self.time.saturating_sub(1), lost);
         self.identities.live.resize(clusters.components(), None);
         let seen = sightings(clusters, |k| middle_and_deviation(clusters, k));
