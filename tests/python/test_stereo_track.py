@@ -14,7 +14,7 @@ from jacoflow import video
 from jacoflow.track import StereoTracker, TrackGraph
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from stereo_scenes import crossing, small
+from stereo_scenes import cart, crossing, curved, passing, pillar, small, tiny
 from stereo_tracking import follow
 from stereo_tracking_scores import gross
 
@@ -84,8 +84,8 @@ def test_who_is_taken_over_by_a_component_at_its_rim_keeps_its_track(seed, label
     assert scores.id_kept(label) == scores.index_kept(label) == scores.path(label) == 6
 
 
-def scored(scene, mode):
-    tracker = StereoTracker(mode, disparity_range=scene.disparity_range)
+def scored(scene, mode, **options):
+    tracker = StereoTracker(mode, disparity_range=scene.disparity_range, **options)
     return follow(scene, scene.film(), tracker, False)[0]
 
 
@@ -115,6 +115,48 @@ def test_who_was_hidden_is_recognised():
     # Of the wall much is being covered, or has just come to light.
     errors = scores.motion_errors()
     assert gross(errors[0]) <= 0.011 and len(errors[0]) > 100 and gross(errors[3]) == 0
+
+
+@pytest.mark.parametrize("seed", [22, 24])
+def test_other_textures_of_the_crossing_are_followed_as_well(seed):
+    scores = scored(replace(crossing(), seed=seed), "improved")
+    assert scores.purity() >= 0.958
+    assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.id_kept(label) for label in (1, 2, 3)]
+    assert scores.recognised(2)
+    # One of the pair is half of it: what is one object is one group.
+    _, share, precision = scores.grouped(3)
+    assert share >= 0.96 and precision >= 0.93 and scores.groups() <= 7
+
+
+@pytest.mark.parametrize(("scene", "label", "kept"), [(passing, 1, 0.93), (pillar, 1, 1.0)])
+def test_who_is_hidden_by_another_or_for_long_is_recognised_from_parts(scene, label, kept):
+    scores = scored(scene(), "improved")
+    assert scores.id_share(label) >= kept and scores.id_share(2) == 1.0
+    assert scores.recognised(label) is not False
+
+
+def test_small_things_are_found_and_keep_their_tracks():
+    scores = scored(tiny(), "improved")
+    for label in (1, 2, 3):
+        assert scores.recall(label) >= 0.98 and scores.id_kept(label) == 10
+    assert scores.short_tracks() <= 0.3
+
+
+def test_what_comes_nearer_is_one_group_and_its_parts_tell_their_motion():
+    scores = scored(curved(), "improved")
+    single, share, precision = scores.grouped(1)
+    assert single < 0.5 and share >= 0.96 and precision >= 0.93
+    assert (np.median(scores.motion_errors("velocity")[1], axis=0) <= 0.03).all()
+    assert (np.median(scores.motion_errors("affine")[1], axis=0) <= 0.02).all()
+    assert scores.purity() >= 0.962 and scores.recall(1) >= 0.979 and scores.recall(2) >= 0.959
+
+
+@pytest.mark.parametrize(("scene", "purity", "recalls", "paths"), [(curved, 0.968, (0.979, 0.947), (10, 10)), (cart, 0.933, (0.952, 0.929), (8,))])
+def test_the_papers_mode_has_the_specifications_figures(scene, purity, recalls, paths):
+    scores = scored(scene(), "paper", n_components=12)
+    assert scores.purity() >= purity - 0.02
+    assert all(scores.recall(label) >= recall - 0.02 for label, recall in enumerate(recalls, 1))
+    assert tuple(scores.path(label) for label in range(1, 1 + len(paths))) == paths
 
 
 def test_every_edge_pixel_has_its_cluster():
