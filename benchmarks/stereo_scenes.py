@@ -166,13 +166,11 @@ class Scene:
     noise: float = 2.0
     """Standard deviation, grey levels."""
 
-    def film(self, noise_seed: int | None = None) -> list[Step]:
-        """Every step; `noise_seed`: other noise than the scene's own, with the same textures."""
+    def film(self) -> list[Step]:
+        """Every step."""
         rng = np.random.default_rng(self.seed)
         width, height = self.size
         textures = [layer.texture(rng, height, width) for layer in self.layers]
-        if noise_seed is not None:
-            rng = np.random.default_rng(noise_seed)
         return [self._step(t, textures, rng) for t in range(self.steps)]
 
     def _step(self, t: int, textures: list[Array], rng: np.random.Generator) -> Step:

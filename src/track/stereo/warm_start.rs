@@ -38,7 +38,7 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
 }
 
 /// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed would explain better than the others do, the largest blobs first. Tells
-/// which were seeded anew, and what is neither explained nor in such a blob; `None` where most of the pixels are in such blobs: another scene.
+/// which were seeded anew, and what is neither explained nor in such a blob; `None` where that and such blobs are most of the pixels: another scene.
 ///
 /// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step or two, and then one of them, whichever, would take it over and with it the identity.
 /// Pixels that are explained already do not count: a seed beside a flat component could take that over, as the sharper of the two.
@@ -60,10 +60,10 @@ pub(super) fn reseed(
     let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained)
         .into_iter()
         .partition(|blob| blob.pixels >= least && blob.explains_itself(all, explained));
-    let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
-    if blobs.iter().map(|blob| blob.pixels).sum::<f64>() > ANOTHER_SCENE * all {
+    if unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > ANOTHER_SCENE * all {
         return Ok(None);
     }
+    let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
     // The order of those alike is that of the voxels.
     blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
     let mut pixels = vec![0.0; components];

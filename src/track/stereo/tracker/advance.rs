@@ -29,7 +29,7 @@ impl StereoTracker {
         voxels: Voxels,
         luminance: CellLuminance,
     ) -> Result<(Step, Seen, Option<Posterior>)> {
-        let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels, None)?;
+        let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels)?;
         let seen = Seen { clusters, luminance, levels: None };
         let cell = seen.clusters.lattice().cell();
         let velocity =
