@@ -133,6 +133,11 @@ mod tests {
         [[Frame::filled(180, 160, 16.0), Frame::filled(180, 160, 16.0)], [noise(1), noise(2)], [title.clone(), title]]
     }
 
+    /// All that was matched, without the pixels that were not, which are NaN.
+    fn said(found: &EdgeDisparity) -> (&[u32], &[u32], &[f32], f64) {
+        (&found.rows, &found.columns, &found.values, found.row_offset)
+    }
+
     #[test]
     fn whatever_a_film_begins_with_its_rows_are_found() {
         for opening in openings() {
@@ -161,7 +166,7 @@ mod tests {
             assert_eq!(rows.match_next(&pair[0], &pair[1], &options()).unwrap().row_offset, first.row_offset);
         }
         // The same offset, to the last bit, as long as views agree with it.
-        assert_eq!(rows.match_next(&left, &right, &options()).unwrap(), first);
+        assert_eq!(said(&rows.match_next(&left, &right, &options()).unwrap()), said(&first));
         assert_eq!(rows.known(), Some(first.row_offset));
     }
 
@@ -172,6 +177,6 @@ mod tests {
         let found = rows.match_next(&left, &right, &options()).unwrap();
         assert_eq!((found.row_offset, rows.known()), (1.0, Some(1.0)));
         let given = EdgeDisparityOptions { row_offset: Some(1.0), ..options() };
-        assert_eq!(found, edge_disparity(&left, &right, &given).unwrap());
+        assert_eq!(said(&found), said(&edge_disparity(&left, &right, &given).unwrap()));
     }
 }

@@ -220,7 +220,8 @@ mod tests {
         three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
         let options = StereoTrackerOptions::default();
         let told = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
-        assert_eq!(told.seeds, [false, true, false]);
+        // The second is the likeliest for all that the first does not explain, and keeps its place.
+        assert_eq!(told.seeds, [false, false, true]);
         assert_eq!(told.strays.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
         // Moved away from what it explained.
         let mut lost = posterior();
