@@ -21,6 +21,9 @@ use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use crate::types::Frame;
 
+/// Overlaps of two steps' clusters, forwards and backwards.
+type Overlaps = (Vec<Row>, Vec<Row>);
+
 impl StereoTracker {
     /// The paper's step: a new mixture, matching and overlaps forwards and backwards (sections 2.5 to 2.8).
     pub(super) fn advance_as_printed(
@@ -85,19 +88,12 @@ impl StereoTracker {
         };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
-        let (clustered, seeded) = match &last {
+        let (clustered, seeded, (forward, backward)) = match &last {
             Some(last) => self.succeeding(&last.clusters, clustered, seeded, &motions),
-            None => (clustered, seeded),
+            None => (clustered, seeded, (vec![], vec![])),
         };
         let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
-        let (forward, backward) = match &last {
-            Some(last) => {
-                let moves = self.moves(&last.clusters, &clusters, &motions);
-                both_ways(&last.clusters, &clusters, &moves)
-            }
-            None => (vec![], vec![]),
-        };
         // Of what is being hidden little meets its moved self, but what is left of it lies there; of what comes to light it is the other way round.
         let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
         let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
@@ -194,24 +190,27 @@ impl StereoTracker {
         Some(others[nearest as usize].1)
     }
 
-    /// What clustering gave, its components called after those that they continue, and which of them began as seeds: who took over what was there before is no newcomer.
+    /// What clustering gave, its components called after those that they continue, which of them began as seeds (who took over what was there before is no newcomer), and the overlaps of both steps.
     fn succeeding(
         &self,
         before: &Clusters,
         clustered: Clustered,
         seeded: Vec<bool>,
         motions: &[Option<(FineMotion, Carried)>],
-    ) -> (Clustered, Vec<bool>) {
+    ) -> (Clustered, Vec<bool>, Overlaps) {
         let moves = self.moves(before, &clustered.clusters, motions);
         let (forward, backward) = both_ways(before, &clustered.clusters, &moves);
         let sizes = [before, &clustered.clusters].map(|all| all.members.iter().map(Vec::len).collect::<Vec<_>>());
         let names = successors(&forward, &backward, [&sizes[0], &sizes[1]], self.options.arc_threshold);
         if names.iter().enumerate().all(|(k, name)| k == *name) {
-            return (clustered, seeded);
+            return (clustered, seeded, (forward, backward));
         }
         let newcomers =
             (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
-        (clustered.renamed(&names), newcomers)
+        let clustered = clustered.renamed(&names);
+        let moves = self.moves(before, &clustered.clusters, motions);
+        let overlaps = both_ways(before, &clustered.clusters, &moves);
+        (clustered, newcomers, overlaps)
     }
 
     fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
@@ -276,7 +275,7 @@ impl StereoTracker {
 }
 
 /// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where that leads back to nothing of its own, that of the cluster which covers it most.
-fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]) -> (Vec<Row>, Vec<Row>) {
+fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]) -> Overlaps {
     let nobody = vec![0.0; before.components()];
     let forward: Vec<Row> = (0..before.components())
         .map(|k| match motions[k] {
