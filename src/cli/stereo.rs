@@ -97,7 +97,7 @@ impl StereoCommand {
         let mut done = Done::default();
         let failure = {
             let bar = Bar::new(watch, "stereo", self.tell.quiet);
-            self.run(&mut pairs, numbering, options, &formats, &bar, &mut done).err()
+            self.run(&mut pairs, numbering, &options, &formats, &bar, &mut done).err()
         };
         let interrupted = matches!(failure, Some(Error::Interrupted));
         if !self.tell.quiet && (failure.is_none() || interrupted) {
@@ -172,7 +172,7 @@ impl StereoCommand {
         &self,
         pairs: &mut GreyPairs,
         numbering: Numbering,
-        options: EdgeDisparityOptions,
+        options: &EdgeDisparityOptions,
         formats: &[DisparityFormat],
         bar: &Bar<'_>,
         done: &mut Done,
@@ -184,7 +184,7 @@ impl StereoCommand {
         let (mut shown, mut rows) = (None, FilmRows::new(options.row_offset));
         while let Some(GreyPair { views: [left, _], grey: pair }) = pairs.next(done.pairs, bar)? {
             let range = *shown.get_or_insert_with(|| GreyRange::of(&left));
-            let found = rows.match_next(&pair[0], &pair[1], &options)?;
+            let found = rows.match_next(&pair[0], &pair[1], options)?;
             let index = numbering.index(done.pairs);
             if let Some(folder) = &self.picture {
                 let mut picture = range.picture(&left);

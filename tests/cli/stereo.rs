@@ -108,7 +108,7 @@ fn every_layout_gives_the_same_disparities() {
 
 /// A view squeezed to half its width or height, as players store it: means of two samples.
 fn squeezed(view: &[u8], wide: bool) -> Vec<u8> {
-    let mean = |a: u8, b: u8| ((u16::from(a) + u16::from(b)) / 2) as u8;
+    let mean = u8::midpoint;
     if wide {
         return view.chunks(2).map(|two| mean(two[0], two[1])).collect();
     }
@@ -145,8 +145,9 @@ fn squeezed_films_have_the_disparities_of_whole_ones() {
 #[test]
 fn rows_are_found_whatever_a_film_begins_with() {
     let card = |_: usize| -> Vec<u8> {
-        let bar =
-            |i: usize| (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && i % WIDTH / 6 % 3 == 0;
+        let bar = |i: usize| {
+            (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && (i % WIDTH / 6).is_multiple_of(3)
+        };
         (0..WIDTH * HEIGHT).map(|i| if bar(i) && (8..88).contains(&(i % WIDTH)) { 230 } else { 20 }).collect()
     };
     for title in [false, true] {

@@ -137,7 +137,7 @@ fn stretched<T: Sample>(frame: &Frame<T>, wider: bool) -> Frame<T> {
     let size = if wider { (2 * width, height) } else { (width, 2 * height) };
     // The squeezed sample that a place lies in, and the one on the side of that where the place is.
     let both = |at: usize, count: usize| {
-        let beside = if at % 2 == 0 { (at / 2).saturating_sub(1) } else { (at / 2 + 1).min(count - 1) };
+        let beside = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { (at / 2 + 1).min(count - 1) };
         (at / 2, beside)
     };
     Frame::from_fn(size.0, size.1, |x, y| {

@@ -51,7 +51,9 @@ impl StereoTracker {
         // What is not to be fitted has no weight; it is given to a component all the same.
         let without = |start: &Posterior, strays: &[usize]| {
             let mut kept = weights.clone();
-            strays.iter().for_each(|&n| kept[n] = 0.0);
+            for &n in strays {
+                kept[n] = 0.0;
+            }
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
         };
         if let Some(mut start) = start

@@ -15,7 +15,9 @@ pub(super) fn gain_of_parting(parts: &[Blob]) -> f64 {
         return 0.0;
     }
     let mut whole = Blob::default();
-    parts.iter().for_each(|part| whole.join(part));
+    for part in parts {
+        whole.join(part);
+    }
     let apart: f64 =
         parts.iter().map(|part| part.pixels * log_density(part.pixels / whole.pixels, &part.covariance())).sum();
     apart / whole.pixels - log_density(1.0, &whole.covariance())
@@ -93,7 +95,9 @@ pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
         return vec![];
     }
     let mut waiting = vec![u32::MAX; lattice.volume()];
-    some.iter().for_each(|&n| waiting[lattice.index(voxels.cells[n])] = n as u32);
+    for &n in some {
+        waiting[lattice.index(voxels.cells[n])] = n as u32;
+    }
     let mut take = |cell: [u16; D]| {
         let slot = &mut waiting[lattice.index(cell)];
         Some(std::mem::replace(slot, u32::MAX)).filter(|&n| n != u32::MAX).map(|n| n as usize)
