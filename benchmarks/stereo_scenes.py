@@ -7,6 +7,9 @@ Disparity is `x_left - x_right` in px; it is negative far away because the camer
 - `crossing()`: a panning wall, three people crossing before it, two of them side by side; one is nearly hidden for some steps.
 - `curved()`: a large ellipsoidal cab with 14 px of relief that drives and approaches, and a small person.
 - `cart()`: a cart that recedes between rows of seats.
+- `passing()`: two people cross in opposite directions, one hides the other for a step or so.
+- `pillar()`: a person walks behind a pillar for six steps.
+- `tiny()`: three boxes of 20 to 32 px before a panning wall.
 - `small()`: two boxes before a panning wall, 320 x 240, disparity -20..12, for tests.
 - `fence()`: a person behind a fence whose pales repeat every 22 px, so that wrong matches look right.
 """
@@ -163,13 +166,11 @@ class Scene:
     noise: float = 2.0
     """Standard deviation, grey levels."""
 
-    def film(self, noise_seed: int | None = None) -> list[Step]:
-        """Every step; `noise_seed`: other noise than the scene's own, with the same textures."""
+    def film(self) -> list[Step]:
+        """Every step."""
         rng = np.random.default_rng(self.seed)
         width, height = self.size
         textures = [layer.texture(rng, height, width) for layer in self.layers]
-        if noise_seed is not None:
-            rng = np.random.default_rng(noise_seed)
         return [self._step(t, textures, rng) for t in range(self.steps)]
 
     def _step(self, t: int, textures: list[Array], rng: np.random.Generator) -> Step:
@@ -271,6 +272,37 @@ def small() -> Scene:
     return Scene("small", layers, 6, 1.0, 7, (320, 240), (-20, 12))
 
 
+def passing() -> Scene:
+    """Two people cross in opposite directions before a wall: the near one hides the far one."""
+    layers = (
+        _wall(280, 240, 0, -32, 16),
+        Layer("person", 1, (120, 260), (20, 0), -12, 0, (45, 105), 16),
+        Layer("person", 2, (520, 280), (-18, 0), 4, 0, (55, 130), 20),
+    )
+    return Scene("passing", layers, 16, 1.0, 2)
+
+
+def pillar() -> Scene:
+    """A person walks behind a pillar that is wider than six of their steps."""
+    layers = (
+        _wall(320, 240, 0, -30, 8),
+        Layer("person", 1, (120, 250), (20, 0), -14, 0, (36, 85), 16),
+        Layer("box", 2, (360, 240), (0, 0), 6, 0, (75, 230), 20),
+    )
+    return Scene("pillar", layers, 18, 0.0, 5)
+
+
+def tiny() -> Scene:
+    """Small things, two of them no nearer to one another in depth than in the picture."""
+    layers = (
+        _wall(320, 240, 2, -30, 4),
+        Layer("box", 1, (150, 150), (8, 0), -10, 0, (12, 16), 7),
+        Layer("box", 2, (400, 200), (-7, 2), 0, 0, (10, 10), 6),
+        Layer("box", 3, (300, 380), (0, -6), 8, 0, (16, 14), 7),
+    )
+    return Scene("tiny", layers, 10, 0.0, 1)
+
+
 def fence() -> Scene:
     """A person walks behind a fence."""
     layers = (
@@ -282,5 +314,5 @@ def fence() -> Scene:
     return Scene("fence", layers, 6, 0.0, 9)
 
 
-SCENES: dict[str, Callable[[], Scene]] = {"crossing": crossing, "curved": curved, "cart": cart, "small": small, "fence": fence}
+SCENES: dict[str, Callable[[], Scene]] = {scene.__name__: scene for scene in (crossing, curved, cart, passing, pillar, tiny, small, fence)}
 """Every scene, by name."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,8 @@ class Node:
     track_id: int
     velocity: Array | None
     """(u, v, w) to the next step, px and disparity; None: not measured."""
+    group: int = 0
+    """Clusters of one group are one object."""
     affine: Array | None = None
     """(u, v, u_x, v_x, u_y, v_y) to the next step at `middle`."""
     middle: Array | None = None
@@ -168,7 +171,7 @@ class Scores:
         return self._steps(label, [self.largest(0, label)] * self.first_hidden(label))
 
     def id_kept(self, label: int) -> int:
-        """Over how many steps of the whole film the track of its largest cluster at first stays on it."""
+        """Over how many steps from the first the track of its largest cluster at first stays on it."""
         first = self.largest(0, label)
         if first is None:
             return 0
@@ -176,29 +179,71 @@ class Scores:
         by_step = [{node.track_id: k for (t, k), node in self.graph.nodes.items() if t == time} for time in range(len(self.told))]
         return self._steps(label, [ids.get(wanted) for ids in by_step])
 
-    def ids(self, time: int, label: int) -> set[int]:
-        """Tracks of all clusters of an object."""
-        return {self.graph.nodes[time, k].track_id for k, c in self.told[time].items() if c.label == label}
+    def id_share(self, label: int) -> float:
+        """Share of the steps at which an object is visible where the track that is a main one of it most often is: one whose cluster has at least half as many of its pixels as its largest cluster."""
+        times = [time for time, seen in enumerate(self.seen(label)) if seen]
+        tracks = [track for time in times for track in self._main_tracks(time, label)]
+        return max((tracks.count(track) for track in tracks), default=0) / max(1, len(times))
+
+    def _main_tracks(self, time: int, label: int) -> set[int]:
+        """Tracks of the object's largest cluster and of those at least half as large."""
+        sizes = {k: cluster.pixels for k, cluster in self.told[time].items() if cluster.label == label}
+        return {self.graph.nodes[time, k].track_id for k, size in sizes.items() if 2 * size >= max(sizes.values())}
+
+    def _track(self, time: int, label: int) -> int | None:
+        """Track of the object's largest cluster."""
+        largest = self.largest(time, label)
+        return None if largest is None else self.graph.nodes[time, largest].track_id
 
     def recognised(self, label: int) -> bool | None:
-        """Whether a track that was the object's before it was hidden is its again when it is visible; None where it never comes back."""
+        """Whether the object's largest cluster is on the track it was on before it was hidden again, by the third step of those at which it is visible, and at the last of them; None where it never comes back."""
         seen = self.seen(label)
         hidden = self.first_hidden(label)
         back = next((t for t in range(hidden, len(seen)) if seen[t]), None)
-        if back is None:
+        if back is None or hidden == 0:
             return None
-        before = set().union(*(self.ids(t, label) for t in range(max(0, hidden - 3), hidden)))
-        after = set().union(*(self.ids(t, label) for t in range(back, min(back + 2, len(seen)))))
-        return bool(before & after)
+        gone = next((t for t in range(back, len(seen)) if not seen[t]), len(seen))
+        before = self._track(hidden - 1, label)
+        return before is not None and all(self._track(time, label) == before for time in (min(back + 2, gone - 1), gone - 1))
 
-    def motion_errors(self) -> dict[int, Array]:
-        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority: both are medians over the label's pixels."""
+    def short_tracks(self) -> float:
+        """Share of the tracks that last one step, of those that do not begin at the last one."""
+        steps: dict[int, list[int]] = defaultdict(list)
+        for (time, _), node in sorted(self.graph.nodes.items()):
+            steps[node.track_id].append(time)
+        begun = [times for times in steps.values() if times[0] < len(self.told) - 1]
+        return sum(len(times) == 1 for times in begun) / max(1, len(begun))
+
+    def grouped(self, label: int) -> tuple[float, float, float]:
+        """Share of an object's edge pixels in its largest cluster, in its largest group, and share of that group's pixels that are the object's; means over the steps after the first at which it is visible."""
+        shares = []
+        for time, (truth, clustering, seen) in enumerate(zip(self.truths, self.clusterings, self.seen(label), strict=True)):
+            if time == 0 or not seen:
+                continue
+            mine = truth.label[clustering.rows, clustering.columns] == label
+            groups = np.array([self.graph.nodes[time, int(k)].group for k in clustering.component])
+            _, of_clusters = np.unique(clustering.component[mine], return_counts=True)
+            names, of_groups = np.unique(groups[mine], return_counts=True)
+            if len(of_groups):
+                largest = groups == names[np.argmax(of_groups)]
+                shares.append((of_clusters.max() / mine.sum(), of_groups.max() / mine.sum(), (largest & mine).sum() / largest.sum()))
+        first, second, third = np.mean(shares, axis=0) if shares else (0.0, 0.0, 0.0)
+        return float(first), float(second), float(third)
+
+    def groups(self) -> float:
+        """Groups of a step after the first, mean."""
+        counts = [len({node.group for (t, _), node in self.graph.nodes.items() if t == time}) for time in range(1, len(self.told))]
+        return float(np.mean(counts))
+
+    def motion_errors(self, told: Literal["affine", "velocity"] = "affine") -> dict[int, Array]:
+        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority; the truth is the median over that label's pixels in it. What the cluster tells is the median of its affine motion at the same pixels, or
+        its velocity, which is a median over pixels that it chose itself: where motion changes by px within a cluster, one in a hundred of another choice makes a tenth of a px."""
         errors = defaultdict(list)
         for time, clusters in enumerate(self.told[:-1]):
             for component, cluster in clusters.items():
                 node = self.graph.nodes[time, component]
                 if cluster.purity >= PURE and node.velocity is not None:
-                    said = np.median(node.motion(cluster.columns, cluster.rows), axis=0)
+                    said = np.median(node.motion(cluster.columns, cluster.rows), axis=0) if told == "affine" else node.velocity
                     errors[cluster.label].append(np.abs(said - cluster.motion))
         return {label: np.array(values) for label, values in errors.items()}
 

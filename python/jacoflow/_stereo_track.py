@@ -38,9 +38,9 @@ class StereoCluster:
     covariance: Array
     """Covariance of (x, y, disparity), (3, 3), px^2."""
     velocity: Array
-    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step."""
+    """Motion (u, v, w) since the last step, medians over the pixels that it had then, (3,), px/step and disparity/step. Of what grows or turns, `affine` says what each pixel does."""
     next_velocity: Array
-    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    """Motion (u, v, w) to the next step, medians over its pixels, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
     middle: Array
     """Medians of its pixels along x and y, (2,), px."""
     affine: Array
@@ -122,8 +122,10 @@ class TrackGraph:
             raise ValueError(f"node: expected a cluster of the graph, got ({t}, {k})")
         return self._graph.follow(time, index, real_number("threshold", threshold), bool(backward))
 
-    def to_networkx(self) -> _networkx.DiGraph[tuple[int, int]]:
+    def to_networkx(self, flat: bool = False) -> _networkx.DiGraph[tuple[int, int]]:
         """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.
+
+        Arrays are lists there, which networkx' JSON (`node_link_data`) can hold. `flat`: every number is an attribute by itself, `mean_0` to `mean_2`, `covariance_0_0` and so on, which the formats that know no lists need (GraphML, GEXF, GML).
 
         Raises
         ------
@@ -136,7 +138,7 @@ class TrackGraph:
             raise MissingDependencyError('networkx is not installed; pip install "jacoflow[graph]"') from error
         graph: _networkx.DiGraph[tuple[int, int]] = networkx.DiGraph()
         for node in self._graph.nodes():
-            graph.add_node((node["time"], node["index"]), **node)
+            graph.add_node((node["time"], node["index"]), **(_flat(node) if flat else _listed(node)))
         for (start, end), (forward, backward) in self.arcs.items():
             graph.add_edge(start, end, forward=forward, backward=backward, score=forward + backward)
         return graph
@@ -147,7 +149,7 @@ class TrackGraph:
 
     @classmethod
     def from_json(cls, text: str) -> TrackGraph:
-        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text."""
+        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text, and for a cluster or an arc that is there twice."""
         return cls(_TrackGraph.from_json(text))
 
     def __eq__(self, other: object) -> bool:
@@ -157,6 +159,22 @@ class TrackGraph:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return TrackGraph.from_json, (self.to_json(),)
+
+
+def _listed(node: dict[str, Any]) -> dict[str, Any]:
+    """A node's attributes with lists for arrays."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in node.items()}
+
+
+def _flat(node: dict[str, Any]) -> dict[str, Any]:
+    """A node's attributes with a number for each entry of an array."""
+    out = {}
+    for name, value in node.items():
+        if isinstance(value, np.ndarray):
+            out.update({"_".join([name, *map(str, at)]): float(entry) for at, entry in np.ndenumerate(value)})
+        else:
+            out[name] = value
+    return out
 
 
 class StereoTracker:
@@ -188,7 +206,7 @@ class StereoTracker:
     disparity_range, row_range : (int, int), px
         Least and greatest disparity, and offset of the right view's rows, that are looked for.
     row_offset : float, px
-        Offset of the rows; default: found from the views, once ("improved") or at every pixel ("paper").
+        Offset of the rows; default: found from the views, at the first step that shows enough and again where later ones contradict it ("improved"), or at every pixel ("paper").
     matching : "sgm" or "classes"
         How the views are matched, see `jacoflow.stereo.edge_disparity`; default "sgm" ("paper": "classes").
     grid : (rows, columns, layers)
@@ -272,7 +290,7 @@ class StereoTracker:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
         Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
-        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom).
+        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
         Raises
         ------

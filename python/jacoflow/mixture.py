@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
+import warnings
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -179,12 +180,13 @@ class VariationalGaussianMixture(_Base):
         X : array (N, D)
             Points.
         y : ignored
-            Only there for pipelines (no unit).
+            Only there for pipelines, as scikit-learn's conventions want it before the weights: `fit(X, w)` does not weight. A UserWarning says so where there is a `y` and no `sample_weight` (no unit).
         sample_weight : array (N,)
             Evidence of each point, not negative; default 1.
         resp : array (N, n_components)
             First responsibilities, rows that sum to 1, in place of `init`.
         """
+        _warn_of(y, sample_weight)
         points, weights = self._points(X, fitting=True), _weights(sample_weight)
         start = self._state if self.warm_start and self._continues(points) else None
         self._take(_mixture_fit(points, weights, self._parameters(), None if resp is None else _reals("resp", resp), start))
@@ -201,12 +203,13 @@ class VariationalGaussianMixture(_Base):
         X : array (N, D)
             Points of the batch.
         y : ignored
-            Only there for pipelines (no unit).
+            As of `fit` (no unit).
         sample_weight : array (N,)
             Evidence of each point, not negative; default 1.
         forgetting : float in (0, 1], no unit
             What earlier points weigh after this batch over what they weighed before.
         """
+        _warn_of(y, sample_weight)
         first = not hasattr(self, "_state")
         points, weights = self._points(X, fitting=first), _weights(sample_weight)
         _demand("forgetting", forgetting, numbers.Real, "a number")
@@ -216,8 +219,9 @@ class VariationalGaussianMixture(_Base):
         return self
 
     def fit_predict(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> NDArray[np.int64]:
-        """Fits the mixture to points (N, D) and returns the component of each, (N,)."""
-        return self.fit(X, y, sample_weight).predict(X)
+        """Fits the mixture to points (N, D) and returns the component of each, (N,); `y` as of `fit`."""
+        _warn_of(y, sample_weight)
+        return self.fit(X, sample_weight=sample_weight).predict(X)
 
     def predict(self, X: ArrayLike) -> NDArray[np.int64]:
         """The component that each point (N, D) belongs to, (N,): the one with the greatest responsibility."""
@@ -237,6 +241,7 @@ class VariationalGaussianMixture(_Base):
 
     def score(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> float:
         """Mean of `score_samples` over points (N, D) with weights (N,)."""
+        _warn_of(y, sample_weight)
         scores, weights = self.score_samples(X), _weights(sample_weight)
         if weights is not None and (weights.shape != scores.shape or not np.isfinite(weights).all() or (weights < 0).any() or weights.sum() <= 0):
             raise ValueError(f"sample_weight: expected {len(scores)} finite weights that are not negative nor all zero, got shape {weights.shape}")
@@ -319,6 +324,12 @@ class VariationalGaussianMixture(_Base):
 def _names(kind: type) -> list[str]:
     """Names of the parameters."""
     return sorted(inspect.signature(kind).parameters)
+
+
+def _warn_of(y: object, sample_weight: ArrayLike | None) -> None:
+    """Says that `y` is not looked at, where it may have been meant for weights."""
+    if y is not None and sample_weight is None:
+        warnings.warn("y is ignored, and there are no weights: give weights as sample_weight=...", UserWarning, stacklevel=3)
 
 
 def _reals(name: str, values: ArrayLike) -> Array:

@@ -66,7 +66,7 @@ def edge_disparity(
     Parameters
     ----------
     left, right : arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
-        Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats up to 1.5 are taken for shares of white. Colour is turned into
+        Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats are taken for shares of white unless more than a thousandth of the left view exceeds 1.5. Colour is turned into
         luminance. A sample that is not finite leaves no edge pixel where the gradient's kernel reaches it, and harms no other.
     disparity_range : (least, greatest), whole px, both included
         Candidates, at most 1024. Those that leave the right view are not admissible.

@@ -10,7 +10,7 @@ use crate::image::picture::{GreyRange, draw_disparity};
 use crate::io::{DisparityFormat, DisparityMap, NumberedFiles, write_picture};
 use crate::parallel::Threads;
 use crate::pipeline::{GreyPair, GreyPairs, Numbering, check_target, is_folder};
-use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, Method, edge_disparity, estimate_row_offset};
+use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, FilmRows, Method};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub struct MatchingArguments {
 #[command(
     after_help = "Disparity is x_left - x_right in px, NaN where there is none; a point at (x, y) on the left is at (x - d, y + row offset) on the right.\n\
     npz holds disparity, score and row_offset; pfm disparity alone, infinite where there is none; kitti is a 16-bit PNG of 256 d, for 0 < d < 256.\n\
-    Brightness is taken on the scale 0 to 255: 16-bit samples are divided by 257, floats that do not exceed 1.5 in the first view multiplied by 255.\n\n\
+    Brightness is taken on the scale 0 to 255: 16-bit samples are divided by 257, floats of which no more than a thousandth exceed 1.5 in the first view multiplied by 255.\n\n\
     Examples:\n  \
     jacoflow stereo left/ right/ -o out/ --format npz,pfm --picture pictures/\n  \
     jacoflow stereo l.png r.png -o d.pfm --disparities 0,63 --row-offset 0\n  \
@@ -97,7 +97,7 @@ impl StereoCommand {
         let mut done = Done::default();
         let failure = {
             let bar = Bar::new(watch, "stereo", self.tell.quiet);
-            self.run(&mut pairs, numbering, options, &formats, &bar, &mut done).err()
+            self.run(&mut pairs, numbering, &options, &formats, &bar, &mut done).err()
         };
         let interrupted = matches!(failure, Some(Error::Interrupted));
         if !self.tell.quiet && (failure.is_none() || interrupted) {
@@ -172,7 +172,7 @@ impl StereoCommand {
         &self,
         pairs: &mut GreyPairs,
         numbering: Numbering,
-        mut options: EdgeDisparityOptions,
+        options: &EdgeDisparityOptions,
         formats: &[DisparityFormat],
         bar: &Bar<'_>,
         done: &mut Done,
@@ -181,13 +181,10 @@ impl StereoCommand {
         if let Some(file) = self.output.as_deref().filter(|path| total > 1 && !is_folder(path)) {
             return Err(Error::argument("output", format!("a folder for {total} pairs"), file.display()));
         }
-        let mut shown = None;
+        let (mut shown, mut rows) = (None, FilmRows::new(options.row_offset));
         while let Some(GreyPair { views: [left, _], grey: pair }) = pairs.next(done.pairs, bar)? {
             let range = *shown.get_or_insert_with(|| GreyRange::of(&left));
-            if options.method == Method::SemiGlobal && options.row_offset.is_none() {
-                options.row_offset = Some(estimate_row_offset(&pair[0], &pair[1], &options)?);
-            }
-            let found = edge_disparity(&pair[0], &pair[1], &options)?;
+            let found = rows.match_next(&pair[0], &pair[1], options)?;
             let index = numbering.index(done.pairs);
             if let Some(folder) = &self.picture {
                 let mut picture = range.picture(&left);
@@ -197,7 +194,10 @@ impl StereoCommand {
                 done.files += 1;
             }
             done.found += found.rows.len();
-            done.row_offset.get_or_insert(found.row_offset);
+            done.row_offset = match options.method {
+                Method::SemiGlobal => rows.known(),
+                Method::Classes => done.row_offset.or(Some(found.row_offset)),
+            };
             self.write(&found, index, formats, done)?;
             done.pairs += 1;
         }
@@ -237,8 +237,9 @@ impl Done {
     fn in_words(&self) -> String {
         let per_pair = self.found / self.pairs.max(1);
         let mut words = format!("{} pairs, {per_pair} disparities each, {} files", self.pairs, self.files);
-        if let Some(rows) = self.row_offset {
-            words += &format!(", row offset {rows:.2}");
+        match self.row_offset {
+            Some(rows) => words += &format!(", row offset {rows:.2}"),
+            None => words += "; no pair shows enough to tell the row offset (--row-offset gives it)",
         }
         if self.lost > 0 {
             words += &format!("; {} disparities do not fit the kitti format (above 0 and below 256 px)", self.lost);

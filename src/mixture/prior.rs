@@ -83,8 +83,8 @@ fn scaled_identity(n: usize, value: f64) -> Vec<f64> {
     (0..n * n).map(|at| if at % (n + 1) == 0 { value } else { 0.0 }).collect()
 }
 
-/// Weighted covariance of the points, over the sum of the weights less one where that is at least one (so that weights are repetitions); raised where the points
-/// lie in a plane.
+/// Weighted covariance of the points, over the sum of the weights less one, so that weights are repetitions, or over half of that sum where that is more: below 2 there is nothing
+/// to repeat, and the prior must not jump where the weights pass it. Raised where the points lie in a plane.
 fn data_covariance(points: &Points) -> Vec<f64> {
     let d = points.dimensions;
     let mean = points.mean();
@@ -99,7 +99,7 @@ fn data_covariance(points: &Points) -> Vec<f64> {
             }
         }
     }
-    let over = if total >= 2.0 { total - 1.0 } else { total };
+    let over = (total - 1.0).max(0.5 * total);
     for i in 0..d {
         for j in 0..=i {
             sums[i * d + j] /= over;

@@ -74,10 +74,13 @@ fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOpti
 
 /// Semi-global matching after the rows are aligned.
 fn by_semi_global(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
-    let settings = EdgeSettings::of(options);
-    let view = View::new(left, &settings);
-    let row_offset = options.row_offset.unwrap_or_else(|| row_offset_of(left, &view, right, options));
-    let matches = match_aligned(left, &view, right, row_offset, options);
+    let view = View::of(left, options);
+    let row_offset = options.row_offset.unwrap_or_else(|| row_offset_of(left, &view, right, options).rows);
+    told(&view, &match_aligned(left, &view, right, row_offset, options), row_offset)
+}
+
+/// What matches of the left edge pixels say.
+pub(super) fn told(view: &View, matches: &[Option<Match>], row_offset: f64) -> EdgeDisparity {
     EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), row_offset)
 }
 
@@ -90,7 +93,7 @@ pub(super) fn match_aligned(
     options: &EdgeDisparityOptions,
 ) -> Vec<Option<Match>> {
     let aligned = rows_moved(right, row_offset);
-    let mut matches = match_views(view, &View::new(&aligned, &EdgeSettings::of(options)), options);
+    let mut matches = match_views(view, &View::of(&aligned, options), options);
     // A row that the right view does not have was replicated from its border.
     let last = left.height() as f64 - 1.0;
     for (found, &row) in matches.iter_mut().zip(&view.edges.rows) {

@@ -13,6 +13,7 @@ mod classes;
 mod cost;
 mod disparity;
 mod edges;
+mod film_rows;
 mod options;
 mod row_offset;
 mod semi_global;
@@ -20,5 +21,6 @@ mod subpixel;
 
 pub use disparity::{EdgeDisparity, edge_disparity};
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
+pub use film_rows::FilmRows;
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
 pub use row_offset::estimate_row_offset;

@@ -24,8 +24,10 @@ const SHORT: f64 = 1e-3;
 const FARTHEST: f64 = 1.5;
 /// Every how many edge pixels one is asked for its row by classes.
 const SAMPLED: usize = 4;
-/// Most windows that vertical steps are made with, and the least.
-const WINDOWS: (usize, usize) = (6000, 30);
+/// Least and most windows that vertical steps are made with.
+const WINDOWS: (usize, usize) = (30, 6000);
+/// Most windows that a known offset is watched with.
+const WATCHED: usize = 1000;
 /// Pixels on each side of the middle of a window.
 const RADIUS: usize = 4;
 /// Pixels of a window.
@@ -47,25 +49,60 @@ pub fn estimate_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &Edge
     options.check_views(left, right)?;
     Ok(options.threads.install(|| {
         let view = View::new(left, &EdgeSettings::of(options));
-        row_offset_of(left, &view, right, options)
+        row_offset_of(left, &view, right, options).rows
     }))
 }
 
+/// What one pair says of its rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RowEstimate {
+    /// `y_right - y_left`.
+    pub rows: f64,
+    /// Whether vertical steps could be made until the end; else it is the most frequent offset of the classes, whatever that is worth.
+    pub settled: bool,
+}
+
 /// As [`estimate_row_offset`], for a left view that is prepared.
-pub(super) fn row_offset_of(left: &Frame<f32>, view: &View, right: &Frame<f32>, options: &EdgeDisparityOptions) -> f64 {
+pub(super) fn row_offset_of(
+    left: &Frame<f32>,
+    view: &View,
+    right: &Frame<f32>,
+    options: &EdgeDisparityOptions,
+) -> RowEstimate {
     let options = EdgeDisparityOptions { prior: None, subpixel: true, check: true, ..options.clone() };
     let classes = EdgeMap::new(right, &EdgeSettings::of(&options));
     let matches = match_classes(&view.edges, &classes, &options, options.row_range, SAMPLED);
     let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
-    let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
-    let (left_smooth, right_smooth) = rayon::join(|| smoother.apply(left), || smoother.apply(right));
+    let (left_smooth, right_smooth) = smoothed(left, right);
     for _ in 0..PASSES {
         let matches = match_aligned(left, view, right, offset, &options);
-        let mut windows = windows(&left_smooth, view, &matches);
-        let Some(refined) = vertical_steps(&mut windows, &right_smooth, offset) else { break };
-        offset = refined;
+        let mut windows = windows(&left_smooth, view, &matches, WINDOWS.1);
+        match vertical_steps(&mut windows, &right_smooth, offset, STEPS) {
+            Some(refined) => offset = refined,
+            None => return RowEstimate { rows: offset, settled: false },
+        }
     }
-    offset
+    RowEstimate { rows: offset, settled: true }
+}
+
+/// How far one vertical step leads from an offset with which views were matched, rows; none of fewer windows than steps need.
+pub(super) fn misalignment(
+    left: &Frame<f32>,
+    view: &View,
+    right: &Frame<f32>,
+    matches: &[Option<Match>],
+    rows: f64,
+) -> Option<f64> {
+    let (left_smooth, right_smooth) = smoothed(left, right);
+    let mut windows = windows(&left_smooth, view, matches, WATCHED);
+    // A step that is too long to be believed is still one.
+    vertical_step(&mut windows, &rows_moved(&right_smooth, rows))
+}
+
+/// Both views as vertical steps compare them.
+fn smoothed(left: &Frame<f32>, right: &Frame<f32>) -> (Frame<f32>, Frame<f32>) {
+    let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
+    rayon::join(|| smoother.apply(left), || smoother.apply(right))
 }
 
 /// The window round a matched edge pixel.
@@ -87,15 +124,15 @@ struct Misfit {
     residual: f64,
 }
 
-/// Windows that lie inside the left view, at most [`WINDOWS`] of them, spread over the picture.
-fn windows(left: &Frame<f32>, view: &View, matches: &[Option<Match>]) -> Vec<Window> {
+/// Windows that lie inside the left view, at most `most` of them, spread over the picture.
+fn windows(left: &Frame<f32>, view: &View, matches: &[Option<Match>], most: usize) -> Vec<Window> {
     let (width, height) = left.size();
     let inside = |x: usize, y: usize| x >= RADIUS && y >= RADIUS && x + RADIUS < width && y + RADIUS < height;
     let places: Vec<(usize, usize, f64)> = (view.edges.rows.iter().zip(&view.edges.columns).zip(matches))
         .filter_map(|((&row, &column), found)| Some((column as usize, row as usize, f64::from((*found)?.disparity))))
         .filter(|&(x, y, _)| inside(x, y))
         .collect();
-    let every = places.len().div_ceil(WINDOWS.0).max(1);
+    let every = places.len().div_ceil(most).max(1);
     places.iter().step_by(every).map(|&(x, y, disparity)| Window::new(left, view, (x, y), disparity)).collect()
 }
 
@@ -153,36 +190,14 @@ impl Window {
     }
 }
 
-/// The offset after Lucas-Kanade steps along y; none without enough windows, or when they leave the neighbourhood of the start.
-fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64) -> Option<f64> {
+/// The offset after at most so many Lucas-Kanade steps along y; none without enough windows, or when they leave the neighbourhood of the start.
+fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps: usize) -> Option<f64> {
     let mut offset = start;
-    for _ in 0..STEPS {
-        let aligned = rows_moved(right, offset);
-        let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(&aligned)).collect();
-        let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();
-        if residuals.len() < WINDOWS.1 {
-            return None;
-        }
-        let middle = residuals.len() / 2;
-        let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(LEAST_SCALE);
-        // Summed in the order of the windows, whatever the threads.
-        let (mut moment, mut square) = (0.0, 0.0);
-        for (window, misfit) in windows.iter().zip(&misfits) {
-            let Some(misfit) = misfit else { continue };
-            let weight = (1.0 + (misfit.residual / (2.0 * scale)).powi(2)).powi(-2);
-            let (m, s) = window.vertical(misfit.moments);
-            moment += weight * m;
-            square += weight * s;
-        }
-        let step = moment / square;
+    for _ in 0..steps {
+        let step = vertical_step(windows, &rows_moved(right, offset))?;
         offset += step;
         if offset.is_nan() || (offset - start).abs() > FARTHEST {
             return None;
-        }
-        for (window, misfit) in windows.iter_mut().zip(&misfits) {
-            let Some(misfit) = misfit else { continue };
-            let [xx, xy, _] = window.squares;
-            window.at.0 += ((misfit.moments[0] - xy * step) / xx).clamp(-1.0, 1.0);
         }
         if step.abs() < SHORT {
             break;
@@ -191,14 +206,41 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64) -> Opt
     Some(offset)
 }
 
+/// One step along y with the aligned right view, rows; the windows take their own along x with it. None without enough windows.
+fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
+    let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(aligned)).collect();
+    let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();
+    if residuals.len() < WINDOWS.0 {
+        return None;
+    }
+    let middle = residuals.len() / 2;
+    let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(LEAST_SCALE);
+    // Summed in the order of the windows, whatever the threads.
+    let (mut moment, mut square) = (0.0, 0.0);
+    for (window, misfit) in windows.iter().zip(&misfits) {
+        let Some(misfit) = misfit else { continue };
+        let weight = (1.0 + (misfit.residual / (2.0 * scale)).powi(2)).powi(-2);
+        let (m, s) = window.vertical(misfit.moments);
+        moment += weight * m;
+        square += weight * s;
+    }
+    let step = moment / square;
+    for (window, misfit) in windows.iter_mut().zip(&misfits) {
+        let Some(misfit) = misfit else { continue };
+        let [xx, xy, _] = window.squares;
+        window.at.0 += ((misfit.moments[0] - xy * step) / xx).clamp(-1.0, 1.0);
+    }
+    Some(step)
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::image::cubic_at;
     use crate::math::random::CounterRng;
 
     /// Soft cells seen by two cameras: the right one `offset` rows lower, disparity -3.3 px above and 2.4 px below the middle.
-    fn views(offset: f64) -> [Frame<f32>; 2] {
+    pub fn views(offset: f64) -> [Frame<f32>; 2] {
         let rng = CounterRng::new(5);
         let cells = Frame::from_fn(240, 200, |x, y| {
             (rng.uniform((1000 * ((y + x / 3) / 11) + (x + y / 4) / 13) as u64) * 200.0) as f32

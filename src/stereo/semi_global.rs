@@ -34,6 +34,11 @@ impl View {
         let (along_x, along_y) = gaussian_gradient(Level::detect(), view, COMPARED.0, COMPARED.1);
         Self { edges: EdgeMap::new(view, settings), along_x, along_y }
     }
+
+    /// The same with the settings of a matcher.
+    pub(super) fn of(view: &Frame<f32>, options: &EdgeDisparityOptions) -> Self {
+        Self::new(view, &EdgeSettings::of(options))
+    }
 }
 
 /// The match of an edge pixel.

@@ -4,11 +4,13 @@ use crate::types::{AnyFrame, Frame};
 
 /// Brightest value of a float picture whose white is 1, with room for noise and overshoot.
 const UNIT_WHITE: f64 = 1.5;
+/// Share of the samples that may exceed it all the same: single pixels that are hot or damaged say nothing of the white.
+const DAMAGED: f64 = 1e-3;
 
 /// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast, gradient) are in these.
 ///
-/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white: if any value of the first frame is above 1.5
-/// they are grey levels already, else white is 1 and they are multiplied by 255. That is decided once, at the first frame, and kept: brightness must not jump.
+/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white: if more than a thousandth of the first frame's finite
+/// samples are above 1.5 they are grey levels already, else white is 1 and they are multiplied by 255. That is decided once, at the first frame, and kept: brightness must not jump.
 ///
 /// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be scaled beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +23,8 @@ impl GreyLevels {
     /// Decides by the first frame of a sequence.
     pub fn decide(first: &AnyFrame) -> Self {
         let levels = match first {
-            AnyFrame::F32(frame) => frame.data().iter().any(|&value| f64::from(value) > UNIT_WHITE),
-            AnyFrame::F64(frame) => frame.data().iter().any(|&value| value > UNIT_WHITE),
+            AnyFrame::F32(frame) => exceed(frame.data().iter().map(|&value| f64::from(value))),
+            AnyFrame::F64(frame) => exceed(frame.data().iter().copied()),
             AnyFrame::U8(_) | AnyFrame::U16(_) => true,
         };
         Self { float: if levels { 1.0 } else { 255.0 } }
@@ -57,6 +59,16 @@ impl GreyLevels {
     }
 }
 
+/// Whether more samples exceed a white of 1 than can be damaged ones.
+fn exceed(samples: impl Iterator<Item = f64>) -> bool {
+    let (mut above, mut all) = (0usize, 0usize);
+    for value in samples.filter(|value| value.is_finite()) {
+        all += 1;
+        above += usize::from(value > UNIT_WHITE);
+    }
+    above as f64 > DAMAGED * all as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +98,17 @@ mod tests {
             assert_eq!(together.convert(&pair[1]).into_data(), [0.5 * white]);
         }
         assert_eq!(GreyLevels::decide_together(std::slice::from_ref(&bytes)).convert(&bytes).into_data(), [7.0]);
+    }
+
+    #[test]
+    fn single_damaged_samples_do_not_decide() {
+        let with = |damaged: usize| {
+            let frame = AnyFrame::F64(Frame::from_fn(100, 30, |x, y| if 100 * y + x < damaged { 2.0 } else { 0.5 }));
+            levels(&frame, &frame)[2999]
+        };
+        assert_eq!([with(0), with(3), with(4)], [127.5, 127.5, 0.5]);
+        let infinite = AnyFrame::F32(Frame::new(2, 1, vec![f32::INFINITY, 0.5]).unwrap());
+        assert_eq!(levels(&infinite, &infinite)[1], 127.5);
     }
 
     #[test]

@@ -106,6 +106,76 @@ fn every_layout_gives_the_same_disparities() {
     assert!(map.score.is_some() && map.row_offset.is_some());
 }
 
+/// A view squeezed to half its width or height, as players store it: means of two samples.
+fn squeezed(view: &[u8], wide: bool) -> Vec<u8> {
+    let mean = u8::midpoint;
+    if wide {
+        return view.chunks(2).map(|two| mean(two[0], two[1])).collect();
+    }
+    view.chunks(2 * WIDTH)
+        .flat_map(|two| (0..WIDTH).map(|x| mean(two[x], two[WIDTH + x])).collect::<Vec<_>>())
+        .collect()
+}
+
+#[test]
+fn squeezed_films_have_the_disparities_of_whole_ones() {
+    let place = Place::new();
+    for (name, wide) in [("half-side-by-side", true), ("half-top-bottom", false)] {
+        let mut film = header(WIDTH, HEIGHT);
+        for index in 0..2 {
+            film.extend(b"FRAME\n");
+            let [left, right] = views(index).map(|view| squeezed(&view, wide));
+            if wide {
+                film.extend(left.chunks(WIDTH / 2).zip(right.chunks(WIDTH / 2)).flat_map(|(a, b)| [a, b].concat()));
+            } else {
+                film.extend([left, right].concat());
+            }
+        }
+        fs::write(place.path("film.y4m"), film).unwrap();
+        place.good(&format!("stereo film.y4m --layout {name} --disparities -8,12 -o {name}"));
+        for index in 0..2 {
+            let file = format!("{name}/disparity_{index:06}.npz");
+            let found = median(&place, &file, DisparityFormat::Npz);
+            assert!((found - disparity(index) as f32).abs() < 0.2, "{file}: {found}");
+        }
+    }
+}
+
+/// A film may begin with black, or with a title that both views show alike.
+#[test]
+fn rows_are_found_whatever_a_film_begins_with() {
+    let card = |_: usize| -> Vec<u8> {
+        let bar = |i: usize| {
+            (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && (i % WIDTH / 6).is_multiple_of(3)
+        };
+        (0..WIDTH * HEIGHT).map(|i| if bar(i) && (8..88).contains(&(i % WIDTH)) { 230 } else { 20 }).collect()
+    };
+    for title in [false, true] {
+        let place = recorded_as(4, |index| match index {
+            0 if title => [card(0), card(0)],
+            0 => [vec![16; WIDTH * HEIGHT], vec![16; WIDTH * HEIGHT]],
+            // The right view is two rows lower.
+            _ => {
+                let [left, right] = views(index);
+                let lower =
+                    (0..WIDTH * HEIGHT).map(|i| right[(i / WIDTH).max(2) * WIDTH - 2 * WIDTH + i % WIDTH]).collect();
+                [left, lower]
+            }
+        });
+        for command in ["stereo left right -o o", "track left right --method stereo --components 4 -o t.csv"] {
+            let summary = place.good(&format!("{command} --disparities -8,12 --json")).json();
+            assert!((summary["row_offset"].as_f64().unwrap() - 2.0).abs() < 0.05, "{command}: {summary}");
+        }
+        for index in 1..4 {
+            let file = format!("o/disparity_{index:06}.npz");
+            assert!((median(&place, &file, DisparityFormat::Npz) - disparity(index) as f32).abs() < 0.1, "{file}");
+        }
+    }
+    let place = recorded_as(1, |_| [vec![16; WIDTH * HEIGHT], vec![16; WIDTH * HEIGHT]]);
+    let ended = place.good("stereo left right -o o");
+    assert!(ended.err.contains("no pair shows enough to tell the row offset"), "{}", ended.err);
+}
+
 #[test]
 fn classes_give_whole_pixels_and_pictures_show_them() {
     let place = recorded(3);

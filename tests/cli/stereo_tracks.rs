@@ -45,6 +45,25 @@ fn every_layout_gives_the_same_tracks() {
 }
 
 #[test]
+fn every_option_of_the_tracker_changes_what_it_is_said_to() {
+    let place = recorded_as(3, moving);
+    let graph = |options: &str| {
+        let out = place.good(&format!("track left right {SMALL} --format json --quiet {options}")).out;
+        TrackGraph::from_json(&out).unwrap()
+    };
+    let usual = graph("");
+    // The defaults, said aloud.
+    assert_eq!(graph("--grid 60,80,16 --search 8 --n-init 1 --tol 1e-4"), usual);
+    assert_ne!(graph("--grid 30,40"), usual);
+    assert_ne!(graph("--tol none"), usual);
+    // What goes 2 px, in cells of 1.2 px by 1.07 px, is within two cells.
+    let moved = |graph: &TrackGraph| graph.nodes().filter(|node| node.velocity.is_some()).count();
+    assert!(moved(&graph("--search 2")) > 0);
+    let weight = |graph: &TrackGraph| graph.nodes().map(|node| node.n_pixels).sum::<usize>();
+    assert_eq!(weight(&graph("--n-init 3")), weight(&usual));
+}
+
+#[test]
 fn tracks_are_drawn_and_told() {
     let place = recorded_as(3, moving);
     let line = format!(
@@ -89,6 +108,12 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo --components 0", &["n_components"]),
         ("left right --method stereo --disparities -4000,4000", &["disparity_range"]),
         ("left right --method stereo --cameras 3", &["--cameras"]),
+        ("left right --method stereo --grid 30", &["--grid", "ROWS,COLUMNS"]),
+        ("left right --method stereo --grid 0,40", &["grid", "1 to 4096"]),
+        ("left right --method stereo --search 65", &["search", "1 to 64"]),
+        ("left right --method stereo --n-init 0", &["n_init"]),
+        ("left right --method stereo --tol never", &["--tol", "none"]),
+        ("left.y4m --search 3", &["search", "stereo"]),
         ("left right --method stereo --graph g.svg", &["graph", ".png"]),
         ("left right --method stereo --graph old.png", &["output", "--force"]),
         ("left right --method stereo --format mot", &["format", "csv or json"]),

@@ -283,6 +283,15 @@ def test_matching_from_the_right_drops_what_is_hidden():
     assert 0 < 2 * hidden[True] < hidden[False]
 
 
+def test_one_hot_pixel_does_not_decide_what_white_is():
+    step = small()[0]
+    clean = stereo.edge_disparity(step.left / 255, step.right / 255, disparity_range=RANGE, row_offset=1.0)
+    hot = step.left / 255
+    hot[100, 100] = 2.0
+    found = stereo.edge_disparity(hot, step.right / 255, disparity_range=RANGE, row_offset=1.0)
+    assert len(found.values) > 0.99 * len(clean.values) > 4000
+
+
 def test_results_pickle():
     step = small()[0]
     found = disparity(step.left, step.right, row_offset=1.0)

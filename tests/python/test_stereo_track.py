@@ -1,5 +1,7 @@
 """The stereo tracker: scenes whose answer is known, edge cases, the graph there and back."""
 
+import io
+import json
 import pickle
 import sys
 from dataclasses import replace
@@ -8,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jacoflow import video
 from jacoflow.track import StereoTracker, TrackGraph
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from stereo_scenes import crossing, small
+from stereo_scenes import cart, crossing, curved, passing, pillar, small, tiny
 from stereo_tracking import follow
 from stereo_tracking_scores import gross
 
@@ -81,8 +84,8 @@ def test_who_is_taken_over_by_a_component_at_its_rim_keeps_its_track(seed, label
     assert scores.id_kept(label) == scores.index_kept(label) == scores.path(label) == 6
 
 
-def scored(scene, mode):
-    tracker = StereoTracker(mode, disparity_range=scene.disparity_range)
+def scored(scene, mode, **options):
+    tracker = StereoTracker(mode, disparity_range=scene.disparity_range, **options)
     return follow(scene, scene.film(), tracker, False)[0]
 
 
@@ -112,6 +115,48 @@ def test_who_was_hidden_is_recognised():
     # Of the wall much is being covered, or has just come to light.
     errors = scores.motion_errors()
     assert gross(errors[0]) <= 0.011 and len(errors[0]) > 100 and gross(errors[3]) == 0
+
+
+@pytest.mark.parametrize("seed", [22, 24])
+def test_other_textures_of_the_crossing_are_followed_as_well(seed):
+    scores = scored(replace(crossing(), seed=seed), "improved")
+    assert scores.purity() >= 0.958
+    assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.id_kept(label) for label in (1, 2, 3)]
+    assert scores.recognised(2)
+    # One of the pair is half of it: what is one object is one group.
+    _, share, precision = scores.grouped(3)
+    assert share >= 0.96 and precision >= 0.93 and scores.groups() <= 7
+
+
+@pytest.mark.parametrize(("scene", "label", "kept"), [(passing, 1, 0.93), (pillar, 1, 1.0)])
+def test_who_is_hidden_by_another_or_for_long_is_recognised_from_parts(scene, label, kept):
+    scores = scored(scene(), "improved")
+    assert scores.id_share(label) >= kept and scores.id_share(2) == 1.0
+    assert scores.recognised(label) is not False
+
+
+def test_small_things_are_found_and_keep_their_tracks():
+    scores = scored(tiny(), "improved")
+    for label in (1, 2, 3):
+        assert scores.recall(label) >= 0.98 and scores.id_kept(label) == 10
+    assert scores.short_tracks() <= 0.3
+
+
+def test_what_comes_nearer_is_one_group_and_its_parts_tell_their_motion():
+    scores = scored(curved(), "improved")
+    single, share, precision = scores.grouped(1)
+    assert single < 0.5 and share >= 0.96 and precision >= 0.93
+    assert (np.median(scores.motion_errors("velocity")[1], axis=0) <= 0.03).all()
+    assert (np.median(scores.motion_errors("affine")[1], axis=0) <= 0.02).all()
+    assert scores.purity() >= 0.962 and scores.recall(1) >= 0.979 and scores.recall(2) >= 0.959
+
+
+@pytest.mark.parametrize(("scene", "purity", "recalls", "paths"), [(curved, 0.968, (0.979, 0.947), (10, 10)), (cart, 0.933, (0.952, 0.929), (8,))])
+def test_the_papers_mode_has_the_specifications_figures(scene, purity, recalls, paths):
+    scores = scored(scene(), "paper", n_components=12)
+    assert scores.purity() >= purity - 0.02
+    assert all(scores.recall(label) >= recall - 0.02 for label, recall in enumerate(recalls, 1))
+    assert tuple(scores.path(label) for label in range(1, 1 + len(paths))) == paths
 
 
 def test_every_edge_pixel_has_its_cluster():
@@ -169,7 +214,66 @@ def test_networkx_has_nodes_arcs_and_attributes():
     assert set(drawn.nodes) == set(graph.nodes) and set(drawn.edges) == set(graph.arcs)
     for edge in drawn.edges.values():
         assert edge["score"] == pytest.approx(edge["forward"] + edge["backward"])
-    assert next(iter(drawn.nodes.values()))["mean"].shape == (3,)
+    for key, node in drawn.nodes.items():
+        np.testing.assert_array_equal(node["mean"], graph.nodes[key].mean)
+        assert np.shape(node["covariance"]) == (3, 3)
+
+
+def test_networkx_can_write_the_graph():
+    networkx = pytest.importorskip("networkx")
+    graph = followed()[0].graph
+    text = json.dumps(networkx.node_link_data(graph.to_networkx(), edges="edges"))
+    again = networkx.node_link_graph(json.loads(text), edges="edges")
+    assert set(again.nodes) == set(graph.nodes) and set(again.edges) == set(graph.arcs)
+    flat = graph.to_networkx(flat=True)
+    written = io.BytesIO()
+    networkx.write_graphml(flat, written)
+    read = networkx.read_graphml(io.BytesIO(written.getvalue()))
+    assert len(read.nodes) == len(graph.nodes) and len(read.edges) == len(graph.arcs)
+    first = min(graph.nodes)
+    assert read.nodes[str(first)]["mean_2"] == graph.nodes[first].mean[2]
+    assert read.nodes[str(first)]["covariance_0_1"] == graph.nodes[first].covariance[0, 1]
+
+
+@pytest.mark.parametrize("part", ["nodes", "arcs"])
+def test_a_written_graph_says_everything_once(part):
+    graph = json.loads(followed()[0].graph.to_json())
+    graph[part].append(graph[part][0])
+    with pytest.raises(ValueError, match="json: .*twice"):
+        TrackGraph.from_json(json.dumps(graph))
+
+
+def test_a_compressed_film_that_holds_both_views_is_followed(tmp_path):
+    """As players have it: MPEG-4 of both views side by side, with the losses that go with it."""
+    av = pytest.importorskip("av")
+    path = tmp_path / "film.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=25, options={"qscale": "2"})
+        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 320, 120, "yuv420p", 8_000_000
+        for views in film():
+            picture = av.VideoFrame.from_ndarray(np.hstack(views), format="gray").reformat(format="yuv420p")
+            container.mux(stream.encode(picture))
+        container.mux(stream.encode())
+    tracker = StereoTracker(n_components=6, **SMALL)
+    for both in video.frames(path):
+        step = tracker.update(*np.split(both, 2, axis=1))
+    assert step.time == 4
+    assert np.allclose(biggest(step, -4).velocity, [2, 0, 0], atol=0.1)
+    assert np.allclose(biggest(step, 5).velocity, [-3, 0, 0], atol=0.1)
+
+
+def test_the_rows_of_a_film_are_not_those_of_its_title():
+    card = np.full((240, 320), 20, np.uint8)
+    card[100:104, 60:260] = card[120:150, 80:84] = card[120:150, 200:204] = 230
+    noise = [np.random.default_rng(seed).integers(0, 40, card.shape, dtype=np.uint8) for seed in (1, 2)]
+    film = small().film()[:2]
+    for first in ((card, card), noise, (np.full_like(card, 16),) * 2):
+        tracker = StereoTracker(disparity_range=(-20, 12))
+        tracker.update(*first)
+        for shown in film:
+            step = tracker.update(shown.left, shown.right)
+            wrong = np.abs(step.values - shown.disparity[step.rows, step.cols]) > 1
+            assert len(step.rows) > 4000 and wrong.mean() < 0.04
 
 
 def test_known_cameras_give_depth_and_speed():
@@ -203,7 +307,9 @@ def test_what_leaves_the_picture_is_measured_while_half_of_it_is_left(mode):
         boards = [c for c in step.clusters if abs(c.mean[2] - 5) < 1.5]
         if 1 <= t <= 5:
             board = max(boards, key=lambda c: c.n_pixels)
-            assert np.allclose(board.velocity, [16, 0, 0], atol=0.1) and not board.coasting
+            assert np.allclose(board.velocity, [16, 0, 0], atol=0.1)
+            # Of its 207 edge pixels at step 4 only 102 are in the picture at step 5, less than half: it coasts, unless strays tip the scales.
+            assert t == 5 or not board.coasting
         # At step 5 there are 20 px of it, at step 6 only 4: nothing can be measured between them.
         if t == 6:
             assert all(np.isnan(c.velocity).all() or c.coasting for c in boards)

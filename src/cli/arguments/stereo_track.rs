@@ -16,13 +16,25 @@ pub struct StereoTrackerArguments {
     #[command(flatten)]
     pub layout: LayoutArguments,
     #[command(flatten)]
-    pub search: SearchArguments,
+    pub matches: SearchArguments,
     /// How views are matched, as `jacoflow stereo --method` [default: sgm, paper classes]
     #[arg(long, value_name = "NAME")]
     pub matching: Option<String>,
     /// Components of the mixture [default: 16, paper 12]
     #[arg(long, value_name = "N")]
     pub components: Option<usize>,
+    /// Fits from different seeds of which the best is kept [default: 1]
+    #[arg(long, value_name = "N")]
+    pub n_init: Option<usize>,
+    /// The mixture's rounds end when its bound grows by less than this for each pixel; none: never [default: 1e-4, paper none]
+    #[arg(long, value_name = "GROWTH|none", value_parser = parse_tol)]
+    pub tol: Option<Tolerance>,
+    /// Cells along y and x over the picture and layers of disparity [default: 60,80 and a layer for each disparity]
+    #[arg(long, value_name = "ROWS,COLUMNS[,LAYERS]", value_parser = parse_grid)]
+    pub grid: Option<CellGrid>,
+    /// How far templates and depths are searched, cells and disparities [default: 8]
+    #[arg(long, value_name = "CELLS")]
+    pub search: Option<usize>,
     /// Seed of the mixture [default: 0]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -43,12 +55,16 @@ impl StereoTrackerArguments {
         let own = [
             self.matching.as_ref().map(|_| "matching"),
             self.components.map(|_| "components"),
+            self.n_init.map(|_| "n_init"),
+            self.tol.map(|_| "tol"),
+            self.grid.map(|_| "grid"),
+            self.search.map(|_| "search"),
             self.seed.map(|_| "seed"),
             self.cameras.map(|_| "cameras"),
             self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
             self.graph.as_ref().map(|_| "graph"),
         ];
-        self.layout.given().or(self.search.given()).or(own.into_iter().find_map(|given| given))
+        self.layout.given().or(self.matches.given()).or(own.into_iter().find_map(|given| given))
     }
 
     /// The options of the stereo tracker; layers of disparity as wide as the range.
@@ -57,13 +73,13 @@ impl StereoTrackerArguments {
     /// [`Error::Argument`] naming the option.
     pub fn options(&self, mode: StereoMode, threads: Threads) -> Result<StereoTrackerOptions> {
         let mut options = StereoTrackerOptions::new(mode);
-        if let Some((least, greatest)) = self.search.disparities {
+        if let Some((least, greatest)) = self.matches.disparities {
             options = options.with_disparities([least, greatest]);
         }
-        if let Some((least, greatest)) = self.search.rows {
+        if let Some((least, greatest)) = self.matches.rows {
             options.row_range = [least, greatest];
         }
-        options.row_offset = self.search.row_offset;
+        options.row_offset = self.matches.row_offset;
         options.matching = match &self.matching {
             Some(name) => Method::parse(name).map_err(|error| match error {
                 Error::Argument { expected, got, .. } => Error::Argument { argument: "matching", expected, got },
@@ -72,11 +88,48 @@ impl StereoTrackerArguments {
             None => options.matching,
         };
         options.components = self.components.unwrap_or(options.components);
+        options.n_init = self.n_init.unwrap_or(options.n_init);
+        options.tol = self.tol.map_or(options.tol, |Tolerance(tol)| tol);
+        if let Some(CellGrid { rows, columns, layers }) = self.grid {
+            options.grid.rows = rows;
+            options.grid.columns = columns;
+            options.grid.layers = layers.unwrap_or(options.grid.layers);
+        }
+        options.search = self.search.unwrap_or(options.search);
         options.seed = self.seed.unwrap_or(options.seed);
         options.camera = self.cameras;
         options.threads = threads;
         options.check()?;
         Ok(options)
+    }
+}
+
+/// When rounds end, if at all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance(pub Option<f64>);
+
+fn parse_tol(text: &str) -> std::result::Result<Tolerance, String> {
+    match text.parse() {
+        _ if text == "none" => Ok(Tolerance(None)),
+        Ok(tol) => Ok(Tolerance(Some(tol))),
+        Err(_) => Err("expected a number or none".into()),
+    }
+}
+
+/// Cells over the picture, and layers where they are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellGrid {
+    pub rows: usize,
+    pub columns: usize,
+    pub layers: Option<usize>,
+}
+
+fn parse_grid(text: &str) -> std::result::Result<CellGrid, String> {
+    let sides: std::result::Result<Vec<usize>, _> = text.split(',').map(|side| side.trim().parse()).collect();
+    match sides.as_deref() {
+        Ok(&[rows, columns]) => Ok(CellGrid { rows, columns, layers: None }),
+        Ok(&[rows, columns, layers]) => Ok(CellGrid { rows, columns, layers: Some(layers) }),
+        _ => Err("expected ROWS,COLUMNS or ROWS,COLUMNS,LAYERS, whole numbers".into()),
     }
 }
 
@@ -93,6 +146,15 @@ fn parse_cameras(text: &str) -> std::result::Result<StereoCamera, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn grids_are_two_or_three_counts_and_rounds_may_never_end() {
+        assert_eq!(parse_grid("30, 40"), Ok(CellGrid { rows: 30, columns: 40, layers: None }));
+        assert_eq!(parse_grid("30,40,16"), Ok(CellGrid { rows: 30, columns: 40, layers: Some(16) }));
+        assert!(["30", "1,2,3,4", "a,b", "-1,2", "1.5,2"].iter().all(|text| parse_grid(text).is_err()));
+        assert_eq!((parse_tol("none"), parse_tol("1e-3")), (Ok(Tolerance(None)), Ok(Tolerance(Some(1e-3)))));
+        assert!(parse_tol("never").is_err());
+    }
 
     #[test]
     fn cameras_are_two_lengths_and_a_disparity() {

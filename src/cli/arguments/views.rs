@@ -15,6 +15,10 @@ pub enum LayoutWord {
     SideBySide,
     /// In one frame, the left view in its upper half
     TopBottom,
+    /// Side by side, each squeezed to half its width; they are widened again
+    HalfSideBySide,
+    /// Top-bottom, each squeezed to half its height; they are stretched again
+    HalfTopBottom,
 }
 
 /// How the input holds two views.
@@ -43,6 +47,8 @@ impl LayoutArguments {
             None | Some(LayoutWord::Separate) => None,
             Some(LayoutWord::SideBySide) => Some(ViewLayout::SideBySide),
             Some(LayoutWord::TopBottom) => Some(ViewLayout::TopBottom),
+            Some(LayoutWord::HalfSideBySide) => Some(ViewLayout::HalfSideBySide),
+            Some(LayoutWord::HalfTopBottom) => Some(ViewLayout::HalfTopBottom),
         };
         let views = ViewPairs::open(input, layout, &selection.options())?.with_swapped(self.swap);
         let numbering = selection.numbering(rate, views.frame_rate());
@@ -64,7 +70,7 @@ pub struct SearchArguments {
     /// Least and greatest row offset that are searched, rows [default: -4,4]
     #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
     pub rows: Option<(i32, i32)>,
-    /// How many rows lower the right view shows a point [default: estimated from the first pair (sgm), searched at every pixel (classes)]
+    /// How many rows lower the right view shows a point [default: estimated from the first pair that shows enough, and again where views contradict it (sgm), searched at every pixel (classes)]
     #[arg(long, value_name = "ROWS")]
     pub row_offset: Option<f64>,
 }

@@ -2,7 +2,7 @@
 
 use super::{FrameSource, OpenOptions, open};
 use crate::error::{Error, Result};
-use crate::types::{AnyFrame, Frame};
+use crate::types::{AnyFrame, Frame, Sample};
 
 /// How one frame holds both views, the left one first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,11 +11,28 @@ pub enum ViewLayout {
     SideBySide,
     /// The left view in the upper half.
     TopBottom,
+    /// Side by side in a frame of the ordinary size: each view squeezed to half its width, to which it is widened again.
+    HalfSideBySide,
+    /// One above the other in a frame of the ordinary size: each view squeezed to half its height, to which it is stretched again.
+    HalfTopBottom,
+}
+
+impl ViewLayout {
+    /// Whether the views stand beside one another.
+    fn beside(self) -> bool {
+        matches!(self, Self::SideBySide | Self::HalfSideBySide)
+    }
+
+    /// Whether they were squeezed.
+    fn squeezed(self) -> bool {
+        matches!(self, Self::HalfSideBySide | Self::HalfTopBottom)
+    }
 }
 
 /// Pairs of views, left and right, one pair at a time.
 ///
-/// Movies that squeeze both views into a frame of the ordinary size ("half" formats) are taken as they are stored: side by side, disparities are then half as large.
+/// Movies that squeeze both views into a frame of the ordinary size ("half" formats) look like those that do not; [`ViewLayout`] has a layout of its own for them. Taken for the others, they give views of half
+/// the width, and disparities half as large, or of half the height.
 pub struct ViewPairs {
     views: Views,
     swapped: bool,
@@ -114,10 +131,31 @@ fn halves(frame: &AnyFrame, layout: ViewLayout) -> Result<[AnyFrame; 2]> {
     }
 }
 
-/// The left or upper half, and the other one.
-fn cut<T: Copy>(frame: &Frame<T>, layout: ViewLayout) -> Result<[Frame<T>; 2]> {
+/// A frame twice as wide or twice as high, interpolated along that axis. Squeezed pixels are as wide as two: the middles of these are a quarter of it from its own.
+fn stretched<T: Sample>(frame: &Frame<T>, wider: bool) -> Frame<T> {
     let (width, height) = frame.size();
-    let beside = layout == ViewLayout::SideBySide;
+    let size = if wider { (2 * width, height) } else { (width, 2 * height) };
+    // The squeezed sample that a place lies in, and the one on the side of that where the place is.
+    let both = |at: usize, count: usize| {
+        let beside = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { (at / 2 + 1).min(count - 1) };
+        (at / 2, beside)
+    };
+    Frame::from_fn(size.0, size.1, |x, y| {
+        let (own, other) = if wider {
+            let (own, other) = both(x, width);
+            (frame.get(own, y), frame.get(other, y))
+        } else {
+            let (own, other) = both(y, height);
+            (frame.get(x, own), frame.get(x, other))
+        };
+        T::from_f64_nearest(0.75 * own.to_real::<f64>() + 0.25 * other.to_real::<f64>())
+    })
+}
+
+/// The left or upper half, and the other one, as wide and as high as they were.
+fn cut<T: Sample>(frame: &Frame<T>, layout: ViewLayout) -> Result<[Frame<T>; 2]> {
+    let (width, height) = frame.size();
+    let beside = layout.beside();
     let divided = if beside { width } else { height };
     if !divided.is_multiple_of(2) {
         let expected = "frames of an even width (side-by-side) or height (top-bottom)";
@@ -125,7 +163,8 @@ fn cut<T: Copy>(frame: &Frame<T>, layout: ViewLayout) -> Result<[Frame<T>; 2]> {
     }
     let (w, h) = if beside { (width / 2, height) } else { (width, height / 2) };
     let (dx, dy) = if beside { (w, 0) } else { (0, h) };
-    Ok([0, 1].map(|half| Frame::from_fn(w, h, |x, y| frame.get(x + half * dx, y + half * dy))))
+    let views = [0, 1].map(|half| Frame::from_fn(w, h, |x, y| frame.get(x + half * dx, y + half * dy)));
+    Ok(if layout.squeezed() { views.map(|view| stretched(&view, beside)) } else { views })
 }
 
 #[cfg(test)]
@@ -135,13 +174,30 @@ mod tests {
 
     #[test]
     fn frames_are_cut_in_halves() {
-        let frame = Frame::from_fn(4, 2, |x, y| 10 * y + x);
+        let frame = Frame::from_fn(4, 2, |x, y| (10 * y + x) as u8);
         let [left, right] = cut(&frame, ViewLayout::SideBySide).unwrap();
         assert_eq!((left.data(), right.data()), (&[0, 1, 10, 11][..], &[2, 3, 12, 13][..]));
         let [upper, lower] = cut(&frame, ViewLayout::TopBottom).unwrap();
         assert_eq!((upper.data(), lower.data()), (&[0, 1, 2, 3][..], &[10, 11, 12, 13][..]));
-        let odd = cut(&Frame::filled(3, 2, 0), ViewLayout::SideBySide).unwrap_err();
+        let odd = cut(&Frame::filled(3, 2, 0u8), ViewLayout::SideBySide).unwrap_err();
         assert!(odd.to_string().starts_with("layout: "));
+    }
+
+    #[test]
+    fn squeezed_views_are_stretched_again() {
+        let frame = Frame::new(4, 2, vec![0.0f32, 8.0, 40.0, 48.0, 80.0, 88.0, 120.0, 160.0]).unwrap();
+        let [left, right] = cut(&frame, ViewLayout::HalfSideBySide).unwrap();
+        assert_eq!((left.size(), left.row(0)), ((4, 2), &[0.0, 2.0, 6.0, 8.0][..]));
+        assert_eq!(right.row(1), [120.0, 130.0, 150.0, 160.0]);
+        let [upper, lower] = cut(&frame, ViewLayout::HalfTopBottom).unwrap();
+        assert_eq!((upper.size(), upper.row(1)), ((4, 2), &[0.0, 8.0, 40.0, 48.0][..]));
+        assert_eq!(lower.row(0), [80.0, 88.0, 120.0, 160.0]);
+        // A ramp comes back as it was squeezed, but for the ends.
+        let ramp = Frame::from_fn(8, 1, |x, _| (10 * x) as u8);
+        let squeezed = Frame::from_fn(8, 1, |x, _| (20 * (x % 4) + 5) as u8);
+        let [again, _] = cut(&squeezed, ViewLayout::HalfSideBySide).unwrap();
+        assert_eq!(again.data()[1..7], ramp.data()[1..7]);
+        assert!(cut(&Frame::filled(3, 2, 0u8), ViewLayout::HalfSideBySide).is_err());
     }
 
     fn source(levels: &[u8]) -> Box<dyn FrameSource> {

@@ -23,9 +23,9 @@ pub struct Node {
     pub mean: [f64; 3],
     /// Covariance of `(x, y, d)`, px^2.
     pub covariance: [[f64; 3]; 3],
-    /// Motion `(u, v, w)` since the last step, px/step and disparity/step; none where it was not measured.
+    /// Motion `(u, v, w)` since the last step, medians over its pixels then, px/step and disparity/step; none where it was not measured.
     pub velocity: Option<[f64; 3]>,
-    /// Motion `(u, v, w)` to the next step, as soon as that is known.
+    /// Motion `(u, v, w)` to the next step, medians over its pixels, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
     /// Medians of its pixels along x and y, px.
     pub middle: [f64; 2],
@@ -184,7 +184,7 @@ impl TrackGraph {
     /// From [`TrackGraph::to_json`], number for number.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `json` for text that is no graph, `arc` for arcs between clusters that are missing.
+    /// [`Error::Argument`] named `json` for text that is no graph or tells a cluster or an arc twice, `arc` for arcs between clusters that are missing.
     pub fn from_json(json: &str) -> Result<Self> {
         let refuse = |got: String| Error::argument("json", "a graph as to_json writes it", got);
         let written: Written = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;
@@ -192,8 +192,16 @@ impl TrackGraph {
             return Err(refuse(format!("format {:?}", written.format)));
         }
         let mut graph = Self::default();
-        written.nodes.into_iter().for_each(|node| graph.insert(node));
+        for node in written.nodes {
+            let at = (node.time, node.index);
+            if graph.nodes.insert(at, node).is_some() {
+                return Err(refuse(format!("cluster {at:?} twice")));
+            }
+        }
         for arc in written.arcs {
+            if graph.arcs.contains_key(&(arc.time, arc.from, arc.to)) {
+                return Err(refuse(format!("arc {:?} twice", (arc.time, arc.from, arc.to))));
+            }
             graph.connect(arc)?;
         }
         Ok(graph)
@@ -262,6 +270,13 @@ mod tests {
         let arc = Arc { time: 0, from: 0, to: 9, forward: 0.5, backward: 0.5 };
         assert!(graph.connect(arc).unwrap_err().to_string().starts_with("arc: "));
         assert!(graph.connect(Arc { to: 1, forward: 1.5, ..arc }).unwrap_err().to_string().starts_with("arc: "));
+        for part in ["nodes", "arcs"] {
+            let mut doubled: serde_json::Value = serde_json::from_str(&graph.to_json().unwrap()).unwrap();
+            let first = doubled[part][0].clone();
+            doubled[part].as_array_mut().unwrap().push(first);
+            let message = TrackGraph::from_json(&doubled.to_string()).unwrap_err().to_string();
+            assert!(message.starts_with("json: ") && message.contains("twice"), "{message}");
+        }
         assert!(TrackGraph::from_json("{}").unwrap_err().to_string().starts_with("json: "));
         let other = graph.to_json().unwrap().replace("graph 1", "graph 2");
         assert!(TrackGraph::from_json(&other).unwrap_err().to_string().contains("graph 2"));

@@ -6,39 +6,43 @@ use super::options::Recognition;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Identity {
     pub id: u64,
+    /// Step at which it began.
+    pub born: usize,
     /// Last good motion, cells along x, y and disparity per step.
     pub velocity: Option<[f64; 3]>,
     /// Steps of like motion.
     pub steady: usize,
     /// Steps coasted in a row.
     pub coasted: usize,
-    /// Where it is, cells: its mean, or where it went since while it is mostly covered, which shifts the mean.
+    /// Where it is, cells: its middle, or where it went since while it is mostly covered, which shifts the middle.
     pub position: [f64; 3],
     /// Most edge pixels of late.
     pub peak: f64,
-    /// Standard deviation in depth when it was last mostly seen, layers.
-    pub thickness: f64,
+    /// Median deviations along x, y and in depth when it was last mostly seen, cells and layers.
+    pub spread: [f64; 3],
 }
 
 /// A component that is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sighting {
     pub component: usize,
-    /// Mean, cells.
+    /// Medians, cells.
     pub position: [f64; 3],
     /// Edge pixels.
     pub pixels: usize,
-    /// Standard deviation in depth, layers.
-    pub thickness: f64,
+    /// Median deviations from these along x, y and in depth, cells and layers. Wrong matches that are in every component change neither much.
+    pub spread: [f64; 3],
 }
 
-/// Share of the most pixels of late below which a track counts as partly covered: its mean is then that of what is left.
+/// Share of the most pixels of late below which a track counts as partly covered: its middle is then that of what is left.
 const COVERED: f64 = 0.8;
 /// By how much a thing may be thicker or thinner than a lost one that it is taken for: a factor, and layers. What covers part of a thing does not change its extent in depth.
 const AS_THICK: (f64, f64) = (2.0, 0.5);
 /// How many times as many pixels as the lost one had a thing that is taken for it may have.
 const AS_LARGE: f64 = 1.5;
-/// What the memory of that loses each step.
+/// Half the extent of something even, over its median deviation.
+const HALF_EXTENT: f64 = 2.0;
+/// What the memory of the most pixels loses each step.
 const FORGET: f64 = 0.9;
 
 /// What a component does from one step to the next.
@@ -125,75 +129,88 @@ impl Identities {
         }
     }
 
-    /// Gives every component that is seen and has no track one: a lost track that is expected there, the nearest first, if there are at least `least` pixels, or a new one.
-    /// Then all are where they were seen. Tracks lost since the step before are not given back.
+    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track or one that has only just begun; which
+    /// its own component gets in exchange.
+    fn pass_to_larger_parts(&mut self, time: usize, seen: &[Sighting], least: f64, limits: &Recognition) {
+        for own in seen {
+            let Some(identity) = self.live[own.component].as_ref() else { continue };
+            if own.pixels as f64 >= COVERED * identity.peak {
+                continue;
+            }
+            let young = |other: &Identity| other.born > identity.born && time <= other.born + limits.coast;
+            let larger = seen.iter().filter(|new| {
+                let free = self.live[new.component].as_ref().is_none_or(young);
+                free && new.pixels > own.pixels
+                    && new.pixels as f64 >= least
+                    && identity.distance(1, new, limits).is_some()
+            });
+            if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
+                self.live.swap(own.component, new.component);
+            }
+        }
+    }
+
+    /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one.
+    /// Then all are where they were seen.
     pub fn name_all(&mut self, time: usize, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
         if let Some(limits) = limits {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
                 for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
-                    if let Some(distance) = resting.distance(time, new, limits) {
-                        pairs.push((distance, r, new.component));
+                    if let Some(distance) = resting.identity.distance(time - resting.since, new, limits) {
+                        pairs.push((new.pixels, distance, r, new.component));
                     }
                 }
             }
-            pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+            pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
             let mut taken = vec![false; self.resting.len()];
-            for (_, r, k) in pairs {
+            for (_, _, r, k) in pairs {
                 if !taken[r] && self.live[k].is_none() {
                     taken[r] = true;
-                    self.live[k] = Some(Identity { coasted: 0, peak: 0.0, ..self.resting[r].identity.clone() });
+                    self.live[k] = Some(self.resting[r].awake(time));
                 }
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
+            self.pass_to_larger_parts(time, seen, least, limits);
         }
-        for &Sighting { component, position, pixels, thickness } in seen {
+        for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
                 let id = self.name();
-                let unknown = Identity { id, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, thickness };
+                let born = time;
+                let unknown = Identity { id, born, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, spread };
                 self.live[component] = Some(unknown);
             }
             if let Some(identity) = &mut self.live[component] {
-                identity.see(position, pixels as f64, thickness);
+                identity.see(position, pixels as f64, spread);
             }
         }
     }
 }
 
 impl Identity {
-    fn see(&mut self, position: [f64; 3], pixels: f64, thickness: f64) {
+    fn see(&mut self, position: [f64; 3], pixels: f64, spread: [f64; 3]) {
         self.peak = pixels.max(FORGET * self.peak);
         self.position = match self.velocity {
             Some(velocity) if pixels < COVERED * self.peak => std::array::from_fn(|i| self.position[i] + velocity[i]),
             _ => {
-                self.thickness = thickness;
+                self.spread = spread;
                 position
             }
         };
     }
 
-    /// Whether a thing may be this one, seen wholly or in part.
-    fn resembles(&self, seen: &Sighting) -> bool {
-        let (factor, layers) = AS_THICK;
-        let (thinner, thicker) = (self.thickness.min(seen.thickness), self.thickness.max(seen.thickness));
-        thicker <= factor * thinner + layers && seen.pixels as f64 <= AS_LARGE * self.peak
-    }
-}
-
-impl Resting {
-    /// How far a component is from where the track is expected, in tolerances; `None` beyond them, for one that does not resemble it, and for a track just lost.
-    fn distance(&self, time: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
-        let gap = time - self.since;
-        if gap < 2 || !self.identity.resembles(seen) {
-            return None;
-        }
-        let velocity = self.identity.velocity?;
+    /// How far a component is from where the track is expected after so many steps, in tolerances; `None` beyond them, and for one that does not resemble it.
+    fn distance(&self, steps: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
+        let velocity = self.velocity.filter(|_| self.resembles(seen))?;
+        // The middle of what is not covered is as far from that of the whole as the other part allows.
+        let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
         let mut sum = 0.0;
         for i in 0..3 {
-            let expected = self.identity.position[i] + gap as f64 * velocity[i];
-            let tolerance = limits.tolerance[i] + gap as f64 * limits.tolerance_per_step[i];
+            let expected = self.position[i] + steps as f64 * velocity[i];
+            let part = if i < 2 { covered * HALF_EXTENT * self.spread[i] } else { 0.0 };
+            let tolerance = limits.tolerance[i] + steps as f64 * limits.tolerance_per_step[i] + part;
             let off = (seen.position[i] - expected).abs() / tolerance;
             if off > 1.0 {
                 return None;
@@ -202,116 +219,26 @@ impl Resting {
         }
         Some(sum)
     }
+
+    /// Whether a thing may be this one, seen wholly or in part.
+    fn resembles(&self, seen: &Sighting) -> bool {
+        let (factor, layers) = AS_THICK;
+        let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
+        thicker <= factor * thinner + layers && seen.pixels as f64 <= AS_LARGE * self.peak
+    }
+}
+
+impl Resting {
+    /// The track as it goes on where it is expected; how much there is of it is remembered.
+    fn awake(&self, time: usize) -> Identity {
+        let mut identity = Identity { coasted: 0, ..self.identity.clone() };
+        if let Some(velocity) = identity.velocity {
+            let steps = (time - self.since).saturating_sub(1) as f64;
+            (0..3).for_each(|i| identity.position[i] += steps * velocity[i]);
+        }
+        identity
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CELL: [f64; 3] = [8.0, 8.0, 1.0];
-
-    const LEAST: f64 = 20.0;
-
-    fn at(component: usize, position: [f64; 3]) -> Sighting {
-        Sighting { component, position, pixels: 100, thickness: 0.3 }
-    }
-
-    fn identities() -> Identities {
-        let mut all = Identities { live: vec![None; 3], ..Identities::default() };
-        all.name_all(0, &[at(0, [10.0, 10.0, 30.0]), at(1, [40.0, 10.0, 20.0])], LEAST, Some(&Recognition::default()));
-        all
-    }
-
-    #[test]
-    fn a_hidden_track_is_recognised_where_it_is_expected() {
-        let limits = Recognition::default();
-        let mut all = identities();
-        all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
-        all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
-        all.name_all(1, &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
-        // Gone at steps 2 to 4.
-        all.rest(1, |k| k == 0);
-        for time in 2..5 {
-            all.name_all(time, &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
-            assert_eq!(all.live[0], None);
-        }
-        let (mut elsewhere, mut small) = (all.clone(), all.clone());
-        small.name_all(5, &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
-        assert_eq!(small.live[2].as_ref().unwrap().id, 2);
-        all.name_all(5, &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
-        assert_eq!(all.live[2].as_ref().unwrap().id, 0);
-        elsewhere.name_all(5, &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
-        assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
-    }
-
-    #[test]
-    fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
-        let limits = Recognition::default();
-        let mut all = identities();
-        for _ in 0..2 {
-            all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
-        }
-        all.rest(0, |k| k == 0);
-        let there = at(2, [16.0, 10.0, 30.0]);
-        for (seen, known) in [
-            (there, true),
-            (Sighting { pixels: 40, ..there }, true),
-            (Sighting { pixels: 160, ..there }, false),
-            (Sighting { thickness: 1.0, ..there }, true),
-            (Sighting { thickness: 4.0, ..there }, false),
-        ] {
-            let mut all = all.clone();
-            all.name_all(3, &[seen], LEAST, Some(&limits));
-            assert_eq!(all.live[2].as_ref().unwrap().id == 0, known, "{seen:?}");
-        }
-    }
-
-    #[test]
-    fn nobody_waits_for_ever_nor_without_a_history() {
-        let limits = Recognition::default();
-        let mut all = identities();
-        all.rest(0, |k| k == 1);
-        all.name_all(3, &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
-        assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-        all.carry(0, Some([0.0; 3]), CELL, Some(&limits)).unwrap();
-        all.rest(3, |k| k == 0);
-        all.name_all(14, &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
-        assert_eq!(all.live[1].as_ref().unwrap().id, 3);
-    }
-
-    #[test]
-    fn steady_tracks_coast_through_jumps_for_three_steps() {
-        let limits = Recognition::default();
-        let mut all = identities();
-        let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
-        let mut carry = |motion| all.carry(0, motion, CELL, Some(&limits));
-        for _ in 0..3 {
-            assert_eq!(carry(Some(good)), Some(Carried { motion: good, coasting: false }));
-        }
-        for measured in [Some(jump), None, Some(jump)] {
-            assert_eq!(carry(measured), Some(Carried { motion: good, coasting: true }));
-        }
-        assert_eq!(carry(Some(jump)), Some(Carried { motion: jump, coasting: false }));
-    }
-
-    #[test]
-    fn what_is_mostly_covered_goes_on_where_it_went() {
-        let limits = Recognition::default();
-        let mut all = identities();
-        all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits)).unwrap();
-        all.name_all(1, &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
-        assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
-        all.name_all(2, &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
-        assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);
-    }
-
-    #[test]
-    fn without_recognition_what_is_measured_counts() {
-        let mut all = identities();
-        all.carry(0, Some([1.0; 3]), CELL, None);
-        assert_eq!(all.carry(0, None, CELL, None), None);
-        all.rest(1, |k| k == 0);
-        all.name_all(4, &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
-        assert_eq!(all.live[0].as_ref().unwrap().id, 2);
-    }
-}
+mod tests;

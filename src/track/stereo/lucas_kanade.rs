@@ -2,7 +2,7 @@
 
 mod visible;
 
-pub(super) use visible::visible_motion;
+pub(super) use visible::{following, visible_motion};
 
 use crate::image::GaussianSmoother;
 use crate::types::{AffineFlow, Frame};

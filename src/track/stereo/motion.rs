@@ -3,7 +3,7 @@
 use super::cell_luminance::CellLuminance;
 use super::clusters::Clusters;
 use super::disparity_change::{nearest, robust_mean};
-use super::lucas_kanade::{PlaneMotion, SmoothedLevels, affine_motion, visible_motion};
+use super::lucas_kanade::{PlaneMotion, SmoothedLevels, affine_motion, following, visible_motion};
 use super::options::StereoTrackerOptions;
 use super::overlap::{Row, depth_motion};
 use crate::types::{AffineFlow, Frame};
@@ -56,6 +56,8 @@ pub(super) struct FineMotion {
     pub plane: PlaneMotion,
     /// Disparity per step.
     pub depth: f64,
+    /// `(u, v, w)` of the cluster as a whole, px and disparity per step: medians over its pixels that follow the motion. Of what grows and has more of its pixels on one side, the motion at the centre is another one.
+    pub typical: [f64; 3],
 }
 
 impl FineMotion {
@@ -64,10 +66,22 @@ impl FineMotion {
         [self.plane.flow.u, self.plane.flow.v, self.depth]
     }
 
+    /// From both parts of a motion and the pixels `(x, y)` that follow it.
+    fn new(plane: PlaneMotion, depth: f64, following: &[[f64; 2]]) -> Self {
+        let flows = following.iter().map(|[x, y]| plane.flow.at_offset(x - plane.centre[0], y - plane.centre[1]));
+        let (along_x, along_y): (Vec<f64>, Vec<f64>) = flows.unzip();
+        let median = |mut along: Vec<f64>, otherwise: f64| {
+            let half = along.len() / 2;
+            if along.is_empty() { otherwise } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+        };
+        let typical = [median(along_x, plane.flow.u), median(along_y, plane.flow.v), depth];
+        Self { plane, depth, typical }
+    }
+
     /// A translation of a cluster whose pixels have the middle `centre`.
     pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
         let flow = AffineFlow { u, v, ..AffineFlow::default() };
-        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, depth: w }
+        Self::new(PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, w, &[])
     }
 
     /// Where a point `(x, y, d)` goes.
@@ -163,7 +177,8 @@ pub(super) fn fine_motions(
             (plane, _) => plane,
         };
         let depth = depth_change(&from.clusters, k, &plane, next.disparity)?;
-        (depth.abs() <= options.search as f64).then_some(FineMotion { plane, depth })
+        let following = || following(levels, next.levels, &places(&from.clusters, k), &plane);
+        (depth.abs() <= options.search as f64).then(|| FineMotion::new(plane, depth, &following()))
     };
     (0..count).into_par_iter().map(one).collect()
 }
@@ -232,6 +247,18 @@ mod tests {
         assert_eq!(noise(&clusters, &[left(0.5), left(0.8), left(9.0), None]), Some(0.8));
         assert_eq!(noise(&clusters, &[None, None, left(9.0), None]), Some(9.0));
         assert_eq!(noise(&clusters, &[None; 4]), None);
+    }
+
+    #[test]
+    fn the_motion_of_a_cluster_is_that_of_most_of_its_pixels() {
+        let motion = FineMotion::translation([2.0, -1.0, 0.5], [10.0, 10.0]);
+        let growing = AffineFlow { u_x: 0.1, v_y: 0.1, v_x: 0.2, ..motion.plane.flow };
+        let plane = PlaneMotion { flow: growing, ..motion.plane };
+        // The medians along x and along y are no pixel's flow: u is 1, 1.5, 2, 2, 3 and v -3, -2, -2, -1, 2.
+        let pixels = [[0.0, 10.0], [10.0, 10.0], [10.0, 0.0], [5.0, 10.0], [20.0, 20.0]];
+        let [u, v, w] = FineMotion::new(plane, 0.5, &pixels).typical;
+        assert!((u - 2.0).abs() < 1e-12 && (v + 2.0).abs() < 1e-12 && w == 0.5, "{u} {v} {w}");
+        assert_eq!(motion.typical, [2.0, -1.0, 0.5]);
     }
 
     #[test]

@@ -138,7 +138,7 @@ pub struct StereoTrackerOptions {
     pub disparity_range: [i32; 2],
     /// Least and greatest offset of rows looked for, px; default (-4, 4).
     pub row_range: [i32; 2],
-    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated at the first step that shows anything and kept (`SemiGlobal`).
+    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated at the first step that shows enough and kept as long as the views agree with it (`SemiGlobal`).
     pub row_offset: Option<f64>,
     /// How views are matched; default classes (`paper`), semi-global (`improved`).
     pub matching: Method,

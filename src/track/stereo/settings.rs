@@ -5,7 +5,7 @@ use crate::mixture::{CovariancePrior, MixtureOptions};
 use crate::stereo::EdgeDisparityOptions;
 
 impl StereoTrackerOptions {
-    /// How views are matched, with the rows that are known by now.
+    /// How views are matched, with an offset of the rows where that is given.
     pub(super) fn matching_options(&self, row_offset: Option<f64>) -> EdgeDisparityOptions {
         let ([least, greatest], [first_row, last_row]) = (self.disparity_range, self.row_range);
         EdgeDisparityOptions {

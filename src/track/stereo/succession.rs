@@ -4,16 +4,20 @@
 
 use super::overlap::Row;
 
-/// What each component is called from now on: as the one of the last step with which it shares most, where each is the other's strongest arc, of at least `least`. The others keep their
+/// What each component is called from now on: as the one of the last step with which it shares most voxels, where that is true of both and their arc is of at least `least`. The others keep their
 /// names as far as these are free, and else get what is left over.
 ///
-/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step, and the other way round.
-pub(super) fn successors(forward: &[Row], backward: &[Row], least: f64) -> Vec<usize> {
+/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step, and the other way round; `sizes` are the voxels of both steps' components. Shares alone would
+/// do for none: all of a few pixels goes into whatever takes them over, and so does all of a large thing.
+pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2], least: f64) -> Vec<usize> {
     let count = backward.len();
     if forward.len() != count {
         return (0..count).collect();
     }
-    let score = |from: usize, to: usize| forward[from][to] + backward[to][from];
+    let arc = |from: usize, to: usize| forward[from][to] + backward[to][from];
+    let [before, after] = sizes;
+    let score =
+        |from: usize, to: usize| forward[from][to] * before[from] as f64 + backward[to][from] * after[to] as f64;
     // Of equals a component's own.
     let strongest = |own: usize, score: &dyn Fn(usize) -> f64| {
         (0..count).fold(own, |best, other| if score(other) > score(best) { other } else { best })
@@ -22,7 +26,7 @@ pub(super) fn successors(forward: &[Row], backward: &[Row], least: f64) -> Vec<u
     let mut taken = vec![false; count];
     for from in 0..count {
         let to = strongest(from, &|to| score(from, to));
-        if strongest(to, &|other| score(other, to)) == from && score(from, to) >= least {
+        if strongest(to, &|other| score(other, to)) == from && arc(from, to) >= least {
             names[to] = Some(from);
             taken[from] = true;
         }
@@ -52,7 +56,17 @@ mod tests {
     fn named(shares: [[f64; 3]; 3]) -> Vec<usize> {
         let rows: Vec<Row> = shares.iter().map(|row| row.to_vec()).collect();
         let columns: Vec<Row> = (0..3).map(|j| shares.iter().map(|row| row[j]).collect()).collect();
-        successors(&rows, &columns, 0.4)
+        successors(&rows, &columns, [&[50; 3]; 2], 0.4)
+    }
+
+    #[test]
+    fn all_of_a_few_pixels_counts_less_than_most_of_many() {
+        // 1, of 20 voxels, takes over 0, of 300: all of its own and most of the other's are in it.
+        let (forward, backward) = ([vec![0.05, 0.65], vec![0.0, 0.95]], [vec![1.0, 0.0], vec![0.25, 0.2]]);
+        assert_eq!(successors(&forward, &backward, [&[300, 20], &[5, 320]], 0.4), [1, 0]);
+        // Nothing of the sort where it lies in the other and stays what it is.
+        let (forward, backward) = ([vec![0.8, 0.05], vec![0.3, 0.6]], [vec![0.8, 0.02], vec![0.3, 0.6]]);
+        assert_eq!(successors(&forward, &backward, [&[300, 20], &[300, 20]], 0.4), [0, 1]);
     }
 
     #[test]
@@ -70,7 +84,7 @@ mod tests {
         assert_eq!(named([[0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.0; 3]]), [0, 1, 2]);
         // 0 goes into 1, which has been there all along.
         assert_eq!(named([[0.0, 0.6, 0.0], [0.0, 0.9, 0.0], [0.0; 3]]), [0, 1, 2]);
-        assert_eq!(successors(&[], &[vec![], vec![]], 0.4), [0, 1]);
+        assert_eq!(successors(&[], &[vec![], vec![]], [&[], &[0, 0]], 0.4), [0, 1]);
     }
 
     #[test]

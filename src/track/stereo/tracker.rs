@@ -13,7 +13,7 @@ use super::step::{Step, Track};
 use super::voxels::{EdgePoints, Lattice, Voxels};
 use crate::error::{Error, Result};
 use crate::mixture::Posterior;
-use crate::stereo::{EdgeDisparity, Method, edge_disparity};
+use crate::stereo::{EdgeDisparity, FilmRows};
 use crate::types::Frame;
 use std::collections::BTreeMap;
 
@@ -25,8 +25,8 @@ pub struct StereoTracker {
     options: StereoTrackerOptions,
     lattice: Option<Lattice>,
     time: usize,
-    /// Offset of the right view's rows, px, once it is known.
-    row_offset: Option<f64>,
+    /// Offset of the right view's rows.
+    rows: FilmRows,
     last: Option<Seen>,
     posterior: Option<Posterior>,
     identities: Identities,
@@ -41,7 +41,7 @@ impl StereoTracker {
     pub fn new(options: StereoTrackerOptions) -> Result<Self> {
         options.check()?;
         Ok(Self {
-            row_offset: options.row_offset,
+            rows: FilmRows::new(options.row_offset),
             options,
             lattice: None,
             time: 0,
@@ -58,9 +58,9 @@ impl StereoTracker {
         &self.options
     }
 
-    /// How many rows lower the right view shows a point, px, where that is given or was found once for all steps.
+    /// How many rows lower the right view shows a point, px, where that is given or was found and the views still agree with it.
     pub fn row_offset(&self) -> Option<f64> {
-        self.row_offset
+        self.rows.known()
     }
 
     /// Steps taken.
@@ -84,11 +84,7 @@ impl StereoTracker {
     /// [`Error::Argument`] for views of different size, of less than 17 px or of another size than before (`left`, with both shapes), and for options of the matching out of range.
     pub fn update(&mut self, left: &Frame<f32>, right: &Frame<f32>) -> Result<Step> {
         self.check(left, &EdgePoints::default())?;
-        let matching = self.options.matching_options(self.row_offset);
-        let found = edge_disparity(left, right, &matching)?;
-        if self.options.matching == Method::SemiGlobal && !found.values.is_empty() {
-            self.row_offset = Some(found.row_offset);
-        }
+        let found = self.rows.match_next(left, right, &self.options.matching_options(None))?;
         let EdgeDisparity { rows, columns, values: disparities, .. } = found;
         self.update_edges(left, EdgePoints { columns, rows, disparities })
     }

@@ -123,6 +123,12 @@ impl Lattice {
         [(at[0] + 0.5) * cx - 0.5, (at[1] + 0.5) * cy - 0.5, at[2] + f64::from(self.grid.first_disparity)]
     }
 
+    /// From px and disparity to coordinates in cells, the other way round.
+    pub fn cells_of(&self, at: [f64; 3]) -> [f64; 3] {
+        let [cx, cy, _] = self.cell();
+        [(at[0] + 0.5) / cx - 0.5, (at[1] + 0.5) / cy - 0.5, at[2] - f64::from(self.grid.first_disparity)]
+    }
+
     /// Voxels of the dense grid.
     pub fn volume(&self) -> usize {
         self.grid.columns * self.grid.rows * self.grid.layers
@@ -219,6 +225,7 @@ pub(super) mod tests {
     fn coordinates_in_cells_go_back_to_pixels() {
         let [x, y, d] = lattice().pixels_of([0.0, 59.0, 40.0]);
         assert_eq!([x, y, d], [3.5, 475.5, 0.0]);
+        assert_eq!(lattice().cells_of([x, y, d]), [0.0, 59.0, 40.0]);
     }
 
     #[test]

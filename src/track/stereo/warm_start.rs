@@ -1,16 +1,20 @@
 //! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the stereo tracker's design.
 
+mod blobs;
+
+use self::blobs::{Blob, blobs, gain_of_parting, log_density};
 use super::options::StereoTrackerOptions;
 use super::voxels::Voxels;
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
+use nalgebra::Matrix3;
 
 /// Coordinates of a voxel.
 const D: usize = 3;
-/// Standard deviations of a new seed, cells along x, y and disparity.
+/// Standard deviations of a typical seed, cells along x, y and disparity.
 const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
-/// Cells along x, y and disparity round a seed that support it, and in which there is none other.
-const SEED_REACH: [i32; D] = [2, 2, 1];
+/// Share of the pixels above which what is not explained is another scene.
+const ANOTHER_SCENE: f64 = 0.5;
 
 /// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole voxels alone moves a flat one.
 const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
@@ -33,10 +37,11 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds every component to which fewer than `reseed_below` pixels belong at the voxel that the others explain worst, among those whose
-/// neighbourhood holds as many pixels that such a seed would explain better. Returns which were seeded anew.
+/// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed would explain better than the others do, the largest blobs first. Tells
+/// which were seeded anew, and what is neither explained nor in such a blob; `None` where that and such blobs are most of the pixels: another scene.
 ///
-/// Pixels that are explained already do not count: a seed beside a flat component could take it over, as the sharper of the two, and with it the identity.
+/// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step or two, and then one of them, whichever, would take it over and with it the identity.
+/// Pixels that are explained already do not count: a seed beside a flat component could take that over, as the sharper of the two.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -45,67 +50,106 @@ pub(super) fn reseed(
     voxels: &Voxels,
     points: &Points,
     options: &StereoTrackerOptions,
-) -> Result<Vec<bool>> {
+) -> Result<Option<Seeded>> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
+    let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
+    let least = options.reseed_below.max(1.0);
+    let explained = explaining(all, options);
+    let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
+    let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained)
+        .into_iter()
+        .partition(|blob| blob.pixels >= least && blob.explains_itself(all, explained));
+    if unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > ANOTHER_SCENE * all {
+        return Ok(None);
+    }
+    let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
+    // The order of those alike is that of the voxels.
+    blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
     let mut pixels = vec![0.0; components];
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
         pixels.iter_mut().zip(row).for_each(|(sum, share)| *sum += share * f64::from(count));
     }
-    let dead: Vec<usize> = (0..components).filter(|&k| pixels[k] < options.reseed_below).collect();
-    let mut seeded = vec![false; components];
-    if dead.is_empty() {
-        return Ok(seeded);
+    let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all), options)).collect();
+    let mut seeds = vec![false; components];
+    for (k, blob) in dead.into_iter().zip(&blobs) {
+        blob.place(posterior, k, options);
+        seeds[k] = true;
     }
-    let least = options.reseed_below.max(1.0);
-    let share = least / voxels.counts.iter().map(|&count| f64::from(count)).sum::<f64>().max(least);
-    let explained = share.ln() + seed_log_density();
-    let mut worst: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
-    let unexplained = worst.clone();
-    worst.sort_by(|&a, &b| densities[a].total_cmp(&densities[b]).then(a.cmp(&b)));
-    let mut seeds: Vec<[u16; D]> = Vec::new();
-    let mut candidates = worst.into_iter();
-    for k in dead {
-        let found = candidates.by_ref().map(|n| voxels.cells[n]).find_map(|cell| {
-            let far = !seeds.iter().any(|&seed| near(cell, seed));
-            far.then(|| (cell, support(voxels, &unexplained, cell)))
-                .filter(|(_, support)| *support >= options.reseed_below)
-        });
-        let Some((cell, support)) = found else { break };
-        seeds.push(cell);
-        place(posterior, k, cell, support, options);
-        seeded[k] = true;
-    }
-    Ok(seeded)
+    Ok(Some(Seeded { seeds, strays }))
 }
 
-/// Whether two voxels are neighbours.
-fn near(a: [u16; D], b: [u16; D]) -> bool {
-    (0..D).all(|i| (i32::from(a[i]) - i32::from(b[i])).abs() <= SEED_REACH[i])
-}
+/// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better components.
+const WORTH_PARTING: f64 = 1.0;
 
-/// Logarithm of a seed's density at one standard deviation along every axis.
-fn seed_log_density() -> f64 {
-    SEED_SPREAD.iter().map(|spread| -0.5 * (std::f64::consts::TAU * spread * spread).ln() - 0.5).sum()
-}
-
-/// Pixels in those voxels, of some, that are in the neighbourhood of one.
-fn support(voxels: &Voxels, some: &[usize], cell: [u16; D]) -> f64 {
-    some.iter().filter(|&&n| near(voxels.cells[n], cell)).map(|&n| f64::from(voxels.counts[n])).sum()
-}
-
-/// Makes component `k` a small one with `pixels` about a voxel.
-fn place(posterior: &mut Posterior, k: usize, cell: [u16; D], pixels: f64, options: &StereoTrackerOptions) {
-    posterior.weight_concentration[k] = options.weight_concentration_prior + pixels;
-    posterior.mean_precision[k] = options.mean_precision_prior + pixels;
-    posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + pixels;
-    for i in 0..D {
-        posterior.means[k * D + i] = f64::from(cell[i]);
-        for j in 0..D {
-            let spread = if i == j { options.covariance_prior + pixels * SEED_SPREAD[i].powi(2) } else { 0.0 };
-            posterior.scale_inverses[(k * D + i) * D + j] = spread;
+/// Seeds components that fewer than `reseed_below` pixels belong to at the parts of others whose voxels lie far from one another: seeds of a whole scene may put two small things into one component, from which rounds
+/// do not find out. The parts that gain most come first. Tells whether there were any.
+///
+/// # Errors
+/// Those of the mixture.
+pub(super) fn part(
+    posterior: &mut Posterior,
+    voxels: &Voxels,
+    points: &Points,
+    options: &StereoTrackerOptions,
+) -> Result<bool> {
+    let labels = posterior.labels(points)?;
+    let mut members = vec![vec![]; posterior.components()];
+    labels.iter().enumerate().for_each(|(n, &k)| members[k as usize].push(n));
+    let pixels = |some: &[usize]| some.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>();
+    let mut idle =
+        (0..members.len()).filter(|&k| pixels(&members[k]) < options.reseed_below).collect::<Vec<_>>().into_iter();
+    let mut worth: Vec<(f64, usize, Vec<Blob>)> = members
+        .iter()
+        .enumerate()
+        .filter_map(|(k, own)| {
+            let parts: Vec<Blob> =
+                blobs(voxels, own).into_iter().filter(|part| part.pixels >= options.reseed_below.max(1.0)).collect();
+            let gain = gain_of_parting(&parts);
+            (gain >= WORTH_PARTING).then_some((gain, k, parts))
+        })
+        .collect();
+    worth.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut parted = false;
+    for (_, k, mut parts) in worth {
+        parts.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
+        for (i, part) in parts.iter().enumerate() {
+            let Some(at) = (if i == 0 { Some(k) } else { idle.next() }) else { return Ok(parted) };
+            part.place(posterior, at, options);
+            parted |= i > 0;
         }
     }
+    Ok(parted)
+}
+
+/// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains none: what others left over.
+pub(super) fn is_left_over(
+    posterior: &Posterior,
+    k: usize,
+    (pixels, all): (f64, f64),
+    options: &StereoTrackerOptions,
+) -> bool {
+    pixels < options.reseed_below || log_density(pixels / all, &covariance(posterior, k)) < explaining(all, options)
+}
+
+/// Logarithm of the density from which on a voxel counts as explained: what a typical seed with the fewest pixels would make of it, one standard deviation off.
+fn explaining(all: f64, options: &StereoTrackerOptions) -> f64 {
+    let least = options.reseed_below.max(1.0);
+    log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()))
+}
+
+/// Covariance of a component, cells^2.
+fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
+    Matrix3::from_row_slice(&posterior.scale_inverses[k * D * D..][..D * D]) / posterior.degrees_of_freedom[k]
+}
+
+/// What seeding did.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seeded {
+    /// Which components were seeded anew.
+    pub seeds: Vec<bool>,
+    /// Voxels that nothing explains and that are too few or too thinly spread to be something: wrong matches, which are not to be fitted.
+    pub strays: Vec<usize>,
 }
 
 #[cfg(test)]
@@ -146,10 +190,63 @@ mod tests {
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, true]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, true]);
         let mean = &posterior.means[3..];
-        assert!((40.0..=42.0).contains(&mean[0]) && (20.0..=22.0).contains(&mean[1]) && mean[2] == 20.0, "{mean:?}");
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+        assert_eq!(mean, [41.0, 21.0, 20.0]);
+        // Its extent: cells 40 to 42 and 20 to 22, each counted five times, one layer.
+        let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - options.covariance_prior - 45.0 / 12.0;
+        assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
+    }
+
+    #[test]
+    fn what_comes_to_light_gets_one_seed_and_another_scene_none() {
+        let block =
+            |at: [u16; 3], width: u16, n: u16| (0..n).map(move |i| ([at[0] + i % width, at[1] + i / width, at[2]], 0));
+        // Explained, a strip far wider than a seed, and two voxels too few to be anything.
+        let cells: Vec<_> = block([10, 10, 30], 3, 9)
+            .flat_map(|cell| [cell; 20])
+            .chain(block([40, 20, 20], 12, 72))
+            .chain(block([70, 5, 60], 2, 2))
+            .collect();
+        let voxels = made_up(&cells, 1).voxels;
+        let (values, weights) = (voxels.centres(), voxels.weights());
+        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+        let mut three = posterior();
+        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
+            of.push(60.0);
+        }
+        three.means.extend([5.0, 55.0, 50.0]);
+        three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
+        let options = StereoTrackerOptions::default();
+        let told = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
+        // The second is the likeliest for all that the first does not explain, and keeps its place.
+        assert_eq!(told.seeds, [false, false, true]);
+        assert_eq!(told.strays.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
+        // Moved away from what it explained.
+        let mut lost = posterior();
+        lost.means[0] = 30.0;
+        assert_eq!(reseed(&mut lost, &voxels, &points, &options).unwrap(), None);
+    }
+
+    #[test]
+    fn two_small_things_in_one_component_are_parted() {
+        let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
+        let told = |second: [u16; 3]| {
+            let cells: Vec<_> = block([10, 10, 30], 45).chain(block(second, 45)).collect();
+            let voxels = made_up(&cells, 1).voxels;
+            let (values, weights) = (voxels.centres(), voxels.weights());
+            let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+            let mut both = posterior();
+            both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
+            (0..3).for_each(|i| both.scale_inverses[4 * i] = 60.0 * 40.0);
+            (part(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
+        };
+        let (parted, means) = told([30, 20, 40]);
+        assert!(parted);
+        assert_eq!(means, [11.0, 11.0, 30.0, 31.0, 21.0, 40.0]);
+        // Beside one another they are one thing.
+        assert!(!told([14, 10, 30]).0);
     }
 
     #[test]
@@ -162,7 +259,7 @@ mod tests {
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap(), [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
         assert_eq!(posterior.means[3..], [70.0, 50.0, 3.0]);
     }
 }

@@ -13,13 +13,16 @@ use super::super::overlap::{Row, moved_overlaps};
 use super::super::step::Step;
 use super::super::succession::successors;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::moved;
+use super::super::warm_start::{is_left_over, moved};
 use super::StereoTracker;
 use super::cluster::Clustered;
 use super::record::{Arrival, Departure};
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use crate::types::Frame;
+
+/// Overlaps of two steps' clusters, forwards and backwards.
+type Overlaps = (Vec<Row>, Vec<Row>);
 
 impl StereoTracker {
     /// The paper's step: a new mixture, matching and overlaps forwards and backwards (sections 2.5 to 2.8).
@@ -29,7 +32,7 @@ impl StereoTracker {
         voxels: Voxels,
         luminance: CellLuminance,
     ) -> Result<(Step, Seen, Option<Posterior>)> {
-        let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels, None)?;
+        let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels)?;
         let seen = Seen { clusters, luminance, levels: None };
         let cell = seen.clusters.lattice().cell();
         let velocity =
@@ -85,25 +88,34 @@ impl StereoTracker {
         };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
         let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
-        let (clustered, seeded) = match &last {
-            Some(last) => succeeding(&last.clusters, clustered, seeded, &motions, self.options.arc_threshold),
-            None => (clustered, seeded),
+        let (clustered, seeded, (forward, backward)) = match &last {
+            Some(last) => self.succeeding(&last.clusters, clustered, seeded, &motions),
+            None => (clustered, seeded, (vec![], vec![])),
         };
         let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
-        let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !seeded.get(k).is_some_and(|seeded| *seeded));
-        let (forward, backward) = match &last {
-            Some(last) => both_ways(&last.clusters, &clusters, &motions, own),
-            None => (vec![], vec![]),
-        };
         // Of what is being hidden little meets its moved self, but what is left of it lies there; of what comes to light it is the other way round.
         let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
         let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
-        self.name_by_components(&clusters, posterior.as_ref(), &seeded, overlap);
+        // Who began as a seed where it was going to be anyway goes on.
+        let least = self.options.recognition.as_ref().map_or(0.0, |limits| limits.least_overlap);
+        let newcomer = |k: usize| seeded.get(k).is_some_and(|seeded| *seeded) && overlap(k) <= least;
+        let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
+        // What is left over of everything else may be anywhere: it needs no new name each time.
+        let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
+            (Some(last), Some(before), Some(now)) => {
+                self.is_left_over(&last.clusters, before, k)
+                    && self.is_left_over(&clusters, now, k)
+                    && clusters.pixels[k].len() <= 2 * last.clusters.pixels[k].len()
+            }
+            _ => false,
+        };
+        let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
+        self.name_by_components(&clusters, &lost);
         let arrivals: Vec<Arrival> = (0..components)
             .map(|k| match own(k) {
                 Some((motion, Carried { coasting, .. })) => Arrival {
-                    velocity: Some(motion.velocity()),
+                    velocity: Some(motion.typical),
                     affine: Some(motion.affine_after(middle(&places(&clusters, k)))),
                     residual: Some(motion.plane.residual).filter(|residual| residual.is_finite()),
                     coasting,
@@ -135,7 +147,7 @@ impl StereoTracker {
             .iter()
             .map(|motion| {
                 motion.map(|(motion, _)| Departure {
-                    velocity: motion.velocity(),
+                    velocity: motion.typical,
                     affine: Some(motion.plane.flow.to_array()),
                 })
             })
@@ -178,6 +190,62 @@ impl StereoTracker {
         Some(others[nearest as usize].1)
     }
 
+    /// What clustering gave, its components called after those that they continue, which of them began as seeds (who took over what was there before is no newcomer), and the overlaps of both steps.
+    fn succeeding(
+        &self,
+        before: &Clusters,
+        clustered: Clustered,
+        seeded: Vec<bool>,
+        motions: &[Option<(FineMotion, Carried)>],
+    ) -> (Clustered, Vec<bool>, Overlaps) {
+        let moves = self.moves(before, &clustered.clusters, motions);
+        let (forward, backward) = both_ways(before, &clustered.clusters, &moves);
+        let sizes = [before, &clustered.clusters].map(|all| all.members.iter().map(Vec::len).collect::<Vec<_>>());
+        let names = successors(&forward, &backward, [&sizes[0], &sizes[1]], self.options.arc_threshold);
+        if names.iter().enumerate().all(|(k, name)| k == *name) {
+            return (clustered, seeded, (forward, backward));
+        }
+        let newcomers =
+            (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
+        let clustered = clustered.renamed(&names);
+        let moves = self.moves(before, &clustered.clusters, motions);
+        let overlaps = both_ways(before, &clustered.clusters, &moves);
+        (clustered, newcomers, overlaps)
+    }
+
+    fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
+        let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
+        k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64), &self.options)
+    }
+
+    /// How each cluster of the last step moves for its overlaps: as measured, and where nothing could be, as it did last or not at all, whichever leads to more of its own component. That it could not be measured
+    /// does not say that it is gone.
+    fn moves(
+        &self,
+        before: &Clusters,
+        after: &Clusters,
+        motions: &[Option<(FineMotion, Carried)>],
+    ) -> Vec<Option<FineMotion>> {
+        let cell = before.lattice().cell();
+        let assumed = |k: usize| {
+            if before.pixels[k].is_empty() || k >= after.components() {
+                return None;
+            }
+            let centre = middle(&places(before, k));
+            let last = self.identities.live.get(k).and_then(|identity| identity.as_ref()?.velocity);
+            let tried = [Some([0.0; 3]), last].into_iter().flatten().map(|velocity| {
+                let motion = FineMotion::translation(std::array::from_fn(|i| velocity[i] * cell[i]), centre);
+                (moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i)))[k], motion)
+            });
+            let best = tried.fold(None, |best: Option<(f64, FineMotion)>, one| match best {
+                Some(best) if best.0 >= one.0 => Some(best),
+                _ => Some(one),
+            });
+            best.filter(|(share, _)| *share > 0.0).map(|(_, motion)| motion)
+        };
+        motions.iter().enumerate().map(|(k, motion)| motion.map(|(motion, _)| motion).or_else(|| assumed(k))).collect()
+    }
+
     /// How each cluster of the last step gets to the next view.
     fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(FineMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
@@ -206,46 +274,29 @@ impl StereoTracker {
     }
 }
 
-/// What clustering gave, its components called after those that they continue, and which of them began as seeds: who took over what was there before is no newcomer.
-fn succeeding(
-    before: &Clusters,
-    clustered: Clustered,
-    seeded: Vec<bool>,
-    motions: &[Option<(FineMotion, Carried)>],
-    least: f64,
-) -> (Clustered, Vec<bool>) {
-    let (forward, backward) = both_ways(before, &clustered.clusters, motions, |k| motions.get(k).copied().flatten());
-    let names = successors(&forward, &backward, least);
-    if names.iter().enumerate().all(|(k, name)| k == *name) {
-        return (clustered, seeded);
-    }
-    let newcomers = (0..names.len()).map(|k| names[k] == k && seeded.get(k).is_some_and(|seeded| *seeded)).collect();
-    (clustered.renamed(&names), newcomers)
-}
-
-/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where it has none, that of the cluster which covers it most.
-fn both_ways(
-    before: &Clusters,
-    after: &Clusters,
-    motions: &[Option<(FineMotion, Carried)>],
-    own: impl Fn(usize) -> Option<(FineMotion, Carried)>,
-) -> (Vec<Row>, Vec<Row>) {
+/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where that leads back to nothing of its own, that of the cluster which covers it most.
+fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]) -> Overlaps {
+    let nobody = vec![0.0; before.components()];
     let forward: Vec<Row> = (0..before.components())
         .map(|k| match motions[k] {
-            Some((motion, _)) => moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i))),
+            Some(motion) => moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i))),
             None => vec![0.0; after.components()],
         })
         .collect();
+    let back = |k: usize, motion: &Option<FineMotion>| match motion {
+        Some(motion) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
+        None => nobody.clone(),
+    };
     let backward = (0..after.components())
         .map(|k| {
+            let own = back(k, motions.get(k).unwrap_or(&None));
+            if own.get(k).is_some_and(|share| *share > 0.0) {
+                return own;
+            }
             let covering = (0..before.components())
                 .filter(|&j| forward[j][k] > 0.0)
                 .max_by(|&i, &j| forward[i][k].total_cmp(&forward[j][k]).then(j.cmp(&i)));
-            let motion = own(k).or_else(|| covering.and_then(|j| motions[j]));
-            match motion {
-                Some((motion, _)) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
-                None => vec![0.0; before.components()],
-            }
+            covering.map_or(own, |j| back(k, &motions[j]))
         })
         .collect();
     (forward, backward)

@@ -2,10 +2,10 @@
 
 use super::super::clusters::Clusters;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::reseed;
+use super::super::warm_start::{Seeded, part, reseed};
 use super::StereoTracker;
 use crate::error::Result;
-use crate::mixture::{Points, Posterior, Start, fit};
+use crate::mixture::{Fit, Points, Posterior, Start, fit};
 
 /// What clustering gave.
 pub(super) struct Clustered {
@@ -15,6 +15,18 @@ pub(super) struct Clustered {
 }
 
 impl Clustered {
+    /// Each voxel with the component that explains it best.
+    fn new(points: EdgePoints, voxels: Voxels, fitted: Fit, weighted: &Points<'_>) -> Result<Self> {
+        let labels = fitted.posterior.labels(weighted)?;
+        let clusters = Clusters::new(points, voxels, &labels, fitted.posterior.components());
+        Ok(Self { clusters, rounds: fitted.lower_bounds.len(), posterior: Some(fitted.posterior) })
+    }
+
+    /// Of a step that shows nothing.
+    fn nothing(points: EdgePoints, voxels: Voxels) -> Self {
+        Self { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 }
+    }
+
     /// The same with the components called otherwise.
     pub fn renamed(self, names: &[usize]) -> Self {
         let posterior = self.posterior.map(|posterior| posterior.renamed(names));
@@ -30,26 +42,47 @@ impl StereoTracker {
         voxels: Voxels,
         start: Option<Posterior>,
     ) -> Result<(Clustered, Vec<bool>)> {
-        let Some(mut start) = start.filter(|_| !voxels.is_empty()) else {
-            return Ok((self.cluster(points, voxels, None)?, vec![]));
-        };
+        if voxels.is_empty() {
+            return Ok((Clustered::nothing(points, voxels), vec![]));
+        }
         let (values, weights) = (voxels.centres(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let seeded = reseed(&mut start, &voxels, &weighted, &self.options)?;
-        Ok((self.cluster(points, voxels, Some(&start))?, seeded))
+        let carried = self.options.mixture_options(true, self.time);
+        // What is not to be fitted has no weight; it is given to a component all the same.
+        let without = |start: &Posterior, strays: &[usize]| {
+            let mut kept = weights.clone();
+            for &n in strays {
+                kept[n] = 0.0;
+            }
+            fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
+        };
+        if let Some(mut start) = start
+            && let Some(Seeded { seeds, strays }) = reseed(&mut start, &voxels, &weighted, &self.options)?
+        {
+            let fitted = without(&start, &strays)?;
+            return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
+        }
+        // Seeds of the whole scene miss what is small, or put two such things into one; components that explain little are better used there.
+        let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
+        let mut start = fitted.posterior.clone();
+        let parted = part(&mut start, &voxels, &weighted, &self.options)?;
+        match reseed(&mut start, &voxels, &weighted, &self.options)? {
+            Some(Seeded { seeds, strays }) if parted || seeds.contains(&true) => fitted = without(&start, &strays)?,
+            _ if parted => fitted = without(&start, &[])?,
+            _ => {}
+        }
+        let seeds = vec![true; fitted.posterior.components()];
+        Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds))
     }
 
-    /// Fits the mixture to the voxels, from seeds or from components, and gives each voxel to one.
-    pub(super) fn cluster(&self, points: EdgePoints, voxels: Voxels, start: Option<&Posterior>) -> Result<Clustered> {
+    /// Fits the mixture to the voxels from seeds, and gives each voxel to a component.
+    pub(super) fn cluster(&self, points: EdgePoints, voxels: Voxels) -> Result<Clustered> {
         if voxels.is_empty() {
-            return Ok(Clustered { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 });
+            return Ok(Clustered::nothing(points, voxels));
         }
-        let options = self.options.mixture_options(start.is_some(), self.time);
         let (values, weights) = (voxels.centres(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let fitted = fit(&weighted, &options, start.map_or(Start::Seeds, Start::Components))?;
-        let labels = fitted.posterior.labels(&weighted)?;
-        let clusters = Clusters::new(points, voxels, &labels, fitted.posterior.components());
-        Ok(Clustered { clusters, rounds: fitted.lower_bounds.len(), posterior: Some(fitted.posterior) })
+        let fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
+        Clustered::new(points, voxels, fitted, &weighted)
     }
 }

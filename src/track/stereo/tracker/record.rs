@@ -50,31 +50,17 @@ impl StereoTracker {
             }
         }
         self.identities.live = live;
-        let seen = sightings(clusters, |_| ([0.0; 3], 0.0));
+        let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 3]));
         self.identities.name_all(self.time, &seen, 0.0, None);
     }
 
-    /// Tracks of the improved mode: a component is its track, as long as it covers its moved self.
-    pub(super) fn name_by_components(
-        &mut self,
-        clusters: &Clusters,
-        posterior: Option<&Posterior>,
-        seeded: &[bool],
-        overlap: impl Fn(usize) -> f64,
-    ) {
+    /// Tracks of the improved mode: a component is its track until it is empty or `lost`.
+    pub(super) fn name_by_components(&mut self, clusters: &Clusters, lost: &[bool]) {
         let limits = self.options.recognition.as_ref();
-        let least = limits.map_or(0.0, |limits| limits.least_overlap);
-        let lost = |k: usize| {
-            let empty = clusters.pixels.get(k).is_none_or(Vec::is_empty);
-            empty || seeded.is_empty() || seeded[k] || overlap(k) < least
-        };
+        let lost = |k: usize| lost.get(k).is_none_or(|lost| *lost) || clusters.pixels[k].is_empty();
         self.identities.rest(self.time.saturating_sub(1), lost);
         self.identities.live.resize(clusters.components(), None);
-        let Some(posterior) = posterior else { return };
-        let seen = sightings(clusters, |k| {
-            let variance = posterior.scale_inverses[9 * k + 8] / posterior.degrees_of_freedom[k];
-            (std::array::from_fn(|i| posterior.means[3 * k + i]), variance.sqrt())
-        });
+        let seen = sightings(clusters, |k| middle_and_deviation(clusters, k));
         self.identities.name_all(self.time, &seen, self.options.reseed_below, limits);
     }
 
@@ -169,14 +155,27 @@ impl StereoTracker {
     }
 }
 
-/// All components that have edge pixels; `told` tells of each where it is and how thick, cells.
-fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], f64)) -> Vec<Sighting> {
+/// All components that have edge pixels; `told` tells of each where it is and how far it spreads, cells.
+fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], [f64; 3])) -> Vec<Sighting> {
     let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
     let sighting = |(component, pixels)| {
-        let (position, thickness) = told(component);
-        Sighting { component, position, pixels, thickness }
+        let (position, spread) = told(component);
+        Sighting { component, position, pixels, spread }
     };
     pixels.map(sighting).collect()
+}
+
+/// Medians of a cluster's pixels along x, y and in depth, and of how far they are from these, cells and layers.
+fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
+    let places: Vec<[f64; 3]> =
+        clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
+    let median = |mut along: Vec<f64>| {
+        let half = along.len() / 2;
+        if along.is_empty() { f64::NAN } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+    };
+    let middle: [f64; 3] = std::array::from_fn(|i| median(places.iter().map(|place| place[i]).collect()));
+    let off = |i: usize| median(places.iter().map(|place| (place[i] - middle[i]).abs()).collect());
+    (middle, std::array::from_fn(off))
 }
 
 /// Covariance `W_k^-1 / nu_k` of a component in px and disparity.

@@ -1,0 +1,182 @@
+//! The row offset of a film: found at the first pair that shows enough of it, and watched from then on.
+//!
+//! Cameras are screwed down, so one offset serves a film, and a single pair's would only add noise. But a film may begin with black, with a title that was drawn into both views alike, or with noise: what such a
+//! pair says, if anything, must not be believed for ever.
+
+use super::disparity::{EdgeDisparity, edge_disparity, match_aligned, told};
+use super::options::{EdgeDisparityOptions, Method};
+use super::row_offset::{misalignment, row_offset_of};
+use super::semi_global::{Match, View};
+use crate::error::Result;
+use crate::types::Frame;
+
+/// A misalignment above this, rows, is not noise: single pairs are within .05 of the truth.
+const MISALIGNED: f64 = 0.2;
+/// Least share of the edge pixels that are matched where the rows are aligned.
+const LEAST_MATCHED: f64 = 0.3;
+/// Fewer edge pixels say nothing of the rows.
+const LEAST_EDGES: usize = 30;
+
+/// Matches a film pair by pair, and knows how many rows lower its right views show a point.
+#[derive(Debug, Clone, Default)]
+pub struct FilmRows {
+    given: Option<f64>,
+    found: Option<f64>,
+}
+
+impl FilmRows {
+    /// Of a film whose offset is given, rows, or is to be found.
+    pub fn new(given: Option<f64>) -> Self {
+        Self { given, found: None }
+    }
+
+    /// The offset for all pairs to come, rows: the one given, or what was found as long as the views agree with it.
+    pub fn known(&self) -> Option<f64> {
+        self.given.or(self.found)
+    }
+
+    /// The next pair, as [`edge_disparity`] matches it; the options' `row_offset` is not looked at.
+    ///
+    /// [`Method::SemiGlobal`] aligns the rows by the offset that is known. It becomes known at the first pair of which the estimate can be believed: enough windows for the vertical steps, and three tenths of
+    /// the edge pixels matched. Where a later pair is matched worse than that, or a vertical step from the known offset leads farther than a fifth of a row, it is estimated again. Pairs that show too little
+    /// change nothing. [`Method::Classes`] searches the rows at every pixel unless they are given.
+    ///
+    /// # Errors
+    /// As [`edge_disparity`].
+    pub fn match_next(
+        &mut self,
+        left: &Frame<f32>,
+        right: &Frame<f32>,
+        options: &EdgeDisparityOptions,
+    ) -> Result<EdgeDisparity> {
+        let options = EdgeDisparityOptions { row_offset: self.given, ..options.clone() };
+        if self.given.is_some() || options.method == Method::Classes {
+            return edge_disparity(left, right, &options);
+        }
+        options.check_views(left, right)?;
+        Ok(options.threads.install(|| self.align(left, right, &options)))
+    }
+
+    fn align(&mut self, left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+        let pair = Pair { left, right, view: View::of(left, options), options };
+        if let Some(rows) = self.found {
+            let matches = pair.matched(rows);
+            if !pair.contradicts(rows, &matches) {
+                return told(&pair.view, &matches, rows);
+            }
+        }
+        let (rows, matches, believed) = pair.estimated();
+        match self.found {
+            // Whatever is wrong with this pair, it does not know better.
+            Some(known) if !believed => told(&pair.view, &pair.matched(known), known),
+            _ => {
+                self.found = Some(rows).filter(|_| believed);
+                told(&pair.view, &matches, rows)
+            }
+        }
+    }
+}
+
+/// Two views that are being matched.
+struct Pair<'a> {
+    left: &'a Frame<f32>,
+    right: &'a Frame<f32>,
+    view: View,
+    options: &'a EdgeDisparityOptions,
+}
+
+impl Pair<'_> {
+    fn matched(&self, rows: f64) -> Vec<Option<Match>> {
+        match_aligned(self.left, &self.view, self.right, rows, self.options)
+    }
+
+    /// The offset estimated from this pair alone, the matches with it, and whether it can be believed.
+    fn estimated(&self) -> (f64, Vec<Option<Match>>, bool) {
+        let found = row_offset_of(self.left, &self.view, self.right, self.options);
+        let matches = self.matched(found.rows);
+        let believed = found.settled && share(&matches) >= LEAST_MATCHED && matches.len() >= LEAST_EDGES;
+        (found.rows, matches, believed)
+    }
+
+    /// Whether matches made with an offset speak against it.
+    fn contradicts(&self, rows: f64, matches: &[Option<Match>]) -> bool {
+        let step = misalignment(self.left, &self.view, self.right, matches, rows);
+        let misaligned = step.is_some_and(|step| step.abs() > MISALIGNED);
+        misaligned || matches.len() >= LEAST_EDGES && share(matches) < LEAST_MATCHED
+    }
+}
+
+/// Share of edge pixels that are matched.
+fn share(matches: &[Option<Match>]) -> f64 {
+    matches.iter().flatten().count() as f64 / matches.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::row_offset::tests::views;
+    use super::*;
+    use crate::math::random::CounterRng;
+
+    fn options() -> EdgeDisparityOptions {
+        EdgeDisparityOptions { disparity_range: (-8, 8), ..EdgeDisparityOptions::default() }
+    }
+
+    /// Views that show nothing, noise, and a title drawn into both alike.
+    fn openings() -> [[Frame<f32>; 2]; 3] {
+        let noise =
+            |seed| Frame::from_fn(180, 160, |x, y| 40.0 * CounterRng::new(seed).uniform((1000 * y + x) as u64) as f32);
+        let title = Frame::from_fn(180, 160, |x, y| {
+            let bar = (40..46).contains(&y) && (20..160).contains(&x);
+            let strokes = (70..100).contains(&y) && (20..160).contains(&x) && x / 6 % 3 == 0;
+            if bar || strokes { 230.0 } else { 20.0 }
+        });
+        [[Frame::filled(180, 160, 16.0), Frame::filled(180, 160, 16.0)], [noise(1), noise(2)], [title.clone(), title]]
+    }
+
+    /// All that was matched, without the pixels that were not, which are NaN.
+    fn said(found: &EdgeDisparity) -> (&[u32], &[u32], &[f32], f64) {
+        (&found.rows, &found.columns, &found.values, found.row_offset)
+    }
+
+    #[test]
+    fn whatever_a_film_begins_with_its_rows_are_found() {
+        for opening in openings() {
+            let mut rows = FilmRows::new(None);
+            rows.match_next(&opening[0], &opening[1], &options()).unwrap();
+            for offset in [1.4, 1.4, -2.3] {
+                let [left, right] = views(offset);
+                let found = rows.match_next(&left, &right, &options()).unwrap();
+                assert!((found.row_offset - offset).abs() < 0.05, "{} for {offset}", found.row_offset);
+                assert_eq!(rows.known(), Some(found.row_offset));
+            }
+        }
+    }
+
+    #[test]
+    fn what_shows_nothing_settles_nothing_and_changes_nothing() {
+        let [black, noise, _] = openings();
+        let mut rows = FilmRows::new(None);
+        for pair in [&black, &noise] {
+            rows.match_next(&pair[0], &pair[1], &options()).unwrap();
+            assert_eq!(rows.known(), None);
+        }
+        let [left, right] = views(0.5);
+        let first = rows.match_next(&left, &right, &options()).unwrap();
+        for pair in [&black, &noise] {
+            assert_eq!(rows.match_next(&pair[0], &pair[1], &options()).unwrap().row_offset, first.row_offset);
+        }
+        // The same offset, to the last bit, as long as views agree with it.
+        assert_eq!(said(&rows.match_next(&left, &right, &options()).unwrap()), said(&first));
+        assert_eq!(rows.known(), Some(first.row_offset));
+    }
+
+    #[test]
+    fn an_offset_that_is_given_is_kept() {
+        let [left, right] = views(1.4);
+        let mut rows = FilmRows::new(Some(1.0));
+        let found = rows.match_next(&left, &right, &options()).unwrap();
+        assert_eq!((found.row_offset, rows.known()), (1.0, Some(1.0)));
+        let given = EdgeDisparityOptions { row_offset: Some(1.0), ..options() };
+        assert_eq!(said(&found), said(&edge_disparity(&left, &right, &given).unwrap()));
+    }
+}

@@ -1,0 +1,123 @@
+//! Neighbouring voxels taken together, and what component they would make.
+
+use super::super::options::StereoTrackerOptions;
+use super::super::voxels::Voxels;
+use super::D;
+use crate::mixture::Posterior;
+use nalgebra::Matrix3;
+
+/// Voxels no farther apart, along x, y and disparity, are of one blob.
+const SEED_REACH: [i32; D] = [2, 2, 1];
+
+/// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean logarithm of the density, with their shares.
+pub(super) fn gain_of_parting(parts: &[Blob]) -> f64 {
+    if parts.len() < 2 {
+        return 0.0;
+    }
+    let mut whole = Blob::default();
+    for part in parts {
+        whole.join(part);
+    }
+    let apart: f64 =
+        parts.iter().map(|part| part.pixels * log_density(part.pixels / whole.pixels, &part.covariance())).sum();
+    apart / whole.pixels - log_density(1.0, &whole.covariance())
+}
+
+/// Logarithm of the density at one standard deviation along every axis of a component with a share of the pixels.
+pub(super) fn log_density(share: f64, covariance: &Matrix3<f64>) -> f64 {
+    share.ln() - 0.5 * (D as f64 + (std::f64::consts::TAU.powi(D as i32) * covariance.determinant()).ln())
+}
+
+/// Neighbouring voxels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Blob {
+    /// The voxels.
+    pub members: Vec<usize>,
+    pub pixels: f64,
+    /// `sum f x`, cells.
+    sums: [f64; D],
+    /// `sum f x x^T`.
+    squares: [f64; D * D],
+}
+
+impl Blob {
+    fn add(&mut self, voxel: usize, cell: [u16; D], count: f64) {
+        self.members.push(voxel);
+        self.pixels += count;
+        for i in 0..D {
+            self.sums[i] += count * f64::from(cell[i]);
+            for j in 0..D {
+                self.squares[i * D + j] += count * f64::from(cell[i]) * f64::from(cell[j]);
+            }
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.members.extend(&other.members);
+        self.pixels += other.pixels;
+        (0..D).for_each(|i| self.sums[i] += other.sums[i]);
+        (0..D * D).for_each(|i| self.squares[i] += other.squares[i]);
+    }
+
+    /// Covariance, cells^2, with what counting in whole voxels hides: a twelfth of a cell's square.
+    pub fn covariance(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| {
+            let counting = if i == j { 1.0 / 12.0 } else { 0.0 };
+            (self.squares[i * D + j] - self.sums[i] * self.sums[j] / self.pixels) / self.pixels + counting
+        })
+    }
+
+    /// Whether its density at one standard deviation is one that explains, among `all` pixels: wrong matches are spread too thinly.
+    pub fn explains_itself(&self, all: f64, explained: f64) -> bool {
+        log_density(self.pixels / all, &self.covariance()) >= explained
+    }
+
+    /// Makes component `k` what these pixels alone would make it.
+    pub fn place(&self, posterior: &mut Posterior, k: usize, options: &StereoTrackerOptions) {
+        posterior.weight_concentration[k] = options.weight_concentration_prior + self.pixels;
+        posterior.mean_precision[k] = options.mean_precision_prior + self.pixels;
+        posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + self.pixels;
+        let covariance = self.covariance();
+        for i in 0..D {
+            posterior.means[k * D + i] = self.sums[i] / self.pixels;
+            for j in 0..D {
+                let prior = if i == j { options.covariance_prior } else { 0.0 };
+                posterior.scale_inverses[(k * D + i) * D + j] = prior + self.pixels * covariance[(i, j)];
+            }
+        }
+    }
+}
+
+/// Some of the voxels by who is beside whom, in the order of their first ones.
+pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
+    let lattice = &voxels.lattice;
+    if some.is_empty() {
+        return vec![];
+    }
+    let mut waiting = vec![u32::MAX; lattice.volume()];
+    for &n in some {
+        waiting[lattice.index(voxels.cells[n])] = n as u32;
+    }
+    let mut take = |cell: [u16; D]| {
+        let slot = &mut waiting[lattice.index(cell)];
+        Some(std::mem::replace(slot, u32::MAX)).filter(|&n| n != u32::MAX).map(|n| n as usize)
+    };
+    let mut out = Vec::new();
+    for &first in some {
+        let Some(first) = take(voxels.cells[first]) else { continue };
+        let (mut blob, mut front) = (Blob::default(), vec![first]);
+        while let Some(n) = front.pop() {
+            blob.add(n, voxels.cells[n], f64::from(voxels.counts[n]));
+            let beside = neighbours().filter_map(|by| lattice.shifted(voxels.cells[n], by));
+            front.extend(beside.filter_map(&mut take));
+        }
+        out.push(blob);
+    }
+    out
+}
+
+/// Shifts to the voxels beside one.
+fn neighbours() -> impl Iterator<Item = [i32; D]> {
+    let [x, y, z] = SEED_REACH;
+    (-z..=z).flat_map(move |dz| (-y..=y).flat_map(move |dy| (-x..=x).map(move |dx| [dx, dy, dz])))
+}
