@@ -17,9 +17,11 @@ mod outgrown;
 mod outset;
 mod patch;
 mod pose;
+mod resized;
 mod scene;
 mod search;
 mod segment;
+mod slanted;
 mod tell;
 mod uncover;
 
@@ -84,6 +86,8 @@ pub(super) struct Layered {
     before: Option<[f64; 2]>,
     missed: usize,
     hidden: bool,
+    /// Frames in a row in which something covered it.
+    covered: usize,
     /// Frames for which a look-alike is still reckoned with.
     wary: usize,
     /// Angle turned, not wrapped, rad.
@@ -145,6 +149,7 @@ impl Layered {
             spare: Vec::new(),
             missed: 0,
             hidden: false,
+            covered: 0,
             wary: 0,
             turned: 0.0,
             gain: 1.0,
@@ -241,7 +246,7 @@ impl Layered {
             own + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
         });
         let step = self.before.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
-        if found.reason == SEARCHED && found.nis > JUMPED {
+        if (found.reason == SEARCHED || found.reason == resized::RESIZED) && found.nis > JUMPED {
             // Nobody moves like that: it is begun anew where it was found.
             self.filter = begun(at);
         }
@@ -265,6 +270,7 @@ impl Layered {
         self.before = (!occluded).then_some(at);
         self.front = self.front.take().filter(|front| occluded && !front.is_past(&self.target, &self.pose));
         (self.missed, self.hidden) = (0, occluded);
+        self.covered = if occluded { self.covered + 1 } else { 0 };
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
         if found.reason == COVERED && look.visibility > self.usual - DROP {
@@ -279,8 +285,8 @@ impl Layered {
             learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
         }
         if self.front.is_some() {
-            let reached = self.reached(&self.pose);
-            learn::learn_background(&mut self.background, frame, reached, self.noise);
+            let hidden = self.hides();
+            learn::learn_background(&mut self.background, frame, &hidden, self.noise);
         }
     }
 
@@ -295,13 +301,14 @@ impl Layered {
         learn::learn_target(&mut self.target, &view, gain, self.noise);
         self.gain *= gain;
         self.usual += VISIBILITY_RATE * (visibility - self.usual);
-        let reached = self.reached(&self.pose);
-        learn::learn_background(&mut self.background, frame, reached, self.noise);
+        let hidden = self.hides();
+        learn::learn_background(&mut self.background, frame, &hidden, self.noise);
     }
 
     /// No measurement.
     fn miss(&mut self) {
         self.missed += 1;
+        self.covered = 0;
         self.before = None;
         self.rate = [0.0; 6];
         self.pose = self.placed(self.pose, self.filter.position());

@@ -2,7 +2,9 @@
 
 use super::Layered;
 use super::find::Finding;
+use super::layers::UNSEEN;
 use super::pose::Pose;
+use super::slanted::Slanted;
 use crate::types::{TargetBox, TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.
@@ -16,7 +18,12 @@ impl Layered {
         TargetBox::about(self.position(pose), width * across, height * down)
     }
 
-    /// Upright box around the target at a pose, its corners included: where it may hide the scene.
+    /// Where it hides the scene, with a margin.
+    pub(super) fn hides(&self) -> Slanted {
+        Slanted::about(self.position(&self.pose), &self.pose, self.target.extent(), UNSEEN)
+    }
+
+    /// Upright box around the target at a pose, its corners included.
     pub(super) fn reached(&self, pose: &Pose) -> TargetBox {
         let half = pose.reach(self.target.extent().map(|side| 0.5 * side));
         TargetBox::about(self.position(pose), 2.0 * half[0], 2.0 * half[1])

@@ -1,0 +1,97 @@
+//! A target that has long been covered, wherever it went: nothing covers it, it has another size.
+//!
+//! The size of a covered target is held, for what is seen of it says little of the rest. If the size was wrong when that began, or changes meanwhile, less and less of the target is where it is
+//! thought to be, and that looks like cover again: the two keep each other up. What really covers a target lets a part of its outline be seen; a target of another size fits all around.
+
+use super::Layered;
+use super::align::{Aligned, Silence};
+use super::camera::CAP;
+use super::find::{DROP, Finding, LEVELS, PRIOR, WELL};
+use super::layers::grown;
+use super::look::Look;
+use super::pose::Pose;
+use super::search;
+use crate::types::{Frame, TargetBox};
+
+/// Frames in a row after which cover is doubted.
+const LONG: usize = 8;
+/// Part of the target's area that may look like it beside it: where the rest of a target that is really covered would be, there is more.
+const FRINGE: f64 = 0.15;
+/// Sizes that are tried, over the one that is held.
+const SIZES: [f64; 5] = [0.8, 0.9, 1.0, 1.1, 1.25];
+/// Farthest from where it is expected, px.
+const REACH: usize = 12;
+/// What a part of the target that is not seen counts as, grey levels.
+const UNSEEN: f64 = 6.0;
+/// What is said of it.
+pub(super) const RESIZED: &str = "what seemed to cover the target was a change of its size";
+
+impl Layered {
+    /// The target at another size than the one held, where it is seen well and explains the picture better than cover does.
+    pub(super) fn resized(&self, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
+        if self.covered < LONG {
+            return None;
+        }
+        let expected = covered.aligned.pose;
+        let at = self.position(&expected);
+        let around = grown(self.reached(&expected), (0.2, REACH as f64));
+        let mut best: Option<(f64, Finding)> = None;
+        for size in SIZES {
+            let guess = self.placed(Pose { a: expected.a.map(|row| row.map(|a| size * a)), ..expected }, at);
+            let Some(place) = search::search(frame, &self.target, &self.background, (&guess, 1.0), REACH) else {
+                continue;
+            };
+            let how = (self.freedom, Silence::None, PRIOR, &LEVELS[1..]);
+            let Some(found) = self.try_at(frame, &place, how) else { continue };
+            let left = self.unexplained(frame, &found, &around);
+            if best.is_none_or(|(least, _)| left < least) {
+                best = Some((left, found));
+            }
+        }
+        let left = self.unexplained(frame, covered, &around);
+        let fits = |look: &Look| {
+            look.visibility >= WELL && look.visibility > covered.look.visibility + DROP && look.leak < FRINGE
+        };
+        let (_, found) = best.filter(|(least, found)| *least < left && fits(&found.look))?;
+        Some(Finding { reason: RESIZED, ..found })
+    }
+
+    /// What target and background together leave unexplained of a part of the picture, large differences counting alike; grey levels. Of a covered target any part may be hidden.
+    fn unexplained(&self, frame: &Frame<f64>, found: &Finding, around: &TargetBox) -> f64 {
+        let Aligned { pose, gain, .. } = found.aligned;
+        let [[a, b], [c, d]] = pose.a;
+        let determinant = a * d - b * c;
+        let (columns, rows) = (self.target.half()[0], self.target.half()[1]);
+        let [low, high] = pixels(around, frame.size());
+        let (mut sum, mut count) = (0.0, 0.0);
+        for y in low[1]..high[1] {
+            for x in low[0]..high[0] {
+                let [dx, dy] = [x as f64 - pose.p[0], y as f64 - pose.p[1]];
+                let [i, j] = [(d * dx - b * dy) / determinant + columns, (a * dy - c * dx) / determinant + rows];
+                let behind = self.background.picture.get(x, y);
+                let on = i >= 0.0 && j >= 0.0 && i <= 2.0 * columns && j <= 2.0 * rows;
+                let model = if on {
+                    let at = [(i + 0.5) as usize, (j + 0.5) as usize];
+                    let support = self.target.a.get(at[0], at[1]);
+                    support * gain * self.target.t.get(at[0], at[1]) + (1.0 - support) * behind
+                } else {
+                    behind
+                };
+                let seen = frame.get(x, y);
+                let hidden = if found.occluded { (seen - behind).abs() + UNSEEN } else { CAP };
+                sum += (seen - model).abs().min(hidden).min(CAP);
+                count += 1.0;
+            }
+        }
+        sum / f64::max(count, 1.0)
+    }
+}
+
+/// First pixel of a box that is in the picture, and the one after the last, along both axes.
+fn pixels(bounds: &TargetBox, (width, height): (usize, usize)) -> [[usize; 2]; 2] {
+    let within = |at: f64, length: usize| at.ceil().clamp(0.0, length as f64) as usize;
+    [
+        [within(bounds.x, width), within(bounds.y, height)],
+        [within(bounds.x + bounds.width, width), within(bounds.y + bounds.height, height)],
+    ]
+}
