@@ -1,4 +1,4 @@
-"""Where the gradient tracker used to go wrong: large targets that turn, weak texture, boxes much too small, jumps of brightness, a camera that moves."""
+"""Where the gradient tracker used to go wrong: large targets that turn, weak texture, boxes much too small, jumps of brightness, a camera that moves, sizes that change unseen."""
 
 import sys
 from pathlib import Path
@@ -13,6 +13,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import tracking_hard_scenes
 import tracking_pictures
 import tracking_scenes
+import tracking_scores
 from test_track import follow, success
 from tracking_scenes import Plane, Scene, circle, disc, line, square
 
@@ -148,3 +149,29 @@ def test_options_of_the_filter_are_refused_by_name():
         track.GaussMarkovFilter((0, 0), measures=None)
     with pytest.raises(TypeError, match="^order: expected an integer"):
         track.derivative_kernels(None)
+
+
+def bars(centre, size):
+    """A dark figure that stands still, as a scene has it."""
+    count = len(tracking_scenes.TIMES)
+    return tracking_scenes.figure(np.full((count, 2), centre), np.full((count, 2), size), 40.0)
+
+
+def test_a_target_that_grows_behind_something_gets_its_new_size():
+    """Its size is held while it is hidden; what comes out is larger, and is not covered for ever by what its old size leaves out."""
+    times = tracking_scenes.TIMES
+    side = np.interp(times, [18, 26], [16, 24])
+    target = tracking_scenes.figure(line((70.0, 128.0), (2.0, 0.3)), np.stack([side, side], axis=1), 200.0)
+    scene = tracking_hard_scenes.scene("grows behind a bar", target, others=(bars((116.0, 127.5), (24.0, 256.0)),))
+    found = track.track(scene.frames(), scene.start_box)
+    assert tracking_scores.overlap(np.asarray(found.box), scene.boxes)[-10:].mean() > 0.7
+
+
+@pytest.mark.parametrize("side", [13.0, 21.0])
+def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
+    """Its lower part is hidden for dozens of frames: that is no change of its size."""
+    target = square(line((60.0, 120.0), (2.5, 0.0)), side=side)
+    scene = tracking_hard_scenes.scene("low wall", target, others=(bars((140.0, 140.0 + 0.1 * side), (90.0, 40.0)),))
+    found = track.track(scene.frames(), scene.start_box)
+    overlap = tracking_scores.overlap(np.asarray(found.box), scene.boxes)
+    assert (overlap > 0.5).all() and overlap[-10:].mean() > 0.8
