@@ -179,7 +179,7 @@ impl Layered {
     }
 
     /// Shorter side, px of the target.
-    fn side(&self) -> f64 {
+    pub(super) fn side(&self) -> f64 {
         let [width, height] = self.target.extent();
         width.min(height).max(1.0)
     }

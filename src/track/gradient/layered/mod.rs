@@ -56,6 +56,8 @@ const LEAST_DEVIATION: f64 = 0.05;
 const OUTLINE: f64 = 0.07;
 /// What noise adds to that, over noise by contrast, px: what is learnt of an edge from noisy frames stays wrong for as long as it is remembered.
 const OUTLINE_IN_NOISE: f64 = 1.4;
+/// Frames after an interruption in which what is not seen of the target may be hidden still.
+const RETURNING: usize = 3;
 /// Rate of the filtered change of size and angle.
 const RATE: f64 = 0.3;
 /// The same of the mean visibility.
@@ -88,6 +90,8 @@ pub(super) struct Layered {
     hidden: bool,
     /// Frames in a row in which something covered it.
     covered: usize,
+    /// Frames for which it is still reckoned with that the target has not come out entirely.
+    returning: usize,
     /// Frames for which a look-alike is still reckoned with.
     wary: usize,
     /// Angle turned, not wrapped, rad.
@@ -150,6 +154,7 @@ impl Layered {
             missed: 0,
             hidden: false,
             covered: 0,
+            returning: 0,
             wary: 0,
             turned: 0.0,
             gain: 1.0,
@@ -240,10 +245,13 @@ impl Layered {
         if !occluded {
             self.faintness = (self.noise / look.contrast.max(1.0)).min(1.0);
         }
+        self.returning = if self.missed > 0 { RETURNING } else { self.returning.saturating_sub(1) };
+        // Where a part of it is still hidden, all of it may be that much farther on.
+        let behind = if self.returning > 0 { self.side() * (1.0 - look.visibility) } else { 0.0 };
         let visible = look.visibility.max(0.1);
         let variance: [f64; 2] = std::array::from_fn(|k| {
             let own = aligned.covariance[k][k].max(LEAST_DEVIATION.powi(2)) / (visible * visible);
-            own + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
+            own + behind * behind + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
         });
         let step = self.before.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
         if (found.reason == SEARCHED || found.reason == resized::RESIZED) && found.nis > JUMPED {
