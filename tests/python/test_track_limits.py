@@ -175,3 +175,30 @@ def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
     found = track.track(scene.frames(), scene.start_box)
     overlap = tracking_scores.overlap(np.asarray(found.box), scene.boxes)
     assert (overlap > 0.5).all() and overlap[-10:].mean() > 0.8
+
+
+def stated(scene, **options):
+    """Errors of the position over the stated deviation, one a frame in which the target is seen."""
+    found = track.track(scene.frames(), scene.start_box, **options)
+    errors = np.linalg.norm(found.position - scene.centres, axis=1) / np.sqrt(found.covariance[:, :, 0, 0].sum(axis=1))
+    return errors[(found.status == "tracking") & (np.arange(len(found)) > 0)]
+
+
+@pytest.mark.parametrize("kind", [FRACTAL, "smooth:4,90,20"])
+def test_a_box_too_large_is_not_sure_of_the_middle_until_it_is_settled(kind):
+    scene = tracking_scenes.simulation(1, kind, 24.0, seed=21)
+    x, y, w, h = scene.start_box
+    large = Scene("large", scene.planes, scene.target, start=(x - 0.2 * w, y - 0.2 * h, 1.4 * w, 1.4 * h))
+    assert stated(large)[:12].max() <= 2.0
+    assert stated(scene).max() <= 3.0
+
+
+@pytest.mark.parametrize("kind", [FRACTAL, "smooth:4,90,20"])
+def test_what_comes_out_from_behind_something_is_not_sure_of_its_place(kind):
+    """As long as a part of it is hidden it is found a few px off."""
+    target = square(line((75.0, 120.0), (2.4, 0.3)))
+    scene = Scene("bar", (Plane(kind, 21),), target, others=(bars((130.0, 127.5), (14.0, 256.0)),))
+    found = track.track(scene.frames(), scene.start_box)
+    errors = np.linalg.norm(found.position - scene.centres, axis=1) / np.sqrt(found.covariance[:, :, 0, 0].sum(axis=1))
+    out = np.flatnonzero((found.status == "tracking") & (np.arange(len(found)) > 19))[:2]
+    assert errors[out].max() <= 3.0

@@ -14,6 +14,7 @@ mod light;
 mod look;
 mod nodes;
 mod outgrown;
+mod outline;
 mod outset;
 mod patch;
 mod pose;
@@ -52,10 +53,6 @@ const WILD: &str = "the frame is nothing like those before";
 const TOLD: f64 = 0.75;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
-/// Deviation of the middle of the learnt support from that of the target, px: it stays from frame to frame, and no filter takes it away.
-const OUTLINE: f64 = 0.07;
-/// What noise adds to that, over noise by contrast, px: what is learnt of an edge from noisy frames stays wrong for as long as it is remembered.
-const OUTLINE_IN_NOISE: f64 = 1.4;
 /// Frames after an interruption in which what is not seen of the target may be hidden still.
 const RETURNING: usize = 3;
 /// Rate of the filtered change of size and angle.
@@ -108,6 +105,8 @@ pub(super) struct Layered {
     front: Option<Front>,
     /// How far the displacement since the first frame may be from what is said, until that is told, px.
     doubt: [f64; 2],
+    /// How far the middle of the support may still move along x and y until it is settled, px.
+    unsettled: [f64; 2],
     /// Noise over the contrast of the target, when it was last seen whole.
     faintness: f64,
 }
@@ -132,6 +131,7 @@ impl Layered {
         Self {
             front: None,
             doubt: [0.0; 2],
+            unsettled: [0.0; 2],
             faintness: 0.0,
             outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
@@ -162,14 +162,6 @@ impl Layered {
             with_camera: false,
             age: 0,
         }
-    }
-
-    /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
-    pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
-        let mut covariance = self.filter.covariance();
-        let outline = OUTLINE.hypot(OUTLINE_IN_NOISE * self.faintness);
-        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += outline * outline + doubt * doubt);
-        covariance
     }
 
     /// The next frame; `None`: it cannot be used.
@@ -306,7 +298,9 @@ impl Layered {
 
     fn learn(&mut self, frame: &Frame<f64>, gain: f64, visibility: f64) {
         let view = view(frame, &self.target, &self.background, &self.pose);
+        let before = self.position(&self.pose);
         learn::learn_target(&mut self.target, &view, gain, self.noise);
+        self.settle(before);
         self.gain *= gain;
         self.usual += VISIBILITY_RATE * (visibility - self.usual);
         let hidden = self.hides();
