@@ -177,6 +177,15 @@ def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
     assert (overlap > 0.5).all() and overlap[-10:].mean() > 0.8
 
 
+@pytest.mark.parametrize(("gap", "bar"), [(8.0, 4.0), (12.0, 6.0)])
+def test_what_is_seen_between_the_bars_of_a_fence_is_not_a_smaller_target(gap, bar):
+    """A target as small as the gap would fit there, but what shows between the next bars belongs to it as well."""
+    pickets = tuple(bars((92.3 + k * (gap + bar), 127.5), (bar, 256.0)) for k in range(int(80 // (gap + bar))))
+    scene = tracking_hard_scenes.scene("fence", square(line((60.0, 128.0), (1.9, 0.2)), side=21.0), others=pickets)
+    found = track.track(scene.frames(), scene.start_box)
+    assert (tracking_scores.overlap(np.asarray(found.box), scene.boxes) > 0.5).all()
+
+
 def stated(scene, **options):
     """Errors of the position over the stated deviation, one a frame in which the target is seen."""
     found = track.track(scene.frames(), scene.start_box, **options)

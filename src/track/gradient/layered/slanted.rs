@@ -23,6 +23,12 @@ impl Slanted {
         Self { middle, inverse, half }
     }
 
+    /// Whether it holds a place of the picture.
+    pub fn holds(&self, place: [f64; 2]) -> bool {
+        let [x, y] = [place[0] - self.middle[0], place[1] - self.middle[1]];
+        self.inverse.iter().zip(self.half).all(|([across, along], half)| (across * x + along * y).abs() <= half)
+    }
+
     /// The columns of a row of pixels that it holds: the first, and the one after the last.
     pub fn columns(&self, y: usize, width: usize) -> [usize; 2] {
         let down = y as f64 - self.middle[1];
