@@ -8,11 +8,11 @@ use super::{Layered, SURE};
 use crate::types::Frame;
 
 /// Deviations of the increment from the prediction: of the position, px, and of size and angle.
-const PRIOR: [f64; 2] = [3.0, 0.02];
+pub(super) const PRIOR: [f64; 2] = [3.0, 0.02];
 /// That of size and angle where a look-alike touches, whose pull may go a long way with the target.
 const STIFF: f64 = 0.005;
 /// Levels of a frame like the one before, and of one after an interruption; px.
-const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
+pub(super) const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Least visibility of a target that is seen well.
 pub(super) const WELL: f64 = 0.75;
 /// Below this visibility it is looked for all around.
@@ -70,7 +70,12 @@ impl Layered {
     }
 
     /// Aligns and judges.
-    fn try_at(&self, frame: &Frame<f64>, guess: &Pose, how: (Freedom, Silence, [f64; 2], &[f64])) -> Option<Finding> {
+    pub(super) fn try_at(
+        &self,
+        frame: &Frame<f64>,
+        guess: &Pose,
+        how: (Freedom, Silence, [f64; 2], &[f64]),
+    ) -> Option<Finding> {
         let (freedom, silence, prior, levels) = how;
         let task = Task {
             frame,
@@ -110,6 +115,9 @@ impl Layered {
         }
         if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
             best = self.searched(frame).or(best);
+        }
+        if let Some(covered) = best.filter(|found| found.occluded) {
+            best = self.resized(frame, &covered).or(best);
         }
         let least = LEAST[usize::from(self.missed > 0)];
         best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
@@ -171,7 +179,7 @@ impl Layered {
     }
 
     /// Shorter side, px of the target.
-    fn side(&self) -> f64 {
+    pub(super) fn side(&self) -> f64 {
         let [width, height] = self.target.extent();
         width.min(height).max(1.0)
     }

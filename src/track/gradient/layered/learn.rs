@@ -1,12 +1,13 @@
 //! What is learnt from a frame in which the target was seen well.
 
-use super::layers::{Background, Target, UNSEEN, grown, holds};
+use super::layers::{Background, Target};
 use super::level::dilated;
 use super::look::View;
 use super::patch::smooth_known;
+use super::slanted::Slanted;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::track::gradient::local_flow::{MAD, median};
-use crate::types::{Frame, TargetBox};
+use crate::types::Frame;
 
 /// Memory of the support.
 const FORGETTING: f64 = 0.95;
@@ -103,16 +104,13 @@ fn continue_template(target: &mut Target) {
     }
 }
 
-/// The background outside the target's box, which is upright in the picture.
-pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, bounds: TargetBox, noise: f64) {
-    let hidden = grown(bounds, UNSEEN);
+/// The background outside the box of the target, which is turned with it.
+pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &Slanted, noise: f64) {
     let sudden = 6.0 * noise + 8.0;
     let (width, height) = frame.size();
-    let columns = [hidden.x, hidden.x + hidden.width].map(|x| x.clamp(-1.0, width as f64));
-    let (first, end) = (columns[0].ceil().max(0.0) as usize, ((columns[1].floor() + 1.0).max(0.0) as usize).min(width));
     for y in 0..height {
-        let crossed = holds(&TargetBox { x: 0.0, width: 0.0, ..hidden }, 0, y) && first < end;
-        let parts = if crossed { [0..first, end..width] } else { [0..width, width..width] };
+        let [first, end] = hidden.columns(y, width);
+        let parts = if first < end { [0..first, end..width] } else { [0..width, width..width] };
         for part in parts {
             let seen = &frame.row(y)[part.clone()];
             let known = &mut background.known.row_mut(y)[part.clone()];

@@ -54,7 +54,7 @@ pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background,
 }
 
 /// Whether the target is what is seen at a point; `contrast` is that to the background, where that is known.
-fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
+pub(super) fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
     let off = (seen - bright).abs();
     let contrast = if behind.is_nan() { UNKNOWN } else { (bright - behind).abs() };
     let nearer = behind.is_nan() || off < (seen - behind).abs();

@@ -14,12 +14,15 @@ mod light;
 mod look;
 mod nodes;
 mod outgrown;
+mod outline;
 mod outset;
 mod patch;
 mod pose;
+mod resized;
 mod scene;
 mod search;
 mod segment;
+mod slanted;
 mod tell;
 mod uncover;
 
@@ -50,10 +53,8 @@ const WILD: &str = "the frame is nothing like those before";
 const TOLD: f64 = 0.75;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
-/// Deviation of the middle of the learnt support from that of the target, px: it stays from frame to frame, and no filter takes it away.
-const OUTLINE: f64 = 0.07;
-/// What noise adds to that, over noise by contrast, px: what is learnt of an edge from noisy frames stays wrong for as long as it is remembered.
-const OUTLINE_IN_NOISE: f64 = 1.4;
+/// Frames after an interruption in which what is not seen of the target may be hidden still.
+const RETURNING: usize = 3;
 /// Rate of the filtered change of size and angle.
 const RATE: f64 = 0.3;
 /// The same of the mean visibility.
@@ -84,6 +85,10 @@ pub(super) struct Layered {
     before: Option<[f64; 2]>,
     missed: usize,
     hidden: bool,
+    /// Frames in a row in which something covered it.
+    covered: usize,
+    /// Frames for which it is still reckoned with that the target has not come out entirely.
+    returning: usize,
     /// Frames for which a look-alike is still reckoned with.
     wary: usize,
     /// Angle turned, not wrapped, rad.
@@ -100,6 +105,8 @@ pub(super) struct Layered {
     front: Option<Front>,
     /// How far the displacement since the first frame may be from what is said, until that is told, px.
     doubt: [f64; 2],
+    /// How far the middle of the support may still move along x and y until it is settled, px.
+    unsettled: [f64; 2],
     /// Noise over the contrast of the target, when it was last seen whole.
     faintness: f64,
 }
@@ -124,6 +131,7 @@ impl Layered {
         Self {
             front: None,
             doubt: [0.0; 2],
+            unsettled: [0.0; 2],
             faintness: 0.0,
             outset: Some(Outset::new(&frame, bounds, target.clone())),
             freedom: match options.shape {
@@ -145,6 +153,8 @@ impl Layered {
             spare: Vec::new(),
             missed: 0,
             hidden: false,
+            covered: 0,
+            returning: 0,
             wary: 0,
             turned: 0.0,
             gain: 1.0,
@@ -152,14 +162,6 @@ impl Layered {
             with_camera: false,
             age: 0,
         }
-    }
-
-    /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the target's middle is known at all.
-    pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
-        let mut covariance = self.filter.covariance();
-        let outline = OUTLINE.hypot(OUTLINE_IN_NOISE * self.faintness);
-        covariance.iter_mut().zip(self.doubt).for_each(|(axis, doubt)| axis[0][0] += outline * outline + doubt * doubt);
-        covariance
     }
 
     /// The next frame; `None`: it cannot be used.
@@ -235,13 +237,16 @@ impl Layered {
         if !occluded {
             self.faintness = (self.noise / look.contrast.max(1.0)).min(1.0);
         }
+        self.returning = if self.missed > 0 { RETURNING } else { self.returning.saturating_sub(1) };
+        // Where a part of it is still hidden, all of it may be that much farther on.
+        let behind = if self.returning > 0 { self.side() * (1.0 - look.visibility) } else { 0.0 };
         let visible = look.visibility.max(0.1);
         let variance: [f64; 2] = std::array::from_fn(|k| {
             let own = aligned.covariance[k][k].max(LEAST_DEVIATION.powi(2)) / (visible * visible);
-            own + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
+            own + behind * behind + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
         });
         let step = self.before.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
-        if found.reason == SEARCHED && found.nis > JUMPED {
+        if (found.reason == SEARCHED || found.reason == resized::RESIZED) && found.nis > JUMPED {
             // Nobody moves like that: it is begun anew where it was found.
             self.filter = begun(at);
         }
@@ -265,6 +270,7 @@ impl Layered {
         self.before = (!occluded).then_some(at);
         self.front = self.front.take().filter(|front| occluded && !front.is_past(&self.target, &self.pose));
         (self.missed, self.hidden) = (0, occluded);
+        self.covered = if occluded { self.covered + 1 } else { 0 };
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
         if found.reason == COVERED && look.visibility > self.usual - DROP {
@@ -279,8 +285,8 @@ impl Layered {
             learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
         }
         if self.front.is_some() {
-            let reached = self.reached(&self.pose);
-            learn::learn_background(&mut self.background, frame, reached, self.noise);
+            let hidden = self.hides();
+            learn::learn_background(&mut self.background, frame, &hidden, self.noise);
         }
     }
 
@@ -292,16 +298,19 @@ impl Layered {
 
     fn learn(&mut self, frame: &Frame<f64>, gain: f64, visibility: f64) {
         let view = view(frame, &self.target, &self.background, &self.pose);
+        let before = self.position(&self.pose);
         learn::learn_target(&mut self.target, &view, gain, self.noise);
+        self.settle(before);
         self.gain *= gain;
         self.usual += VISIBILITY_RATE * (visibility - self.usual);
-        let reached = self.reached(&self.pose);
-        learn::learn_background(&mut self.background, frame, reached, self.noise);
+        let hidden = self.hides();
+        learn::learn_background(&mut self.background, frame, &hidden, self.noise);
     }
 
     /// No measurement.
     fn miss(&mut self) {
         self.missed += 1;
+        self.covered = 0;
         self.before = None;
         self.rate = [0.0; 6];
         self.pose = self.placed(self.pose, self.filter.position());

@@ -3,10 +3,13 @@
 use super::Layered;
 use super::find::Finding;
 use super::pose::Pose;
+use super::slanted::Slanted;
 use crate::types::{TargetBox, TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.
 const LOST_AFTER: usize = 15;
+/// Around the box, the scene may be hidden: share of its sides, and px. Limbs and what else is not in the support must not be learnt as background, for the target would look like that a moment later.
+const HIDES: (f64, f64) = (0.1, 4.0);
 
 impl Layered {
     /// Upright box of the target at a pose.
@@ -16,7 +19,12 @@ impl Layered {
         TargetBox::about(self.position(pose), width * across, height * down)
     }
 
-    /// Upright box around the target at a pose, its corners included: where it may hide the scene.
+    /// Where it hides the scene, with a margin.
+    pub(super) fn hides(&self) -> Slanted {
+        Slanted::about(self.position(&self.pose), &self.pose, self.target.extent(), HIDES)
+    }
+
+    /// Upright box around the target at a pose, its corners included.
     pub(super) fn reached(&self, pose: &Pose) -> TargetBox {
         let half = pose.reach(self.target.extent().map(|side| 0.5 * side));
         TargetBox::about(self.position(pose), 2.0 * half[0], 2.0 * half[1])
