@@ -6,48 +6,134 @@
 //!
 //! The windows of refinement carry such errors a little way out of those areas, and where they grow, the slopes err by their rise.
 
-use super::super::data::MOTION;
+use super::super::data::{MOTION, SEEN, UU, UV, VV};
 use super::super::grid::Planes;
 use super::super::refine::{PITCH, SPACING};
-use super::seen::Seen;
+use super::noise::Noise;
 use super::soften;
 use crate::simd::SimdReal;
-use std::f64::consts::FRAC_PI_2;
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 /// How far a level sees into what has no texture, px of the level: its stencils and the windows of its data.
-const REACH: f64 = 3.0;
-/// Variance of what was handed down over that of the differences where there is texture: coarse levels see less of its rim.
-const LESS_SEEN: f64 = 2.0;
+const REACH: f64 = 4.0;
+/// Share of the sites from which on they tell how exact coarse levels are.
+const TELLING: f64 = 0.02;
+/// Usable share of a window from which on a site counts as seen.
+const USABLE: f64 = 0.1;
+/// Sites whose information is told together reach so far from one.
+const NEAR: usize = 1;
+/// Sites that one thread looks at, at a time.
+const PIECE: usize = 4096;
 
 /// Variance of the slopes over the mean square of the rise of the flow's deviation: errors are not as steep everywhere as at their steepest.
-const STEEP: f64 = 0.5;
+const STEEP: f64 = 0.25;
+
+/// Where data lead the motion.
+pub(super) struct Led {
+    width: usize,
+    /// How far every site is from the next that data lead, px, row by row; 0 where nothing is seen at all: that is another matter.
+    distances: Vec<f64>,
+}
+
+impl Led {
+    /// As the `noise` says of the sites' data.
+    pub fn by<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>) -> Self {
+        let (width, height) = (data.width, data.height);
+        let around = |at: usize, len: usize| at.saturating_sub(NEAR)..(at + NEAR + 1).min(len);
+        let place = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
+        let leads = |n: usize| {
+            let (x, y) = (n % width, n / width);
+            let (columns, rows) = (around(x, width), around(y, height));
+            let count = (columns.len() * rows.len()) as f64;
+            let mean = |k| {
+                let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
+                rows.clone().map(row).sum::<f64>() / count
+            };
+            noise.leads([UU, UV, VV].map(mean), place(x, width), place(y, height))
+        };
+        let led: Vec<bool> = (0..width * height).into_par_iter().with_min_len(PIECE).map(leads).collect();
+        let seen = |n: usize| data.at(SEEN, n % width, n / width).to_f64() >= USABLE;
+        Self::with(width, &led, seen)
+    }
+
+    /// For sites of which these are led; they all count as led where nearly none is: then they do not tell.
+    fn with(width: usize, led: &[bool], seen: impl Fn(usize) -> bool) -> Self {
+        let count = led.iter().filter(|led| **led).count();
+        let mut distances = if (count as f64) < TELLING * led.len() as f64 || count == 0 {
+            vec![0.0; led.len()]
+        } else {
+            distances(width, led)
+        };
+        (0..distances.len()).filter(|&n| !seen(n)).for_each(|n| distances[n] = 0.0);
+        Self { width, distances }
+    }
+
+    /// The farthest of a place's sites.
+    fn at_place(&self, x: usize, y: usize) -> f64 {
+        let (width, height) = (self.width, self.distances.len() / self.width);
+        let around = |place: usize, len: usize| {
+            (SPACING * place).saturating_sub(SPACING / 2)..(SPACING * place + SPACING / 2 + 1).min(len)
+        };
+        let rows = around(y, height).map(|y| &self.distances[y * width..][..width]);
+        rows.flat_map(|row| &row[around(x, width)]).fold(0.0, |most, distance| f64::max(most, *distance))
+    }
+}
+
+/// From every site to the next of the `led` ones, px: the shortest way along rows, columns and diagonals.
+fn distances(width: usize, led: &[bool]) -> Vec<f64> {
+    let mut out: Vec<f64> = led.iter().map(|led| if *led { 0.0 } else { f64::INFINITY }).collect();
+    let sites = out.len();
+    let (straight, diagonal) = (PITCH, PITCH * SQRT_2);
+    // Once from above and once, everything turned about, from below.
+    for _ in 0..2 {
+        for n in 0..sites {
+            let x = n % width;
+            let mut least = out[n];
+            if x > 0 {
+                least = least.min(out[n - 1] + straight);
+            }
+            if n >= width {
+                least = least.min(out[n - width] + straight);
+                if x > 0 {
+                    least = least.min(out[n - width - 1] + diagonal);
+                }
+                if x + 1 < width {
+                    least = least.min(out[n - width + 1] + diagonal);
+                }
+            }
+            out[n] = least;
+        }
+        out.reverse();
+    }
+    out
+}
 
 /// Variances of what was found on coarser levels.
 pub(super) struct Inherited {
     /// Of the flow, px^2 of the finest level worked on, and of the slopes; the next coarser level first.
     variances: Vec<[f64; 2]>,
+    led: Led,
 }
 
 impl Inherited {
-    /// From the refined `motion`, that on the levels `above` it, the finest first, and where the texture is.
-    pub fn new<T: SimdReal>(motion: &Planes<T>, above: &[Planes<T>], textured: &Seen) -> Self {
+    /// From the refined `motion`, that on the levels `above` it, the finest first, and where data lead.
+    pub fn new<T: SimdReal>(motion: &Planes<T>, above: &[Planes<T>], led: Led) -> Self {
         let mut variances: Vec<[f64; 2]> = Vec::new();
         for (k, coarse) in above.iter().enumerate() {
-            let mut found = differences(motion, (coarse, k + 1), textured).unwrap_or_default();
+            let mut found = differences(motion, (coarse, k + 1), &led).unwrap_or_default();
             if let Some(finer) = variances.last() {
                 // The farther, the less is known.
                 found = [0, 1].map(|kind| found[kind].max(finer[kind]));
             }
             variances.push(found);
         }
-        Self { variances }
+        Self { variances, led }
     }
 
-    /// The variances of the flow and of the slopes at every place that is `seen`, row by row, and a little around: what is not seen at all is another matter.
-    pub fn at_places(&self, [seen, textured]: [&Seen; 2], size: (usize, usize)) -> Vec<[f64; 2]> {
-        let distances = (0..size.0 * size.1)
-            .map(|n| (n % size.0, n / size.0))
-            .map(|(x, y)| if seen.beyond(x, y) > 0.0 { 0.0 } else { textured.beyond(x, y) });
+    /// The variances of the flow and of the slopes at every place, row by row.
+    pub fn at_places(&self, size: (usize, usize)) -> Vec<[f64; 2]> {
+        let distances = (0..size.0 * size.1).map(|n| self.led.at_place(n % size.0, n / size.0));
         let own: Vec<[f64; 2]> =
             distances.map(|distance| [0, 1].map(|kind| self.variance(kind, distance / REACH).sqrt())).collect();
         let mut carried = own.clone();
@@ -66,30 +152,26 @@ impl Inherited {
         let (mut from, mut least) = (0.5, 0.0);
         for variances in &self.variances {
             let to = 2.0 * from;
-            let most = LESS_SEEN * variances[kind];
+            let most = variances[kind];
             if pixels < to {
                 return least + (most - least) * ((pixels - from) / (to - from)).max(0.0);
             }
             (from, least) = (to, most);
         }
-        least
+        // Nothing saw further; what was never corrected grows with the distance.
+        least * (pixels / from).powi(2)
     }
 }
 
-/// Of the motion found so many levels above: the flow's and the slopes' mean square difference at the places with texture that lie on its sites, if there are any.
-fn differences<T: SimdReal>(
-    motion: &Planes<T>,
-    (coarse, above): (&Planes<T>, usize),
-    textured: &Seen,
-) -> Option<[f64; 2]> {
-    let (width, height) = (motion.width.div_ceil(SPACING), motion.height.div_ceil(SPACING));
+/// Of the motion found so many levels above: the flow's and the slopes' mean square difference at those of its sites that data lead, on lines through the places; if there are any.
+fn differences<T: SimdReal>(motion: &Planes<T>, (coarse, above): (&Planes<T>, usize), led: &Led) -> Option<[f64; 2]> {
     let (mut sums, mut count) = ([0.0; 2], 0.0);
-    let step = ((1 << above) / SPACING).max(1);
-    for (x, y) in (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| (x, y))) {
-        if textured.beyond(x, y) > 0.0 {
+    let step = (1 << above).max(SPACING);
+    let every = |len: usize| (0..len).step_by(step);
+    for (x, y) in every(motion.height).flat_map(|y| every(motion.width).map(move |x| (x, y))) {
+        if led.distances[y * led.width + x] > 0.0 {
             continue;
         }
-        let (x, y) = (SPACING * x, SPACING * y);
         for k in 0..MOTION {
             let scale = if k < 2 { f64::from(1u32 << above) } else { 1.0 };
             let there = scale * coarse.line(k, y >> above)[x >> above].to_f64();
@@ -115,18 +197,13 @@ fn squared_rise(values: &[f64], (width, height): (usize, usize), n: usize) -> f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::data::SEEN;
     use super::*;
 
-    /// What is seen at the places, and what is textured there, which a square is not.
-    fn with_a_flat_square(side: usize, square: std::ops::Range<usize>) -> ([Seen; 2], usize) {
-        let mut data = Planes::<f64>::new(side, side, SEEN + 1);
-        (0..side).for_each(|y| data.line_mut(SEEN, y).fill(1.0));
-        let places = side.div_ceil(SPACING);
-        let has = |n: usize| square.contains(&(SPACING * n));
-        let textured: Vec<bool> = (0..places * places).map(|n| !(has(n % places) && has(n / places))).collect();
-        let size = (places, places);
-        ([Seen::new(&data, size), Seen::textured(&data, size, &textured)], places)
+    /// Sites led but for a square of them, all seen; and how many places there are along a side.
+    fn but_for(side: usize, square: std::ops::Range<usize>) -> (Led, usize) {
+        let led = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
+        let led: Vec<bool> = (0..side * side).map(led).collect();
+        (Led::with(side, &led, |_| true), side.div_ceil(SPACING))
     }
 
     /// Motion of so many sites whose flow and slopes all are these.
@@ -141,13 +218,13 @@ mod tests {
     #[test]
     fn areas_without_texture_have_the_errors_of_the_levels_that_see_into_them() {
         let side = 97;
-        let ([seen, textured], places) = with_a_flat_square(side, 24..73);
+        let (led, places) = but_for(side, 24..73);
         // Off by .1 and .5 px of the finest level, and by .01 and .02 in the slopes.
         let above = [constant(49, 0.5 * 1.1, 0.01), constant(25, 0.25 * 1.5, -0.02)];
-        let inherited = Inherited::new(&constant(side, 1.0, 0.0), &above, &textured);
-        let variances = inherited.at_places([&seen, &textured], (places, places));
+        let inherited = Inherited::new(&constant(side, 1.0, 0.0), &above, led);
+        let variances = inherited.at_places((places, places));
         let middle = variances[places * (places / 2) + places / 2];
-        let want = [0.5f64, 0.02].map(|error| LESS_SEEN * FRAC_PI_2 * error * error);
+        let want = [0.5f64, 0.02].map(|error| FRAC_PI_2 * error * error);
         assert!((0..2).all(|kind| (middle[kind] / want[kind] - 1.0).abs() < 1e-9), "{middle:?}, {want:?}");
         let row: Vec<f64> = (0..=places / 2).map(|x| variances[places * (places / 2) + x][0]).collect();
         assert_eq!(row[..4], [0.0; 4]);
@@ -155,19 +232,28 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_inherited_where_all_has_texture_or_nothing_is_seen_or_there_is_one_level() {
-        let ([seen, all], places) = with_a_flat_square(33, 0..0);
-        let inherited = Inherited::new(&constant(33, 1.0, 0.0), &[constant(17, 0.7, 0.1)], &all);
-        assert!(inherited.at_places([&seen, &all], (places, places)).iter().all(|variances| *variances == [0.0; 2]));
-        let ([_, textured], places) = with_a_flat_square(33, 8..25);
-        let inherited = Inherited::new(&constant(33, 1.0, 0.0), &[constant(17, 0.7, 0.1)], &textured);
-        let areas = [(&seen, true), (&textured, false)];
-        for (seen, inherits) in areas {
-            let variances = inherited.at_places([seen, &textured], (places, places));
-            assert_eq!(variances.iter().any(|variances| *variances != [0.0; 2]), inherits);
-        }
-        let one_level = Inherited::new(&constant(33, 1.0, 0.0), &[], &textured);
-        assert!(one_level.at_places([&seen, &textured], (places, places)).iter().all(|v| *v == [0.0; 2]));
+    fn nothing_is_inherited_where_data_lead_or_nothing_is_seen_or_there_is_one_level() {
+        let none = |led: Led, places: usize, above: &[Planes<f64>]| {
+            let inherited = Inherited::new(&constant(33, 1.0, 0.0), above, led);
+            inherited.at_places((places, places)).iter().all(|variances| *variances == [0.0; 2])
+        };
+        let above = [constant(17, 0.7, 0.1)];
+        let (led, places) = but_for(33, 0..0);
+        assert!(none(led, places, &above));
+        let (led, places) = but_for(33, 8..25);
+        assert!(!none(led, places, &above));
+        assert!(none(but_for(33, 8..25).0, places, &[]));
+        assert!(none(but_for(33, 0..33).0, places, &above), "no site tells how exact the level is");
+        let hidden: Vec<bool> = (0..33 * 33).map(|n| n % 33 < 8).collect();
+        assert!(none(Led::with(33, &hidden, |n| hidden[n]), places, &above));
+    }
+
+    #[test]
+    fn distances_are_those_to_the_next_led_site() {
+        let led: Vec<bool> = (0..12).map(|n| n == 0 || n == 11).collect();
+        let want = [0.0, 1.0, SQRT_2 + 1.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, SQRT_2 + 1.0, 1.0, 0.0];
+        let got = distances(4, &led);
+        assert!(got.iter().zip(want).all(|(got, want)| (got - PITCH * want).abs() < 1e-12), "{got:?}");
     }
 
     #[test]

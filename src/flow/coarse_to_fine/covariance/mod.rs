@@ -83,8 +83,9 @@ pub(super) fn covariance<T: SimdReal>(
     let known = known(&noise, &estimate.data, (width, height));
     let known = known.as_ref().unwrap_or(&seen);
     let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, known);
-    let inherited = inherited::Inherited::new(&estimate.motion, &estimate.above, known);
-    let inherited = inherited.at_places([&seen, known], (width, height));
+    let inherited =
+        inherited::Inherited::new(&estimate.motion, &estimate.above, inherited::Led::by(&estimate.data, &noise));
+    let inherited = inherited.at_places((width, height));
     let change = estimate.change.as_ref();
     let change = change
         .map(|evidence| noise::Noise::new(evidence, data, energy.times(AHEAD_ENERGY), true).no_quieter_than(&noise));

@@ -43,6 +43,9 @@ const NEAR: usize = 2;
 /// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2 px.
 const TEXTURED: f64 = 10.0;
 
+/// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are stronger, but pull where the neighbours are led as well.
+const LEADING: f64 = 1.0;
+
 /// The residual energy that noise leaves, grey^2.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::flow::coarse_to_fine) enum Energy {
@@ -139,6 +142,12 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         let [a, b, c] = inverse_without_noise([UU, UV, VV].map(mean), self.gradient * energy);
         let best = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
         self.excess * energy * best <= TEXTURED
+    }
+
+    /// Whether the data of sites near a place, whose mean information this is, lead their motion in every direction, so that the first visits correct it.
+    pub fn leads(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> bool {
+        let weak = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
+        weak >= (self.gradient + LEADING) * self.energy(x, y)
     }
 
     /// What is left at a place.
