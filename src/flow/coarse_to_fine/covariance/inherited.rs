@@ -224,7 +224,8 @@ mod tests {
         let inherited = Inherited::new(&constant(side, 1.0, 0.0), &above, led);
         let variances = inherited.at_places((places, places));
         let middle = variances[places * (places / 2) + places / 2];
-        let want = [0.5f64, 0.02].map(|error| FRAC_PI_2 * error * error);
+        // The middle is 50 px from the rim, the coarsest level sees 8 px into the square.
+        let want = [0.5f64, 0.02].map(|error| FRAC_PI_2 * error * error * (50.0f64 / 8.0).powi(2));
         assert!((0..2).all(|kind| (middle[kind] / want[kind] - 1.0).abs() < 1e-9), "{middle:?}, {want:?}");
         let row: Vec<f64> = (0..=places / 2).map(|x| variances[places * (places / 2) + x][0]).collect();
         assert_eq!(row[..4], [0.0; 4]);
@@ -251,7 +252,7 @@ mod tests {
     #[test]
     fn distances_are_those_to_the_next_led_site() {
         let led: Vec<bool> = (0..12).map(|n| n == 0 || n == 11).collect();
-        let want = [0.0, 1.0, SQRT_2 + 1.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, SQRT_2 + 1.0, 1.0, 0.0];
+        let want = [0.0, 1.0, 2.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, 2.0, 1.0, 0.0];
         let got = distances(4, &led);
         assert!(got.iter().zip(want).all(|(got, want)| (got - PITCH * want).abs() < 1e-12), "{got:?}");
     }
