@@ -75,13 +75,14 @@ def test_local_follows_what_is_too_fast_for_one_gradient_step():
 
 
 def test_stated_deviations_hold_the_centre():
-    """Within two stated deviations in 95 % of frames would be right for independent errors; those of the learnt outline stay from frame to frame."""
+    """Within two stated deviations in 95 % of frames would be right for independent errors; those of the learnt outline stay from frame to frame. While it is being learnt, in the first ten
+    frames, its middle may still move, and large targets tell so."""
     held = []
     for scene in SIMULATION.values():
         found = follow(scene)
         deviations = np.sqrt(found.covariance[:, :, 0, 0])
         held.append((np.abs(found.position - scene.centres) < 2 * deviations)[1:].mean())
-        assert deviations[5:].max() <= 0.5, scene.name
+        assert deviations[5:].max() <= 0.9 and deviations[10:].max() <= 0.45, scene.name
     assert np.mean(held) >= 0.85 and np.median(held) >= 0.9
 
 
