@@ -174,7 +174,7 @@ def flat_area(kind, width, centre):
     ],
 )
 def test_what_coarse_levels_leave_beneath_areas_without_texture_is_told(preset, kind, width, least):
-    """In a scene that moves as a whole nothing bends, but only coarse levels see into flat areas. Without their part the intervals held as little as .05 within and .2 along the rim. Where the
+    """In a scene that moves as a whole nothing bends, but only coarse levels see into flat areas. Where the
     area lies on the grid that deviations are told at must not matter. They may be wide, but not so wide that nothing is told."""
     y, x = np.indices((256, 256)).astype(float)
     inside, rim, wide = [], [], []
