@@ -92,7 +92,12 @@ impl Plan {
         }
         let most = |k: usize| self.effort.ahead[k.saturating_sub(self.last)];
         let limits: Vec<_> = (0..=first).map(|k| self.effort.up_to(k, most(k))).collect();
-        self.descend(workspace, Compared::Ahead, start, (&limits, self.last))
+        self.untraced().descend(workspace, Compared::Ahead, start, (&limits, self.last))
+    }
+
+    /// The same, but that nothing is kept on the way.
+    fn untraced(&self) -> Self {
+        Self { traced: false, ..*self }
     }
 
     /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one above, tells better.
@@ -102,7 +107,7 @@ impl Plan {
         let limits: Vec<_> = (0..=coarsest).map(|k| self.effort.on_level(k, levels[k].size, k == coarsest)).collect();
         let start = raised(workspace, motion, level..=coarsest);
         let Found { motion: above, data, scale, .. } =
-            self.descend(workspace, Compared::Ahead, start, (&limits, level + 1));
+            self.untraced().descend(workspace, Compared::Ahead, start, (&limits, level + 1));
         let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[level];
         let mut own = space.planes(0, 0, MOTION);

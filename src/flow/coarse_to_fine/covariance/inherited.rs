@@ -27,13 +27,15 @@ const NEAR: usize = 1;
 const PIECE: usize = 4096;
 
 /// Variance of the slopes over the mean square of the rise of the flow's deviation: errors are not as steep everywhere as at their steepest.
-const STEEP: f64 = 0.25;
+const STEEP: f64 = 0.35;
 
 /// Where data lead the motion.
 pub(super) struct Led {
     width: usize,
     /// How far every site is from the next that data lead, px, row by row; 0 where nothing is seen at all: that is another matter.
     distances: Vec<f64>,
+    /// The sites that tell how exact coarser levels are, row by row: seen, and led.
+    telling: Vec<bool>,
 }
 
 impl Led {
@@ -66,7 +68,8 @@ impl Led {
             distances(width, led)
         };
         (0..distances.len()).filter(|&n| !seen(n)).for_each(|n| distances[n] = 0.0);
-        Self { width, distances }
+        let telling = (0..led.len()).map(|n| led[n] && seen(n)).collect();
+        Self { width, distances, telling }
     }
 
     /// The farthest of a place's sites.
@@ -169,7 +172,7 @@ fn differences<T: SimdReal>(motion: &Planes<T>, (coarse, above): (&Planes<T>, us
     let step = (1 << above).max(SPACING);
     let every = |len: usize| (0..len).step_by(step);
     for (x, y) in every(motion.height).flat_map(|y| every(motion.width).map(move |x| (x, y))) {
-        if led.distances[y * led.width + x] > 0.0 {
+        if !led.telling[y * led.width + x] {
             continue;
         }
         for k in 0..MOTION {

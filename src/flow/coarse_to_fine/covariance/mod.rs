@@ -33,7 +33,7 @@ pub(super) use spread::Spread;
 /// Of pairs, and of triples, whose last linearisation is about the refined motion.
 const FLOW_NOISE: [f64; 2] = [1.15, 1.35];
 /// The same for the slopes.
-const SLOPE_NOISE: f64 = 0.44;
+const SLOPE_NOISE: f64 = 0.42;
 /// Errors over what bent motion loses, in the flow and in the slopes; of pairs and of triples.
 const BENDING: [bending::Shares; 2] = [
     bending::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] },

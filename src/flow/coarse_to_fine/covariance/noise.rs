@@ -44,7 +44,7 @@ const NEAR: usize = 2;
 const TEXTURED: f64 = 10.0;
 
 /// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are stronger, but pull where the neighbours are led as well.
-const LEADING: f64 = 1.0;
+const LEADING: f64 = 0.5;
 
 /// The residual energy that noise leaves, grey^2.
 #[derive(Debug, Clone, Copy)]
