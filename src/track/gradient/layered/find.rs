@@ -30,7 +30,7 @@ const VISIBLE: f64 = 1.0;
 /// What is said of a target that something hides in part.
 pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
-const LEAK: f64 = 0.06;
+pub(super) const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
 const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said then.
@@ -108,6 +108,9 @@ impl Layered {
         if (doubted || interrupted || held_back.is_some()) && self.age >= YOUNG {
             let begun = || held_back.and_then(|plain| self.begun(frame, &plain));
             best = self.covered(frame, plain, levels).or_else(begun).or(best);
+        }
+        if let Some(plain) = plain.filter(|_| self.age > 0) {
+            best = self.reshaped(frame, &plain, levels).or(best);
         }
         let touched = best.filter(|found| !found.occluded).and_then(|found| self.is_touched(&found));
         if let Some(reason) = touched {

@@ -18,6 +18,7 @@ mod outline;
 mod outset;
 mod patch;
 mod pose;
+mod reshaped;
 mod resized;
 mod scene;
 mod search;
