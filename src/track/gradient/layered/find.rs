@@ -44,7 +44,7 @@ const GROWN: f64 = 0.04;
 /// Loss of visibility that is one.
 pub(super) const DROP: f64 = 0.08;
 /// Visibility of a target of which nothing is hidden.
-pub(super) const WHOLE: f64 = 0.95;
+const WHOLE: f64 = 0.95;
 /// Loss of visibility that noise alone may make.
 const SLIGHT: f64 = 0.03;
 /// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a loss of visibility.
@@ -167,7 +167,7 @@ impl Layered {
     /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is not told, but of a large target that was seen whole: of a small one a wrong box leaves as
     /// much unseen as cover.
     fn is_known(&self) -> bool {
-        self.age >= YOUNG || self.whole && self.is_large()
+        self.age >= YOUNG || self.most_seen > WHOLE && self.is_large()
     }
 
     /// Whether a strip along a side is little of the target.
