@@ -139,7 +139,7 @@ class GradientTracker:
     control : "integer" or "subpixel"
         Whether that window moves in whole pixels (default) or not.
     model : "similarity" or "affine"
-        What the target's picture does besides moving ("layered"): turn and grow (default), or be stretched as well.
+        What the target's picture does besides moving ("layered"): turn and grow (default; stretched only where its outline is not explained otherwise), or be stretched as well.
     camera : "auto" or "none"
         Whether the camera may move ("layered", default) or stands still, which is faster.
     order : int

@@ -14,6 +14,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import tracking_hard_scenes
 import tracking_scenes
 from test_track import follow, overlap, success
+from tracking_scenes import TIMES, Plane, Scene, circle, figure
 
 HARD = {scene.name: scene for scene in tracking_hard_scenes.further()}
 SIMULATION = {scene.name: scene for scene in tracking_scenes.simulations()}
@@ -254,6 +255,25 @@ def test_every_frame_size_is_followed_alike():
 def test_an_ellipse_that_breathes_is_held_by_the_affine_model():
     scene = tracking_hard_scenes.breathing_ellipse()
     assert success(scene, follow(scene, model="affine")) >= 0.98
+
+
+def breathing(seed, period, share):
+    """An ellipse whose width and height swing against each other, on a circle."""
+    swing = share * np.sin(2 * np.pi * TIMES / period)
+    target = figure(circle(20.0), 16 * np.stack([1 + swing, 1 - swing], axis=1), 200.0, shape="disc")
+    return Scene("breathing", (Plane("fractal:1,90,30", seed),), target)
+
+
+@pytest.mark.parametrize("period", [20, 25, 40])
+def test_an_ellipse_that_breathes_is_held_by_the_similarity_model_too(period):
+    """A similarity alone becomes smaller and smaller; it is left where the outline goes on beyond it."""
+    shares = [success(scene, follow(scene)) for scene in (breathing(seed, period, 0.45) for seed in (5, 21, 33))]
+    assert min(shares) >= 0.8 and np.mean(shares) >= 0.88
+
+
+def test_the_box_of_a_target_that_turns_out_of_the_plane_is_that_of_its_outline():
+    scene = tracking_hard_scenes.turn_out_of_plane()
+    assert success(scene, follow(scene)) >= 0.98
 
 
 def plain(path, side, bar=0, seed=0):

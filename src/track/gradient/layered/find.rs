@@ -30,7 +30,7 @@ const VISIBLE: f64 = 1.0;
 /// What is said of a target that something hides in part.
 pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
-const LEAK: f64 = 0.06;
+pub(super) const LEAK: f64 = 0.06;
 /// The same from which on, on one side, a look-alike touches.
 const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said then.
@@ -39,10 +39,12 @@ pub(super) const TOUCHED: &str = "something like the target touches it";
 const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
 /// What is said of a target that was looked for.
 pub(super) const SEARCHED: &str = "found by looking all around";
-/// Growth from one frame to the next that a look-alike makes.
+/// Change of size from one frame to the next that a look-alike makes, or cover.
 const GROWN: f64 = 0.04;
 /// Loss of visibility that is one.
 pub(super) const DROP: f64 = 0.08;
+/// Visibility of a target of which nothing is hidden.
+const WHOLE: f64 = 0.95;
 /// Loss of visibility that noise alone may make.
 const SLIGHT: f64 = 0.03;
 /// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a loss of visibility.
@@ -104,10 +106,13 @@ impl Layered {
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
         let mut best = plain;
         let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
-        let held_back = plain.filter(|plain| self.age >= YOUNG && self.may_be_held_back(plain));
-        if (doubted || interrupted || held_back.is_some()) && self.age >= YOUNG {
+        let held_back = plain.filter(|plain| self.is_known() && self.may_be_held_back(plain));
+        if (doubted || interrupted || held_back.is_some()) && self.is_known() {
             let begun = || held_back.and_then(|plain| self.begun(frame, &plain));
             best = self.covered(frame, plain, levels).or_else(begun).or(best);
+        }
+        if let Some(plain) = plain.filter(|_| self.age > 0) {
+            best = self.reshaped(frame, &plain, levels).or(best);
         }
         let touched = best.filter(|found| !found.occluded).and_then(|found| self.is_touched(&found));
         if let Some(reason) = touched {
@@ -138,8 +143,9 @@ impl Layered {
         let how = (Freedom::Translation, Silence::Covered, [self.spread(), PRIOR[1]], levels);
         let found = self.try_at(frame, &self.expected(false), how)?;
         let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
-        // What is seen as well as ever in a place that nobody expected has made a turn.
-        let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT);
+        // What is seen as well as ever in a place that nobody expected has made a turn; unless it became smaller at that, as what lies between the bars of a fence.
+        let shrunk = |plain: &Finding| plain.aligned.pose.scale() < (1.0 - GROWN) * self.pose.scale();
+        let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !shrunk(plain);
         // The last strip of a large target is not to be taken for background.
         let drop = if self.hidden && self.is_large() { SLIGHT } else { DROP };
         let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, drop) || plain.nis > DOUBT));
@@ -156,6 +162,12 @@ impl Layered {
         let found = self.try_at(frame, &self.expected(false), how)?;
         let taken = found.look.leak < LEAK && self.is_held_back(&found, plain);
         taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
+    }
+
+    /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is not told, but of a large target that was seen whole: of a small one a wrong box leaves as
+    /// much unseen as cover.
+    fn is_known(&self) -> bool {
+        self.age >= YOUNG || self.most_seen > WHOLE && self.is_large()
     }
 
     /// Whether a strip along a side is little of the target.

@@ -18,6 +18,7 @@ mod outline;
 mod outset;
 mod patch;
 mod pose;
+mod reshaped;
 mod resized;
 mod scene;
 mod search;
@@ -97,6 +98,8 @@ pub(super) struct Layered {
     rotation_told: bool,
     /// Whether the target keeps its place in the picture when the camera moves.
     with_camera: bool,
+    /// Greatest visibility after the first frame, with nothing known to cover it.
+    most_seen: f64,
     /// Frames measured.
     age: usize,
     /// What the first box held, until that is told.
@@ -160,6 +163,7 @@ impl Layered {
             gain: 1.0,
             rotation_told: true,
             with_camera: false,
+            most_seen: 0.0,
             age: 0,
         }
     }
@@ -273,6 +277,7 @@ impl Layered {
         self.covered = if occluded { self.covered + 1 } else { 0 };
         self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
         self.age += 1;
+        self.most_seen = if occluded { self.most_seen } else { self.most_seen.max(look.visibility) };
         if found.reason == COVERED && look.visibility > self.usual - DROP {
             // What stays hidden, though it is little, is not covered but gone.
             self.usual += VISIBILITY_RATE * (look.visibility - self.usual);

@@ -141,9 +141,7 @@ impl Changes<'_> {
 
     /// Change from what was at one pixel to what is at another, but for what fractions of a pixel make, grey levels.
     pub fn along(&self, from: [usize; 2], to: [usize; 2]) -> f64 {
-        let [low, high] = self.outset.between.get(from[0], from[1]);
-        let now = self.now.get(to[0], to[1]);
-        (low - now).max(now - high).max(0.0)
+        beyond(self.outset.between.get(from[0], from[1]), self.now.get(to[0], to[1]))
     }
 
     /// What noise does not make of a change.
@@ -160,7 +158,9 @@ impl Changes<'_> {
         let beside = self.beside();
         let area = inside.data().iter().filter(|inside| **inside).count();
         let every = (area as f64 / VOTES).sqrt().ceil().max(1.0) as usize;
-        let cost = |d: [isize; 2]| beside + (every * every) as f64 * self.within(d, every);
+        let voting: Vec<_> = self.inside(every).map(|at| (at, self.outset.between.get(at[0], at[1]))).collect();
+        let rests = self.rests();
+        let cost = |d: [isize; 2]| beside + (every * every) as f64 * self.within(d, &voting, &rests);
         let rest = cost([0; 2]);
         let all: Vec<_> = (-reach..=reach)
             .flat_map(|dy| (-reach..=reach).map(move |dx| [middle[0] + dx, middle[1] + dy]))
@@ -181,15 +181,23 @@ impl Changes<'_> {
         pixels.filter(|(_, inside)| !**inside).map(|((now, first), _)| self.excess((now - first).abs())).sum()
     }
 
-    /// What is left of it, and of what changed in the box, where the box moved on.
-    fn within(&self, d: [isize; 2], every: usize) -> f64 {
-        let left = |from: [usize; 2]| {
-            let Some(to) = self.on(from, d) else { return 0.0 };
-            let rest = self.excess(self.at_rest(to));
-            let moved = self.excess(self.along(from, to));
-            rest.min(moved) - if self.outset.inside.get(to[0], to[1]) { 0.0 } else { rest }
+    /// Change at every pixel of the patch that noise does not make, grey levels, and that of it which is beside the box.
+    fn rests(&self) -> Frame<[f64; 2]> {
+        let (width, height) = self.now.size();
+        Frame::from_fn(width, height, |x, y| {
+            let rest = self.excess(self.at_rest([x, y]));
+            [rest, if self.outset.inside.get(x, y) { 0.0 } else { rest }]
+        })
+    }
+
+    /// What is left of it, and of what changed in the box, where the box moved on; `voting` pixels of the box with the least and the greatest brightness around them.
+    fn within(&self, d: [isize; 2], voting: &[([usize; 2], [f64; 2])], rests: &Frame<[f64; 2]>) -> f64 {
+        let left = |&(from, between): &([usize; 2], [f64; 2])| {
+            let Some([x, y]) = self.on(from, d) else { return 0.0 };
+            let [rest, beside] = rests.get(x, y);
+            rest.min(self.excess(beyond(between, self.now.get(x, y)))) - beside
         };
-        self.inside(every).map(left).sum()
+        voting.iter().map(left).sum()
     }
 
     /// Mean of the changes that noise does not make, grey levels.
@@ -199,6 +207,11 @@ impl Changes<'_> {
         let (sum, count) = changes.fold((0.0, 0.0), |(sum, count), change| (sum + change, count + 1.0));
         if count > 0.0 { sum / count } else { CAP }
     }
+}
+
+/// How far a value is beyond two limits.
+fn beyond([low, high]: [f64; 2], value: f64) -> f64 {
+    (low - value).max(value - high).max(0.0)
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ impl Layered {
             (p[(0, 0)], p[(1, 1)]) = (WHOLE_PIXELS, 1.0);
         }
         (self.rate, self.before, self.usual) = ([0.0; 6], None, 1.0);
-        (self.missed, self.hidden, self.age) = (0, false, 0);
+        (self.missed, self.hidden, self.age, self.most_seen) = (0, false, 0, 0.0);
         (self.turned, self.wary, self.front) = (0.0, 0, None);
     }
 
