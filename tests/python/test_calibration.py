@@ -200,6 +200,32 @@ def test_what_coarse_levels_leave_beneath_areas_without_texture_is_told(preset, 
     assert kind == "half" or np.median(wide) < 0.8
 
 
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+@pytest.mark.parametrize("frames", [2, 3])
+def test_texture_of_one_direction_tells_of_motion_across_it_and_not_along_it(preset, frames):
+    """A square of 80 px has upright stripes, the rest of the scene has texture of all directions; all of it moves as a whole."""
+    y, x = np.indices((240, 320)).astype(float)
+    area = np.s_[90:150, 130:190]
+    across, along = [], []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        stripes = gaussian_filter(rng.standard_normal(x.shape[1]), 1.5, mode="wrap")
+        blobs = gaussian_filter(rng.standard_normal(x.shape), 1.5, mode="wrap")
+        within = np.maximum(abs(x - 160), abs(y - 120)) < 40
+        scene = 128 + 40 * np.where(within, stripes / stripes.std(), blobs / blobs.std())
+        u, v = 1.7, -0.9 + 0.5 * seed
+        films = [map_coordinates(scene, [y - k * v, x - k * u], order=3, mode="wrap") for k in range(2 - frames, 2)]
+        film = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in films]
+        field = jacoflow.estimate(film, preset=preset)
+        for found, name, truth in ((across, "u", u), (along, "v", v)):
+            error, told = (field.value(name) - truth)[area], field.std(name)[area]
+            found.append((np.mean(abs(error) < 1.96 * told), np.sqrt(np.mean(error**2)), np.median(told)))
+    across, along = np.mean(across, axis=0), np.mean(along, axis=0)
+    print(preset, frames, "across: held, error, told", np.round(across, 4), "along", np.round(along, 3))
+    assert across[2] < 6 * across[1] and across[2] < 0.03, across
+    assert along[0] > 0.85 and along[2] > 10 * across[2], along
+
+
 @pytest.mark.parametrize(("preset", "least"), [("fast", 0.85), ("balanced", 0.85)])
 def test_areas_without_texture_are_told_as_uncertain_as_they_are(preset, least):
     """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the intervals say how far motion departs from that. Without this they hold the truth

@@ -6,110 +6,25 @@
 //!
 //! The windows of refinement carry such errors a little way out of those areas, and where they grow, the slopes err by their rise.
 
-use super::super::data::{MOTION, SEEN, UU, UV, VV};
+use super::super::data::MOTION;
 use super::super::grid::Planes;
 use super::super::refine::{PITCH, SPACING};
-use super::noise::Noise;
+use super::led::Led;
 use super::soften;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
-use std::f64::consts::{FRAC_PI_2, SQRT_2};
+use std::f64::consts::FRAC_PI_2;
 
 /// How far a level sees into what has no texture, px of the level: its stencils and the windows of its data.
 const REACH: f64 = 4.0;
-/// Share of the sites from which on they tell how exact coarse levels are.
-const TELLING: f64 = 0.02;
-/// Usable share of a window from which on a site counts as seen.
-const USABLE: f64 = 0.1;
-/// Sites whose information is told together reach so far from one.
-const NEAR: usize = 1;
-/// Sites that one thread looks at, at a time.
-const PIECE: usize = 4096;
-
 /// Variance of the slopes over the mean square of the rise of the flow's deviation: errors are not as steep everywhere as at their steepest.
 const STEEP: f64 = 0.35;
 
-/// Where data lead the motion.
-pub(super) struct Led {
-    width: usize,
-    /// How far every site is from the next that data lead, px, row by row; 0 where nothing is seen at all: that is another matter.
-    distances: Vec<f64>,
-    /// The sites that tell how exact coarser levels are, row by row: seen, and led.
-    telling: Vec<bool>,
-}
-
-impl Led {
-    /// As the `noise` says of the sites' data.
-    pub fn by<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>) -> Self {
-        let (width, height) = (data.width, data.height);
-        let around = |at: usize, len: usize| at.saturating_sub(NEAR)..(at + NEAR + 1).min(len);
-        let place = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
-        let leads = |n: usize| {
-            let (x, y) = (n % width, n / width);
-            let (columns, rows) = (around(x, width), around(y, height));
-            let count = (columns.len() * rows.len()) as f64;
-            let mean = |k| {
-                let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
-                rows.clone().map(row).sum::<f64>() / count
-            };
-            noise.leads([UU, UV, VV].map(mean), place(x, width), place(y, height))
-        };
-        let led: Vec<bool> = (0..width * height).into_par_iter().with_min_len(PIECE).map(leads).collect();
-        let seen = |n: usize| data.at(SEEN, n % width, n / width).to_f64() >= USABLE;
-        Self::with(width, &led, seen)
-    }
-
-    /// For sites of which these are led; they all count as led where nearly none is: then they do not tell.
-    fn with(width: usize, led: &[bool], seen: impl Fn(usize) -> bool) -> Self {
-        let count = led.iter().filter(|led| **led).count();
-        let mut distances = if (count as f64) < TELLING * led.len() as f64 || count == 0 {
-            vec![0.0; led.len()]
-        } else {
-            distances(width, led)
-        };
-        (0..distances.len()).filter(|&n| !seen(n)).for_each(|n| distances[n] = 0.0);
-        let telling = (0..led.len()).map(|n| led[n] && seen(n)).collect();
-        Self { width, distances, telling }
-    }
-
-    /// The farthest of a place's sites.
-    fn at_place(&self, x: usize, y: usize) -> f64 {
-        let (width, height) = (self.width, self.distances.len() / self.width);
-        let around = |place: usize, len: usize| {
-            (SPACING * place).saturating_sub(SPACING / 2)..(SPACING * place + SPACING / 2 + 1).min(len)
-        };
-        let rows = around(y, height).map(|y| &self.distances[y * width..][..width]);
-        rows.flat_map(|row| &row[around(x, width)]).fold(0.0, |most, distance| f64::max(most, *distance))
-    }
-}
-
-/// From every site to the next of the `led` ones, px: the shortest way along rows, columns and diagonals.
-fn distances(width: usize, led: &[bool]) -> Vec<f64> {
-    let mut out: Vec<f64> = led.iter().map(|led| if *led { 0.0 } else { f64::INFINITY }).collect();
-    let sites = out.len();
-    let (straight, diagonal) = (PITCH, PITCH * SQRT_2);
-    // Once from above and once, everything turned about, from below.
-    for _ in 0..2 {
-        for n in 0..sites {
-            let x = n % width;
-            let mut least = out[n];
-            if x > 0 {
-                least = least.min(out[n - 1] + straight);
-            }
-            if n >= width {
-                least = least.min(out[n - width] + straight);
-                if x > 0 {
-                    least = least.min(out[n - width - 1] + diagonal);
-                }
-                if x + 1 < width {
-                    least = least.min(out[n - width + 1] + diagonal);
-                }
-            }
-            out[n] = least;
-        }
-        out.reverse();
-    }
-    out
+/// What a place has of the errors of coarser levels.
+pub(super) struct Inheritance {
+    /// Of the flow, px^2, and of the slopes, in the directions that are not led.
+    pub variances: [f64; 2],
+    /// The matrix `xx, xy, yy` that leaves of motion what is in those.
+    pub directions: [f64; 3],
 }
 
 /// Variances of what was found on coarser levels.
@@ -134,24 +49,49 @@ impl Inherited {
         Self { variances, led }
     }
 
-    /// The variances of the flow and of the slopes at every place, row by row.
-    pub fn at_places(&self, size: (usize, usize)) -> Vec<[f64; 2]> {
-        let distances = (0..size.0 * size.1).map(|n| self.led.at_place(n % size.0, n / size.0));
+    /// What every place inherits, row by row.
+    pub fn at_places(&self, size: (usize, usize)) -> Vec<Inheritance> {
+        let distances = (0..size.0 * size.1).map(|n| self.led.distance(n % size.0, n / size.0));
         let own: Vec<[f64; 2]> =
-            distances.map(|distance| [0, 1].map(|kind| self.variance(kind, distance / REACH).sqrt())).collect();
+            distances.map(|distance| [0, 1].map(|kind| self.variance(kind, distance).sqrt())).collect();
         let mut carried = own.clone();
         soften(&mut carried, size);
         let deviations = |n: usize| [0, 1].map(|kind| f64::max(own[n][kind], carried[n][kind]));
         let flow: Vec<f64> = (0..own.len()).map(|n| deviations(n)[0]).collect();
+        let directions = self.directions(&own, size);
         let with_rise = |n: usize| {
             let [flow_deviation, slope_deviation] = deviations(n);
-            [flow_deviation.powi(2), slope_deviation.powi(2) + STEEP * squared_rise(&flow, size, n)]
+            let slopes = slope_deviation.powi(2) + STEEP * squared_rise(&flow, size, n);
+            Inheritance { variances: [flow_deviation.powi(2), slopes], directions: directions[n] }
         };
         (0..own.len()).map(with_rise).collect()
     }
 
-    /// Of the flow (`kind` 0) or the slopes (1), where that level is the first to see something whose pixels are so many of the finest: linear between levels, nothing below half a pixel.
-    fn variance(&self, kind: usize, pixels: f64) -> f64 {
+    /// In which directions places inherit: in those that are not led there, and where all is led as their neighbours, whose deviations are `own`, as far as errors are carried and rise.
+    fn directions(&self, own: &[[f64; 2]], size: (usize, usize)) -> Vec<[f64; 3]> {
+        let mut around: Vec<[f64; 4]> = (0..own.len())
+            .map(|n| {
+                let [a, b, c] = self.led.directions(n).map(|entry| own[n][0] * entry);
+                [a, b, c, own[n][0]]
+            })
+            .collect();
+        soften(&mut around, size);
+        soften(&mut around, size);
+        let mean = |n: usize| match around[n] {
+            _ if own[n][0] > 0.0 => self.led.directions(n),
+            [a, b, c, sum] if sum > 0.0 => [a / sum, b / sum, c / sum],
+            _ => [1.0, 0.0, 1.0],
+        };
+        (0..own.len()).map(mean).collect()
+    }
+
+    /// Of the flow (`kind` 0) or the slopes (1), so far from where data lead, px: all that a level left from where on the next finer one sees nothing, linear between levels, nothing
+    /// below half the reach of the finest.
+    fn variance(&self, kind: usize, distance: f64) -> f64 {
+        if distance.is_infinite() {
+            return self.searched(kind);
+        }
+        let pixels = distance / REACH;
         let (mut from, mut least) = (0.5, 0.0);
         for variances in &self.variances {
             let to = 2.0 * from;
@@ -164,6 +104,11 @@ impl Inherited {
         // Nothing saw further; what was never corrected grows with the distance.
         least * (pixels / from).powi(2)
     }
+
+    /// Where nothing tells how exact the levels are: the motions that the coarsest of them tells apart, a pixel of it within its reach.
+    fn searched(&self, kind: usize) -> f64 {
+        if kind == 0 { 4f64.powi(self.variances.len() as i32) } else { REACH.powi(-2) }
+    }
 }
 
 /// Of the motion found so many levels above: the flow's and the slopes' mean square difference at those of its sites that data lead, on lines through the places; if there are any.
@@ -172,7 +117,7 @@ fn differences<T: SimdReal>(motion: &Planes<T>, (coarse, above): (&Planes<T>, us
     let step = (1 << above).max(SPACING);
     let every = |len: usize| (0..len).step_by(step);
     for (x, y) in every(motion.height).flat_map(|y| every(motion.width).map(move |x| (x, y))) {
-        if !led.telling[y * led.width + x] {
+        if !led.tells(x, y) {
             continue;
         }
         for k in 0..MOTION {
@@ -200,13 +145,15 @@ fn squared_rise(values: &[f64], (width, height): (usize, usize), n: usize) -> f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::led::{ALL, Directions, NONE};
     use super::*;
 
     /// Sites led but for a square of them, all seen; and how many places there are along a side.
     fn but_for(side: usize, square: std::ops::Range<usize>) -> (Led, usize) {
         let led = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
-        let led: Vec<bool> = (0..side * side).map(led).collect();
-        (Led::with(side, &led, |_| true), side.div_ceil(SPACING))
+        let sites: Vec<Directions> = (0..side * side).map(|n| if led(n) { NONE } else { ALL }).collect();
+        let places = side.div_ceil(SPACING);
+        (Led::with((side, &sites), (places, places), |_| true), places)
     }
 
     /// Motion of so many sites whose flow and slopes all are these.
@@ -226,13 +173,15 @@ mod tests {
         let above = [constant(49, 0.5 * 1.1, 0.01), constant(25, 0.25 * 1.5, -0.02)];
         let inherited = Inherited::new(&constant(side, 1.0, 0.0), &above, led);
         let variances = inherited.at_places((places, places));
-        let middle = variances[places * (places / 2) + places / 2];
-        // The middle is 50 px from the rim, the coarsest level sees 8 px into the square.
+        let middle = &variances[places * (places / 2) + places / 2];
+        assert_eq!(middle.directions, [1.0, 0.0, 1.0]);
+        let middle = middle.variances;
+        // The middle is 50 px from the rim, the coarsest level has the last word from 8 px on.
         let want = [0.5f64, 0.02].map(|error| FRAC_PI_2 * error * error * (50.0f64 / 8.0).powi(2));
         // The slopes also err by the rise of the flow's deviation.
         assert!((middle[0] / want[0] - 1.0).abs() < 1e-9, "{middle:?}, {want:?}");
         assert!((1.0..1.1).contains(&(middle[1] / want[1])), "{middle:?}, {want:?}");
-        let row: Vec<f64> = (0..=places / 2).map(|x| variances[places * (places / 2) + x][0]).collect();
+        let row: Vec<f64> = (0..=places / 2).map(|x| variances[places * (places / 2) + x].variances[0]).collect();
         assert_eq!(row[..4], [0.0; 4]);
         assert!(row.windows(2).all(|pair| pair[0] <= pair[1]));
     }
@@ -241,7 +190,7 @@ mod tests {
     fn nothing_is_inherited_where_data_lead_or_nothing_is_seen_or_there_is_one_level() {
         let none = |led: Led, places: usize, above: &[Planes<f64>]| {
             let inherited = Inherited::new(&constant(33, 1.0, 0.0), above, led);
-            inherited.at_places((places, places)).iter().all(|variances| *variances == [0.0; 2])
+            inherited.at_places((places, places)).iter().all(|found| found.variances == [0.0; 2])
         };
         let above = [constant(17, 0.7, 0.1)];
         let (led, places) = but_for(33, 0..0);
@@ -250,16 +199,8 @@ mod tests {
         assert!(!none(led, places, &above));
         assert!(none(but_for(33, 8..25).0, places, &[]));
         assert!(none(but_for(33, 0..33).0, places, &above), "no site tells how exact the level is");
-        let hidden: Vec<bool> = (0..33 * 33).map(|n| n % 33 < 8).collect();
-        assert!(none(Led::with(33, &hidden, |n| hidden[n]), places, &above));
-    }
-
-    #[test]
-    fn distances_are_those_to_the_next_led_site() {
-        let led: Vec<bool> = (0..12).map(|n| n == 0 || n == 11).collect();
-        let want = [0.0, 1.0, 2.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, 2.0, 1.0, 0.0];
-        let got = distances(4, &led);
-        assert!(got.iter().zip(want).all(|(got, want)| (got - PITCH * want).abs() < 1e-12), "{got:?}");
+        let hidden: Vec<Directions> = (0..33 * 33).map(|n| if n % 33 < 8 { NONE } else { ALL }).collect();
+        assert!(none(Led::with((33, &hidden), (places, places), |n| hidden[n] == NONE), places, &above));
     }
 
     #[test]
@@ -267,5 +208,28 @@ mod tests {
         let values = [0.0, 0.0, 0.8, 0.8, 0.0, 0.0, 0.8, 2.4];
         let rises = [(0, 0.0), (1, 0.005), (2, 0.005), (3, 0.02), (6, 0.025)];
         assert!(rises.iter().all(|&(n, rise)| (squared_rise(&values, (4, 2), n) - rise).abs() < 1e-12));
+    }
+
+    #[test]
+    fn only_directions_without_texture_inherit() {
+        let side = 97;
+        let (slanted, above) = ([0.5, 0.5, 0.5], [constant(49, 0.5 * 1.1, 0.01)]);
+        let sites = |here: Directions| -> Vec<Directions> {
+            (0..side * side).map(|n| if (24..73).contains(&(n % side)) { here } else { NONE }).collect()
+        };
+        let places = side.div_ceil(SPACING);
+        let found = |sites: &[Directions]| {
+            Inherited::new(&constant(side, 1.0, 0.0), &above, Led::with((side, sites), (places, places), |_| true))
+                .at_places((places, places))
+        };
+        let (partly, wholly) = (found(&sites(slanted)), found(&sites(ALL)));
+        for (partly, wholly) in partly.iter().zip(&wholly).filter(|(_, wholly)| wholly.variances[1] > 0.0) {
+            assert_eq!(partly.variances, wholly.variances);
+            assert_eq!(wholly.directions, [1.0, 0.0, 1.0]);
+            assert!(partly.directions.iter().all(|entry| (entry - 0.5).abs() < 1e-12), "{:?}", partly.directions);
+        }
+        // Nothing but texture of one direction: along it motion is as uncertain as what was searched.
+        let all = found(&vec![slanted; side * side]);
+        assert!(all.iter().all(|found| found.variances == [4.0, 1.0 / 16.0] && found.directions == [0.5; 3]));
     }
 }

@@ -6,7 +6,7 @@
 //! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
 //!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
 //! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it is that of other sites, continued; the field itself tells how fast it departs from that.
-//! * *Inheritance* ([`inherited`]). Where there is no texture, finer levels do not correct what coarser ones left.
+//! * *Inheritance* ([`inherited`]). Where there is no texture, or only in one direction, finer levels do not correct what coarser ones left.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
 //! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
 //!
@@ -16,6 +16,7 @@ mod bending;
 mod carry;
 mod extrapolation;
 mod inherited;
+mod led;
 mod noise;
 mod seen;
 mod spread;
@@ -83,8 +84,8 @@ pub(super) fn covariance<T: SimdReal>(
     let known = known(&noise, &estimate.data, (width, height));
     let known = known.as_ref().unwrap_or(&seen);
     let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, evidence, known);
-    let inherited =
-        inherited::Inherited::new(&estimate.motion, &estimate.above, inherited::Led::by(&estimate.data, &noise));
+    let led = led::Led::by(&estimate.data, &noise, (width, height));
+    let inherited = inherited::Inherited::new(&estimate.motion, &estimate.above, led);
     let inherited = inherited.at_places((width, height));
     let change = estimate.change.as_ref();
     let change = change
@@ -101,7 +102,7 @@ pub(super) fn covariance<T: SimdReal>(
             add_noise(&mut noisy, &change.at(at.0, at.1), [CHANGE * FLOW_NOISE[kind], CHANGE * SLOPE_NOISE]);
         }
         extrapolation.add(place, known.distances(at.0, at.1), evidence.mean_sigmas(at.0, at.1));
-        add_unrelated(place, inherited[n]);
+        add_inherited(place, &inherited[n]);
         add_locking(place, &motion, &estimate.locking);
         if !carried {
             add_acceleration(place, &motion);
@@ -159,10 +160,13 @@ fn soften<const N: usize>(places: &mut [[f64; N]], (width, height): (usize, usiz
     }
 }
 
-/// Adds variances of the flow and of the slopes, the same in all directions.
-fn add_unrelated(place: &mut Entries, [flow, slopes]: [f64; 2]) {
-    for k in 0..6 {
-        place[upper(k, k)] += if k < 2 { flow } else { slopes };
+/// Adds variances of the flow and of the slopes, in the directions that are not led.
+fn add_inherited(place: &mut Entries, inheritance: &inherited::Inheritance) {
+    let [flow, slopes] = inheritance.variances;
+    for (block, variance) in [flow, slopes, slopes].into_iter().enumerate() {
+        for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
+            place[upper(2 * block + i, 2 * block + j)] += variance * inheritance.directions[k];
+        }
     }
 }
 

@@ -17,6 +17,7 @@
 use super::super::data::{SEEN, UU, UV, VV};
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, SPACING, TERMS};
+use super::led::{self, Directions};
 use super::seen::{Edge, Seen};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
@@ -45,6 +46,8 @@ const TEXTURED: f64 = 10.0;
 
 /// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are stronger, but pull where the neighbours are led as well.
 const LEADING: f64 = 0.5;
+/// The same, where motion in the other direction is not led: as strong as the bonds.
+const BOUND: f64 = 20.0;
 
 /// The residual energy that noise leaves, grey^2.
 #[derive(Debug, Clone, Copy)]
@@ -144,10 +147,20 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         self.excess * energy * best <= TEXTURED
     }
 
-    /// Whether the data of sites near a place, whose mean information this is, lead their motion in every direction, so that the first visits correct it.
-    pub fn leads(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> bool {
-        let weak = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
-        weak >= (self.gradient + LEADING) * self.energy(x, y)
+    /// In which directions the data of sites near a place, whose mean information this is, do not lead their motion, so that the first visits do not correct it.
+    pub fn not_led(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> Directions {
+        let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
+        let radius = half.hypot(b);
+        let beyond = |share: f64| (self.gradient + share) * self.energy(x, y);
+        if middle - radius >= beyond(LEADING) {
+            return led::NONE;
+        }
+        if middle + radius < beyond(BOUND) || radius <= 0.0 {
+            return led::ALL;
+        }
+        // The direction with the least information.
+        let (cosine, sine) = (half / radius, b / radius);
+        [0.5 * (1.0 - cosine), -0.5 * sine, 0.5 * (1.0 + cosine)].map(|entry| entry as f32)
     }
 
     /// What is left at a place.
