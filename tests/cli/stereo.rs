@@ -195,6 +195,22 @@ fn classes_give_whole_pixels_and_pictures_show_them() {
 }
 
 #[test]
+fn semi_global_matching_gives_whole_pixels_when_asked() {
+    let place = recorded(1);
+    let fractions = |option: &str| {
+        let line = format!("stereo left right --disparities -8,12 --row-offset 0 -o d.pfm --force {option}");
+        place.good(&line);
+        let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap().disparity;
+        let found = map.data().iter().filter(|d| d.is_finite());
+        let (whole, all) = found.fold((0, 0), |(whole, all), d| (whole + usize::from(d.fract() == 0.0), all + 1));
+        assert!(all > 300, "{option}: {all}");
+        all - whole
+    };
+    assert_eq!((fractions("--whole"), fractions("--whole --unchecked")), (0, 0));
+    assert!(fractions("") > 300);
+}
+
+#[test]
 fn an_interrupted_run_leaves_whole_files_only() {
     let place = Place::new();
     let line = "stereo - --layout top-bottom --disparities -8,12 -o out --format npz,pfm --json";

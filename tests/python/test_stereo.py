@@ -260,6 +260,15 @@ def test_fractions_of_a_pixel_are_measured():
         assert np.median(np.abs(found.values - truth)) <= np.median(np.abs(coarse.values - truth)) + 0.01
 
 
+@pytest.mark.parametrize("check", [True, False])
+def test_whole_disparities_are_whole(check):
+    step = small()[0]
+    found = disparity(step.left, step.right, row_offset=1.0, subpixel=False, check=check)
+    assert len(found.values) > 4000 and (found.values % 1 == 0).all()
+    fitted = disparity(step.left, step.right, row_offset=1.0, check=check)
+    assert (fitted.values % 1 != 0).mean() > 0.9
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_prior_narrows_the_search(method):
     step = small()[0]
