@@ -63,9 +63,10 @@ impl Agreement {
         self.edges >= LEAST_EDGES && self.matched < LEAST_MATCHED
     }
 
-    /// Whether there is much to be matched, and what was matched is matched badly.
-    pub fn is_poor(&self) -> bool {
-        self.edges >= LEAST_EDGES && self.score.is_some_and(|score| score < POOR)
+    /// Whether there is much to be matched, too little of it was or the offset is `unsure` for another reason, and what was matched is matched badly.
+    pub fn is_doubtful(&self, unsure: bool) -> bool {
+        let poor = self.score.is_some_and(|score| score < POOR);
+        self.edges >= LEAST_EDGES && (unsure || !self.suffices()) && poor
     }
 }
 

@@ -76,8 +76,8 @@ fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOpti
     let found = options.row_offset.map_or_else(
         || {
             let row_offset = f64::from(most_frequent_row(&matches, rows));
-            let poor = || Agreement::new(matches.iter().map(|found| found.map(|found| found.support))).is_poor();
-            RowOffset { rows: row_offset, doubtful: at_an_end(row_offset, rows) && poor() }
+            let agreement = Agreement::new(matches.iter().map(|found| found.map(|found| found.support)));
+            RowOffset { rows: row_offset, doubtful: agreement.is_doubtful(at_an_end(row_offset, rows)) }
         },
         RowOffset::given,
     );

@@ -77,8 +77,7 @@ pub(super) struct RowEstimate {
 impl RowEstimate {
     /// Whether nothing speaks for it, and the agreement against it: rows that cannot be told, as of vertical edges alone, do no harm.
     pub fn is_doubtful(&self, options: &EdgeDisparityOptions) -> bool {
-        let unsure = !self.settled || !self.agreement.suffices() || at_an_end(self.rows, options.row_range);
-        unsure && self.agreement.is_poor()
+        self.agreement.is_doubtful(!self.settled || at_an_end(self.rows, options.row_range))
     }
 
     /// The estimate, and whether it is to be doubted.
