@@ -106,10 +106,10 @@ def edge_disparity(
     "sgm" compares gradients, after the right view is multiplied by the ratio of both views' contrasts where that is below .92 or above 1.08 and alike for the greatest 1 to 8 % of the differences in brightness.
     A bias makes no difference. Contrasts that differ from place to place, or are cut off at white, are not evened out: "classes" looks at directions alone.
     """
-    *parts, (rows, doubtful) = _edge_disparity(*checked_views(left, right), _options(locals()))
+    disparity, rows, cols, values, score, (offset, doubtful) = _edge_disparity(*checked_views(left, right), _options(locals()))
     if doubtful:
         tell_doubt(row_range)
-    return EdgeDisparity(*parts, rows)
+    return EdgeDisparity(disparity, rows, cols, values, score, offset)
 
 
 def estimate_row_offset(
