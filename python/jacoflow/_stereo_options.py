@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -81,6 +82,13 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "method" and not isinstance(value, str):
             raise ValueError(f'method: expected "classes" or "sgm", got {value!r}')
     return out
+
+
+def tell_doubt(row_range: tuple[int, int]) -> None:
+    """Warns that views hardly agree with any of these row offsets, px."""
+    least, greatest = row_range
+    message = f"row_range: the views hardly agree with any row offset that was searched, {least} to {greatest}, and many disparities are wrong; widen the range or give row_offset"
+    warnings.warn(message, UserWarning, stacklevel=3)
 
 
 def _switch(name: str, value: Any, expected: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import as_array, checked, checked_views, real_number, whole_number
+from ._stereo_options import as_array, checked, checked_views, real_number, tell_doubt, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -34,9 +35,9 @@ class StereoCluster:
     weight: float
     """Weight of the component, 0 to 1, no unit."""
     mean: Array
-    """Mean (x, y, disparity), (3,), px."""
+    """Mean (x, y) of the component, and the median disparity of the cluster's pixels, (3,), px."""
     covariance: Array
-    """Covariance of (x, y, disparity), (3, 3), px^2."""
+    """Covariance of (x, y, disparity), (3, 3), px^2: the component's, and a twelfth of a cell and of a disparity squared for what counting in voxels hides."""
     velocity: Array
     """Motion (u, v, w) since the last step, medians over the pixels that it had then, (3,), px/step and disparity/step. Of what grows or turns, `affine` says what each pixel does."""
     next_velocity: Array
@@ -73,6 +74,12 @@ class StereoStep:
     """Their disparities, (N,), px."""
     cluster_of_pixel: NDArray[np.uint32]
     """`index` of the cluster that each belongs to, (N,), no unit."""
+    left_out: int
+    """Disparities farther than 1.5 px outside of `disparity_range` (of the layers of `grid`, where these are more), which took no part; no unit."""
+    row_offset: float
+    """How many rows lower the right view shows a point, px, as these views were matched; NaN where disparities were given."""
+    rows_doubtful: bool
+    """Whether the row offset was searched and the views hardly agree with it: many disparities are wrong (no unit)."""
     rounds: int
     """Rounds of the mixture, no unit."""
 
@@ -84,7 +91,7 @@ class StereoTrack:
     times: NDArray[np.int64]
     """Steps at which it was seen, (T,), ascending, no unit."""
     positions: Array
-    """Mean (x, y, disparity) there, (T, 3), px."""
+    """`mean` (x, y, disparity) of its cluster there, (T, 3), px."""
     velocities: Array
     """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step; NaN where not measured."""
 
@@ -210,7 +217,7 @@ class StereoTracker:
     matching : "sgm" or "classes"
         How the views are matched, see `jacoflow.stereo.edge_disparity`; default "sgm" ("paper": "classes").
     grid : (rows, columns, layers)
-        Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`.
+        Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`, and no fewer.
     search : int
         How far templates and depths are searched, cells and disparities; default 8. What changes its disparity by more in one step has no motion.
     luminance_levels : int
@@ -284,7 +291,9 @@ class StereoTracker:
         threads: int | None = None,
     ) -> None:
         options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        self._tracker = _StereoTracker(checked(options))
+        given = checked(options)
+        self._tracker = _StereoTracker(given)
+        self._disparity_range, self._row_range = given["disparity_range"], given["row_range"]
 
     def update(self, left: ArrayLike, right: ArrayLike) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
@@ -296,18 +305,42 @@ class StereoTracker:
         ------
         ValueError
             For views of different size or of another size than before, naming both shapes.
+
+        Warns
+        -----
+        UserWarning
+            Where views with edges hardly agree at any row offset in `row_range`; what is then found is mostly wrong.
         """
-        return _step(self._tracker.update(*checked_views(left, right)))
+        step = _step(self._tracker.update(*checked_views(left, right)))
+        if step.rows_doubtful:
+            tell_doubt(self._row_range)
+        return step
 
     def update_disparity(self, left: ArrayLike, disparity: ArrayLike) -> StereoStep:
         """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part.
+
+        Disparities farther than 1.5 px outside of the layers of the grid, which are those of `disparity_range` unless `grid` has more, take no part either: `StereoStep.left_out` counts them.
 
         Raises
         ------
         ValueError
             As `update`.
+
+        Warns
+        -----
+        UserWarning
+            Where disparities were left out.
         """
-        return _step(self._tracker.update_disparity(as_array(left), as_array(disparity)))
+        step = _step(self._tracker.update_disparity(as_array(left), as_array(disparity)))
+        if step.left_out:
+            all_of_them = step.left_out + len(step.rows)
+            warnings.warn(f"disparity: {step.left_out} of {all_of_them} are outside of disparity_range, {self._disparity_range}, and were left out", UserWarning, stacklevel=2)
+        return step
+
+    @property
+    def row_offset(self) -> float | None:
+        """How many rows lower the right view shows a point, px: the one given, or what was found as long as the views agree with it; None where nothing is known ("classes" searches it at every pixel)."""
+        return self._tracker.row_offset()
 
     @property
     def graph(self) -> TrackGraph:

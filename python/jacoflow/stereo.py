@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
-from ._stereo_options import checked_matching, checked_views
+from ._stereo_options import checked_matching, checked_views, tell_doubt
 
 __all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
@@ -66,7 +66,7 @@ def edge_disparity(
     Parameters
     ----------
     left, right : arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
-        Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats are taken for shares of white unless more than a thousandth of the left view exceeds 1.5. Colour is turned into
+        Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats are taken for shares of white unless at least half of what is not dark (above 0.1) exceeds 1.5; hot patches decide nothing. Colour is turned into
         luminance. A sample that is not finite leaves no edge pixel where the gradient's kernel reaches it, and harms no other.
     disparity_range : (least, greatest), whole px, both included
         Candidates, at most 1024. Those that leave the right view are not admissible.
@@ -100,9 +100,16 @@ def edge_disparity(
     EdgeDisparity
         Empty, not an error, where there are no edges.
 
-    ValueError names an argument that is out of range or views that do not fit, with both shapes.
+    ValueError names an argument that is out of range or views that do not fit, with both shapes. A UserWarning says where views with edges hardly agree at any row offset in `row_range`: cameras that are farther
+    apart in height, or views that do not belong together. What is then found is mostly wrong.
+
+    "sgm" compares gradients, after the right view is multiplied by the ratio of both views' contrasts where that is below .92 or above 1.08 and alike for the greatest 1 to 8 % of the differences in brightness.
+    A bias makes no difference. Contrasts that differ from place to place, or are cut off at white, are not evened out: "classes" looks at directions alone.
     """
-    return EdgeDisparity(*_edge_disparity(*checked_views(left, right), _options(locals())))
+    disparity, rows, cols, values, score, (offset, doubtful) = _edge_disparity(*checked_views(left, right), _options(locals()))
+    if doubtful:
+        tell_doubt(row_range)
+    return EdgeDisparity(disparity, rows, cols, values, score, offset)
 
 
 def estimate_row_offset(
@@ -121,9 +128,12 @@ def estimate_row_offset(
     """How many rows (px, with fractions) lower the right view shows a point.
 
     The most frequent row offset of the class matching, then twice: disparity by "sgm", then Lucas-Kanade steps along y over all matched edge pixels, robustly weighted. Arguments
-    and units are those of `edge_disparity`. 0.0 where nothing can be matched; ValueError as there.
+    and units are those of `edge_disparity`. 0.0 where nothing can be matched; ValueError and UserWarning as there.
     """
-    return _estimate_row_offset(*checked_views(left, right), _options(locals()))
+    rows, doubtful = _estimate_row_offset(*checked_views(left, right), _options(locals()))
+    if doubtful:
+        tell_doubt(row_range)
+    return rows
 
 
 def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:

@@ -126,7 +126,7 @@ class GradientTracker:
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
-        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless more than a thousandth of the frame exceeds 1.5.
+        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
     bbox : (x, y, width, height), px
         The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the frame's; it may reach over the border.
     center : (x, y), px

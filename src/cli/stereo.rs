@@ -41,7 +41,7 @@ pub struct MatchingArguments {
 #[command(
     after_help = "Disparity is x_left - x_right in px, NaN where there is none; a point at (x, y) on the left is at (x - d, y + row offset) on the right.\n\
     npz holds disparity, score and row_offset; pfm disparity alone, infinite where there is none; kitti is a 16-bit PNG of 256 d, for 0 < d < 256.\n\
-    Brightness is taken on the scale 0 to 255: 16-bit samples are divided by 257, floats of which no more than a thousandth exceed 1.5 in the first view multiplied by 255.\n\n\
+    Brightness is taken on the scale 0 to 255: 16-bit samples are divided by 257, floats multiplied by 255 unless at least half of what is not dark (above 0.1) exceeds 1.5.\n\n\
     Examples:\n  \
     jacoflow stereo left/ right/ -o out/ --format npz,pfm --picture pictures/\n  \
     jacoflow stereo l.png r.png -o d.pfm --disparities 0,63 --row-offset 0\n  \
@@ -84,6 +84,8 @@ struct Done {
     found: usize,
     lost: usize,
     row_offset: Option<f64>,
+    /// Pairs whose views hardly agree with any row offset that was searched.
+    rows_doubtful: usize,
 }
 
 impl StereoCommand {
@@ -105,7 +107,7 @@ impl StereoCommand {
         }
         let summary = json!({
             "command": "stereo", "method": self.matching.method, "pairs": done.pairs, "files": done.files, "disparities": done.found,
-            "not_held": done.lost, "row_offset": done.row_offset, "output": self.output, "picture": self.picture, "interrupted": interrupted,
+            "not_held": done.lost, "row_offset": done.row_offset, "rows_doubtful": done.rows_doubtful, "output": self.output, "picture": self.picture, "interrupted": interrupted,
         });
         Ok(Report { summary, failure })
     }
@@ -194,6 +196,7 @@ impl StereoCommand {
                 done.files += 1;
             }
             done.found += found.rows.len();
+            done.rows_doubtful += usize::from(found.rows_doubtful);
             done.row_offset = match options.method {
                 Method::SemiGlobal => rows.known(),
                 Method::Classes => done.row_offset.or(Some(found.row_offset)),
@@ -232,6 +235,16 @@ impl StereoCommand {
     }
 }
 
+/// What is said of so many pairs whose rows are to be doubted.
+pub fn rows_doubted(pairs: usize) -> String {
+    match pairs {
+        0 => String::new(),
+        _ => format!(
+            "; the views of {pairs} pairs hardly agree with any row offset that was searched, and many of their disparities are wrong (--rows LEAST,GREATEST widens the search, --row-offset gives it)"
+        ),
+    }
+}
+
 impl Done {
     /// The summary for people.
     fn in_words(&self) -> String {
@@ -239,8 +252,10 @@ impl Done {
         let mut words = format!("{} pairs, {per_pair} disparities each, {} files", self.pairs, self.files);
         match self.row_offset {
             Some(rows) => words += &format!(", row offset {rows:.2}"),
+            None if self.rows_doubtful > 0 => {}
             None => words += "; no pair shows enough to tell the row offset (--row-offset gives it)",
         }
+        words += &rows_doubted(self.rows_doubtful);
         if self.lost > 0 {
             words += &format!("; {} disparities do not fit the kitti format (above 0 and below 256 px)", self.lost);
         }

@@ -21,7 +21,8 @@ use output::TrackOutputArguments;
     gradient: csv has one row a target and frame: status, position, velocity, acceleration, box, scale, rotation, visibility, ..., and the covariance; mot is\n\
     the MOT challenge's frame,id,x,y,w,h,conf,-1,-1,-1, counted from 1. Targets are followed independently of each other.\n\
     stereo: csv has one row a cluster and step (track, group, x, y, disparity, motion, covariance, ...), json the graph of all clusters. Brightness is\n\
-    taken on the scale 0 to 255: 16-bit samples are divided by 257, floats of which no more than a thousandth exceed 1.5 in the first frame multiplied by 255.\n\
+    taken on the scale 0 to 255: 16-bit samples are divided by 257, floats multiplied by 255 unless at least half of what is not dark\n\
+    (above 0.1) exceeds 1.5.\n\
     What exists is not replaced without --force, and pictures of an earlier run not before the new one is complete. When a run is stopped (Ctrl-C), what\n\
     there is is kept in name.partial.csv, ....\n\n\
     Examples:\n  \

@@ -1,8 +1,10 @@
 //! Small numerical parts that know nothing of images.
 
 pub(crate) mod dense;
+mod median;
 pub mod random;
 mod real;
 pub mod special;
 
+pub(crate) use median::median;
 pub use real::Real;

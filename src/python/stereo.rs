@@ -4,14 +4,14 @@ use super::arrays::{self, ColourRule};
 use crate::error::{Error, Result};
 use crate::io::{DisparityFormat, DisparityMap};
 use crate::parallel::Threads;
-use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method};
+use crate::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method, RowOffset};
 use crate::track::GreyLevels;
 use crate::types::{AnyFrame, Frame};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 
-/// Views in 8-bit grey levels; the first of floats decides what their white is.
+/// Views in 8-bit grey levels; those of floats decide together what their white is.
 fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[Frame<f32>; N]> {
     let mut frames = Vec::with_capacity(N);
     for (name, view) in views {
@@ -87,13 +87,17 @@ impl Matching<'_> {
     }
 }
 
-/// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and scores (N,), then the row offset.
+/// What `_edge_disparity` gives.
+type Matched<'py> =
+    (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, (f64, bool));
+
+/// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and scores (N,), then the row offset and whether it is to be doubted.
 #[pyfunction(name = "_edge_disparity")]
 pub fn edge_disparity<'py>(
     left: &Bound<'py, PyAny>,
     right: &Bound<'py, PyAny>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, f64)> {
+) -> PyResult<Matched<'py>> {
     let py = left.py();
     let (search, matching): (Search, Matching<'_>) = (options.extract()?, options.extract()?);
     let options = matching.add_to(search.options()?)?;
@@ -106,21 +110,22 @@ pub fn edge_disparity<'py>(
         arrays::owned(py, &count, found.columns)?.into_any(),
         arrays::owned(py, &count, found.values)?.into_any(),
         arrays::owned(py, &count, found.scores)?.into_any(),
-        found.row_offset,
+        (found.row_offset, found.rows_doubtful),
     ))
 }
 
-/// The compiled part of `jacoflow.stereo.estimate_row_offset`: rows.
+/// The compiled part of `jacoflow.stereo.estimate_row_offset`: rows, and whether they are to be doubted.
 #[pyfunction(name = "_estimate_row_offset")]
 pub fn estimate_row_offset(
     left: &Bound<'_, PyAny>,
     right: &Bound<'_, PyAny>,
     options: &Bound<'_, PyDict>,
-) -> PyResult<f64> {
+) -> PyResult<(f64, bool)> {
     let options = options.extract::<Search>()?.options()?;
     let py = left.py();
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
-    Ok(py.detach(|| stereo::estimate_row_offset(&left, &right, &options))?)
+    let RowOffset { rows, doubtful } = py.detach(|| stereo::find_row_offset(&left, &right, &options))?;
+    Ok((rows, doubtful))
 }
 
 /// The compiled part of `jacoflow.stereo.edge_pixels`: rows and columns (N,).

@@ -137,7 +137,7 @@ pub struct PyStereoTracker(Mutex<Tracking>);
 
 struct Tracking {
     tracker: StereoTracker,
-    /// Decided by the first views.
+    /// Decided by the first views, unless they are too dark to.
     levels: Option<GreyLevels>,
 }
 
@@ -148,13 +148,16 @@ impl PyStereoTracker {
 }
 
 impl Tracking {
-    /// A step from views, the left one first, in grey levels: the scale of floats is that of the first views with which a step could be taken.
+    /// A step from views, the left one first, in grey levels: views with which no step can be taken say nothing of the scale of floats.
     fn step<const N: usize>(
         &mut self,
         views: &[AnyFrame; N],
         take: impl FnOnce(&mut StereoTracker, [Frame<f32>; N]) -> crate::error::Result<Step>,
     ) -> crate::error::Result<Step> {
-        let levels = self.levels.unwrap_or_else(|| GreyLevels::decide_together(views));
+        let levels = match self.levels {
+            Some(known) => known.revised(views),
+            None => GreyLevels::decide_together(views),
+        };
         let step = take(&mut self.tracker, views.each_ref().map(|view| in_levels(view, levels.gain(view))))?;
         self.levels = Some(levels);
         Ok(step)
@@ -203,6 +206,11 @@ impl PyStereoTracker {
         let points = EdgePoints::from_map(&disparity);
         let step = py.detach(|| self.lock().step(&[left], |tracker, [left]| tracker.update_edges(&left, points)))?;
         told(py, step)
+    }
+
+    /// How many rows lower the right view shows a point, where that is known.
+    fn row_offset(&self) -> Option<f64> {
+        self.lock().tracker.row_offset()
     }
 
     /// Clusters of all steps so far and their arcs.
@@ -268,6 +276,9 @@ fn told(py: Python<'_>, step: Step) -> PyResult<Bound<'_, PyDict>> {
     out.set_item("cols", arrays::owned(py, &count, step.columns)?)?;
     out.set_item("values", arrays::owned(py, &count, step.disparities)?)?;
     out.set_item("cluster_of_pixel", arrays::owned(py, &count, step.labels)?)?;
+    out.set_item("left_out", step.left_out)?;
+    out.set_item("row_offset", step.row_offset.unwrap_or(f64::NAN))?;
+    out.set_item("rows_doubtful", step.rows_doubtful)?;
     out.set_item("rounds", step.rounds)?;
     Ok(out)
 }

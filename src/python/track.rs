@@ -16,8 +16,11 @@ use std::sync::{Mutex, PoisonError};
 
 /// The compiled part of `jacoflow.track.GradientTracker`.
 #[pyclass(name = "_GradientTracker", module = "jacoflow._jacoflow", frozen)]
-pub struct PyGradientTracker {
-    tracker: Mutex<GradientTracker>,
+pub struct PyGradientTracker(Mutex<Following>);
+
+struct Following {
+    tracker: GradientTracker,
+    /// Decided by the first frame, unless that is too dark to.
     levels: GreyLevels,
 }
 
@@ -66,7 +69,7 @@ impl PyGradientTracker {
         let frame_of = arrays::frame("frame", frame, ColourRule::Refuse)?;
         let levels = GreyLevels::decide(&frame_of);
         let tracker = frame.py().detach(|| GradientTracker::new(&levels.convert(&frame_of), start, &options))?;
-        Ok(Self { tracker: Mutex::new(tracker), levels })
+        Ok(Self(Mutex::new(Following { tracker, levels })))
     }
 
     /// The target in the next frame, as a dictionary.
@@ -74,16 +77,18 @@ impl PyGradientTracker {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
         let state = py.detach(|| {
-            let mut tracker = self.tracker.lock().unwrap_or_else(PoisonError::into_inner);
-            tracker.update(&self.levels.convert(&frame))
+            let mut following = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let levels = following.levels.revised(std::slice::from_ref(&frame));
+            let state = following.tracker.update(&levels.convert(&frame))?;
+            following.levels = levels;
+            Ok::<_, Error>(state)
         })?;
         told(py, &state)
     }
 
     /// The target at the last frame, as a dictionary.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let tracker = self.tracker.lock().unwrap_or_else(PoisonError::into_inner);
-        told(py, tracker.state())
+        told(py, self.0.lock().unwrap_or_else(PoisonError::into_inner).tracker.state())
     }
 }
 
@@ -175,9 +180,9 @@ pub fn detect(
 /// Two frames of one size in grey levels.
 fn pair(first: &Bound<'_, PyAny>, second: &Bound<'_, PyAny>) -> PyResult<(Frame<f64>, Frame<f64>)> {
     let first = arrays::frame("first", first, ColourRule::Refuse)?;
-    let levels = GreyLevels::decide(&first);
-    let (first, second) =
-        (levels.convert(&first), levels.convert(&arrays::frame("second", second, ColourRule::Refuse)?));
+    let frames = [first, arrays::frame("second", second, ColourRule::Refuse)?];
+    let levels = GreyLevels::decide_together(&frames);
+    let [first, second] = frames.map(|frame| levels.convert(&frame));
     if first.size() != second.size() {
         let told = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
         let expected = format!("a frame as large as the first, {}", told(&first));

@@ -1,7 +1,9 @@
 //! The one door: two views in, the disparity of the left edge pixels out.
 
+use super::agreement::{Agreement, RowOffset, at_an_end};
 use super::align::rows_moved;
 use super::classes::{match_classes, most_frequent_row};
+use super::contrast::balanced;
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::{EdgeDisparityOptions, Method};
 use super::row_offset::row_offset_of;
@@ -23,17 +25,20 @@ pub struct EdgeDisparity {
     pub values: Vec<f32>,
     /// How well both views agree there, 0 to 1: share of the window's classed pixels whose class agrees, or 1 less the matching cost over its truncation.
     pub scores: Vec<f32>,
+    /// Whether `row_offset` was searched and the views hardly agree with it: the true one lies outside of the range, or the views do not belong together. Many disparities are then wrong.
+    pub rows_doubtful: bool,
     /// How many rows lower the right view shows a point: the one given, the estimate, or the most frequent one of the class matching (0 without matches).
     pub row_offset: f64,
 }
 
 impl EdgeDisparity {
     /// From the disparity and score of every edge pixel that has one.
-    fn new(edges: &EdgeMap, found: impl Iterator<Item = Option<(f32, f32)>>, row_offset: f64) -> Self {
+    fn new(edges: &EdgeMap, found: impl Iterator<Item = Option<(f32, f32)>>, rows: RowOffset) -> Self {
         let (width, height) = edges.class.size();
         let disparity = Frame::filled(width, height, f32::NAN);
+        let RowOffset { rows: row_offset, doubtful: rows_doubtful } = rows;
         let (rows, columns, values, scores) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut all = Self { disparity, rows, columns, values, scores, row_offset };
+        let mut all = Self { disparity, rows, columns, values, scores, rows_doubtful, row_offset };
         for ((&row, &column), found) in edges.rows.iter().zip(&edges.columns).zip(found) {
             if let Some((disparity, score)) = found {
                 all.disparity.row_mut(row as usize)[column as usize] = disparity;
@@ -68,20 +73,29 @@ fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOpti
     let (edges, right) = (EdgeMap::new(left, &settings), EdgeMap::new(right, &settings));
     let rows = options.row_offset.map_or(options.row_range, |e| (e.round() as i32, e.round() as i32));
     let matches = match_classes(&edges, &right, options, rows, 1);
-    let row_offset = options.row_offset.unwrap_or_else(|| f64::from(most_frequent_row(&matches, rows)));
-    EdgeDisparity::new(&edges, matches.iter().map(|m| m.map(|m| (m.disparity as f32, m.support))), row_offset)
+    let found = options.row_offset.map_or_else(
+        || {
+            let row_offset = f64::from(most_frequent_row(&matches, rows));
+            let agreement = Agreement::new(matches.iter().map(|found| found.map(|found| found.support)));
+            RowOffset { rows: row_offset, doubtful: agreement.is_doubtful(at_an_end(row_offset, rows)) }
+        },
+        RowOffset::given,
+    );
+    EdgeDisparity::new(&edges, matches.iter().map(|m| m.map(|m| (m.disparity as f32, m.support))), found)
 }
 
-/// Semi-global matching after the rows are aligned.
+/// Semi-global matching after contrasts are balanced and the rows aligned.
 fn by_semi_global(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+    let right = &*balanced(left, right);
     let view = View::of(left, options);
-    let row_offset = options.row_offset.unwrap_or_else(|| row_offset_of(left, &view, right, options).rows);
-    told(&view, &match_aligned(left, &view, right, row_offset, options), row_offset)
+    let rows =
+        options.row_offset.map_or_else(|| row_offset_of(left, &view, right, options).told(options), RowOffset::given);
+    told(&view, &match_aligned(left, &view, right, rows.rows, options), rows)
 }
 
 /// What matches of the left edge pixels say.
-pub(super) fn told(view: &View, matches: &[Option<Match>], row_offset: f64) -> EdgeDisparity {
-    EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), row_offset)
+pub(super) fn told(view: &View, matches: &[Option<Match>], rows: RowOffset) -> EdgeDisparity {
+    EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), rows)
 }
 
 /// Matches of the left edge pixels with the right view moved up by `row_offset`.

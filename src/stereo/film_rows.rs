@@ -3,6 +3,8 @@
 //! Cameras are screwed down, so one offset serves a film, and a single pair's would only add noise. But a film may begin with black, with a title that was drawn into both views alike, or with noise: what such a
 //! pair says, if anything, must not be believed for ever.
 
+use super::agreement::{Agreement, RowOffset};
+use super::contrast::balanced;
 use super::disparity::{EdgeDisparity, edge_disparity, match_aligned, told};
 use super::options::{EdgeDisparityOptions, Method};
 use super::row_offset::{misalignment, row_offset_of};
@@ -12,10 +14,6 @@ use crate::types::Frame;
 
 /// A misalignment above this, rows, is not noise: single pairs are within .05 of the truth.
 const MISALIGNED: f64 = 0.2;
-/// Least share of the edge pixels that are matched where the rows are aligned.
-const LEAST_MATCHED: f64 = 0.3;
-/// Fewer edge pixels say nothing of the rows.
-const LEAST_EDGES: usize = 30;
 
 /// Matches a film pair by pair, and knows how many rows lower its right views show a point.
 #[derive(Debug, Clone, Default)]
@@ -58,20 +56,22 @@ impl FilmRows {
     }
 
     fn align(&mut self, left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
+        let right = &*balanced(left, right);
         let pair = Pair { left, right, view: View::of(left, options), options };
         if let Some(rows) = self.found {
             let matches = pair.matched(rows);
             if !pair.contradicts(rows, &matches) {
-                return told(&pair.view, &matches, rows);
+                return told(&pair.view, &matches, RowOffset::given(rows));
             }
         }
-        let (rows, matches, believed) = pair.estimated();
+        let found = row_offset_of(left, &pair.view, right, options);
+        let believed = found.is_believed(options);
         match self.found {
             // Whatever is wrong with this pair, it does not know better.
-            Some(known) if !believed => told(&pair.view, &pair.matched(known), known),
+            Some(known) if !believed => told(&pair.view, &pair.matched(known), RowOffset::given(known)),
             _ => {
-                self.found = Some(rows).filter(|_| believed);
-                told(&pair.view, &matches, rows)
+                self.found = Some(found.rows).filter(|_| believed);
+                told(&pair.view, &pair.matched(found.rows), found.told(options))
             }
         }
     }
@@ -90,25 +90,12 @@ impl Pair<'_> {
         match_aligned(self.left, &self.view, self.right, rows, self.options)
     }
 
-    /// The offset estimated from this pair alone, the matches with it, and whether it can be believed.
-    fn estimated(&self) -> (f64, Vec<Option<Match>>, bool) {
-        let found = row_offset_of(self.left, &self.view, self.right, self.options);
-        let matches = self.matched(found.rows);
-        let believed = found.settled && share(&matches) >= LEAST_MATCHED && matches.len() >= LEAST_EDGES;
-        (found.rows, matches, believed)
-    }
-
     /// Whether matches made with an offset speak against it.
     fn contradicts(&self, rows: f64, matches: &[Option<Match>]) -> bool {
         let step = misalignment(self.left, &self.view, self.right, matches, rows);
         let misaligned = step.is_some_and(|step| step.abs() > MISALIGNED);
-        misaligned || matches.len() >= LEAST_EDGES && share(matches) < LEAST_MATCHED
+        misaligned || Agreement::of(matches).contradicts()
     }
-}
-
-/// Share of edge pixels that are matched.
-fn share(matches: &[Option<Match>]) -> f64 {
-    matches.iter().flatten().count() as f64 / matches.len().max(1) as f64
 }
 
 #[cfg(test)]

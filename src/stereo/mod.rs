@@ -7,9 +7,11 @@
 //! H. Hirschmueller, "Stereo processing by semiglobal matching and mutual information", 2008, with edge pixels in place of a dense grid), which wants the rows of the cameras
 //! aligned: [`estimate_row_offset`].
 
+mod agreement;
 mod align;
 mod chains;
 mod classes;
+mod contrast;
 mod cost;
 mod disparity;
 mod edges;
@@ -19,8 +21,9 @@ mod row_offset;
 mod semi_global;
 mod subpixel;
 
+pub use agreement::RowOffset;
 pub use disparity::{EdgeDisparity, edge_disparity};
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
 pub use film_rows::FilmRows;
 pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
-pub use row_offset::estimate_row_offset;
+pub use row_offset::{estimate_row_offset, find_row_offset};

@@ -16,7 +16,7 @@ const MOST_CANDIDATES: i64 = 1024;
 pub enum Method {
     /// Agreement of the classes of gradient direction in a window, section 3 of the stereo paper: whole disparities, each with a row offset of its own.
     Classes,
-    /// Gradients compared and smoothed along chains of edge pixels from eight sides, checked from the right view, refined to fractions of a pixel. The default.
+    /// Gradients compared and smoothed along chains of edge pixels from eight sides, checked from the right view, refined to fractions of a pixel. A gain of the right view over the left one is taken out beforehand. The default.
     #[default]
     SemiGlobal,
 }

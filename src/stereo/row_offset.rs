@@ -3,8 +3,10 @@
 //! Along a slanted edge a wrong row offset looks like a wrong disparity. Each window's own shift along x is therefore solved for together with the one offset that all share, and only
 //! what no shift along x explains speaks for an offset.
 
+use super::agreement::{Agreement, RowOffset, at_an_end};
 use super::align::rows_moved;
 use super::classes::{match_classes, most_frequent_row};
+use super::contrast::balanced;
 use super::disparity::match_aligned;
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::EdgeDisparityOptions;
@@ -46,10 +48,18 @@ const LEAST_SLOPE: f64 = 4.0;
 /// # Errors
 /// As [`edge_disparity`](super::edge_disparity).
 pub fn estimate_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<f64> {
+    find_row_offset(left, right, options).map(|found| found.rows)
+}
+
+/// As [`estimate_row_offset`], with whether it is to be doubted.
+///
+/// # Errors
+/// As [`edge_disparity`](super::edge_disparity).
+pub fn find_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<RowOffset> {
     options.check_views(left, right)?;
     Ok(options.threads.install(|| {
         let view = View::new(left, &EdgeSettings::of(options));
-        row_offset_of(left, &view, right, options).rows
+        row_offset_of(left, &view, &balanced(left, right), options).told(options)
     }))
 }
 
@@ -60,6 +70,25 @@ pub(super) struct RowEstimate {
     pub rows: f64,
     /// Whether vertical steps could be made until the end; else it is the most frequent offset of the classes, whatever that is worth.
     pub settled: bool,
+    /// How well the views agree with it.
+    pub agreement: Agreement,
+}
+
+impl RowEstimate {
+    /// Whether nothing speaks for it, and the agreement against it: rows that cannot be told, as of vertical edges alone, do no harm.
+    pub fn is_doubtful(&self, options: &EdgeDisparityOptions) -> bool {
+        self.agreement.is_doubtful(!self.settled || at_an_end(self.rows, options.row_range))
+    }
+
+    /// The estimate, and whether it is to be doubted.
+    pub fn told(&self, options: &EdgeDisparityOptions) -> RowOffset {
+        RowOffset { rows: self.rows, doubtful: self.is_doubtful(options) }
+    }
+
+    /// Whether it may be kept for other pairs.
+    pub fn is_believed(&self, options: &EdgeDisparityOptions) -> bool {
+        self.settled && self.agreement.suffices() && !self.is_doubtful(options)
+    }
 }
 
 /// As [`estimate_row_offset`], for a left view that is prepared.
@@ -74,15 +103,17 @@ pub(super) fn row_offset_of(
     let matches = match_classes(&view.edges, &classes, &options, options.row_range, SAMPLED);
     let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
     let (left_smooth, right_smooth) = smoothed(left, right);
+    let mut agreement = Agreement::new(std::iter::empty());
     for _ in 0..PASSES {
         let matches = match_aligned(left, view, right, offset, &options);
+        agreement = Agreement::of(&matches);
         let mut windows = windows(&left_smooth, view, &matches, WINDOWS.1);
         match vertical_steps(&mut windows, &right_smooth, offset, STEPS) {
             Some(refined) => offset = refined,
-            None => return RowEstimate { rows: offset, settled: false },
+            None => return RowEstimate { rows: offset, settled: false, agreement },
         }
     }
-    RowEstimate { rows: offset, settled: true }
+    RowEstimate { rows: offset, settled: true, agreement }
 }
 
 /// How far one vertical step leads from an offset with which views were matched, rows; none of fewer windows than steps need.
@@ -235,6 +266,8 @@ fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::disparity::edge_disparity;
+    use super::super::options::Method;
     use super::*;
     use crate::image::cubic_at;
     use crate::math::random::CounterRng;
@@ -270,6 +303,31 @@ pub(super) mod tests {
     #[test]
     fn nothing_to_match_is_no_offset() {
         let flat = Frame::filled(64, 64, 9.0f32);
-        assert_eq!(estimate_row_offset(&flat, &flat, &EdgeDisparityOptions::default()).unwrap(), 0.0);
+        let found = find_row_offset(&flat, &flat, &EdgeDisparityOptions::default()).unwrap();
+        assert_eq!(found, RowOffset { rows: 0.0, doubtful: false });
+    }
+
+    #[test]
+    fn an_offset_beyond_the_rows_that_are_searched_is_doubted() {
+        let options = |row_range| EdgeDisparityOptions { disparity_range: (-8, 8), row_range, ..Default::default() };
+        for offset in [-9.0, -6.5, 6.0, 7.3] {
+            let [left, right] = views(offset);
+            let doubtful = |rows| find_row_offset(&left, &right, &options(rows)).unwrap().doubtful;
+            assert!(doubtful((-3, 3)), "{offset}");
+            assert!(!doubtful((-9, 9)), "{offset}");
+            let by = |method, row_offset| {
+                let options = EdgeDisparityOptions { method, row_offset, ..options((-3, 3)) };
+                edge_disparity(&left, &right, &options).unwrap().rows_doubtful
+            };
+            for method in Method::ALL {
+                assert!(by(method, None) && !by(method, Some(offset)), "{offset} {method:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_that_cannot_be_told_are_not_doubted() {
+        let stripes = Frame::from_fn(180, 160, |x, _| if x / 9 % 2 == 0 { 40.0f32 } else { 180.0 });
+        assert!(!find_row_offset(&stripes, &stripes, &EdgeDisparityOptions::default()).unwrap().doubtful);
     }
 }

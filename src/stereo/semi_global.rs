@@ -8,6 +8,7 @@ use crate::image::gaussian_gradient;
 use crate::simd::Level;
 use crate::types::Frame;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Share of the highest cost above which a match is refused.
 const REFUSED: f32 = 0.8;
@@ -44,7 +45,7 @@ impl View {
 /// The match of an edge pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Match {
-    /// px, fitted between the candidates.
+    /// px, fitted between the candidates unless whole ones are wanted.
     pub disparity: f32,
     /// Matching cost of the winner over its truncation, 0 to 1.
     pub cost: f32,
@@ -70,12 +71,13 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
         let (first, end) = ((greatest - high) as usize, (greatest - low + 1) as usize);
         inside.start.max(first)..inside.end.min(end)
     };
-    let find_left = || winners(&left.edges, &own, &other, from_left, allowed, |k| greatest as f32 - k);
+    let place = if options.subpixel { fitted } else { whole };
+    let find_left = || winners(&left.edges, [&own, &other], from_left, allowed, place, |k| greatest as f32 - k);
     if !options.check {
         return find_left();
     }
     let everywhere = |edge: usize| from_right.inside(right.edges.columns[edge], width);
-    let find_right = || winners(&right.edges, &other, &own, from_right, everywhere, |k| least as f32 + k);
+    let find_right = || winners(&right.edges, [&other, &own], from_right, everywhere, place, |k| least as f32 + k);
     let (mut matches, confirming) = rayon::join(find_left, find_right);
     keep_confirmed(&left.edges, &mut matches, &right.edges, &confirming);
     matches
@@ -84,10 +86,10 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
 /// The candidate with the least `sum_r L_r` of every edge pixel, as a disparity.
 fn winners(
     edges: &EdgeMap,
-    own: &Coded,
-    other: &Coded,
+    [own, other]: [&Coded; 2],
     candidates: Candidates,
-    allowed: impl Fn(usize) -> std::ops::Range<usize> + Sync,
+    allowed: impl Fn(usize) -> Range<usize> + Sync,
+    place: Place,
     disparity: impl Fn(f32) -> f32 + Sync,
 ) -> Vec<Option<Match>> {
     let padded = candidates.padded();
@@ -103,24 +105,35 @@ fn winners(
             for (sum, (a, b)) in sums.iter_mut().zip(above[span.clone()].iter().zip(&below[span.clone()])) {
                 *sum = a + b;
             }
-            *out = lowest(&sums, &costs[span], allowed(edge)).map(|(k, cost)| Match { disparity: disparity(k), cost });
+            let lowest = lowest(&sums, &costs[span], allowed(edge));
+            *out = lowest.map(|(k, cost)| Match { disparity: disparity(place(&sums, k, allowed(edge))), cost });
         }
     });
     matches
 }
 
-/// The candidate with the least sum, between candidates by two lines of equal slope through it and its neighbours, and its cost over the highest.
-fn lowest(sums: &[u16], costs: &[u16], allowed: std::ops::Range<usize>) -> Option<(f32, f32)> {
-    let best = allowed.clone().min_by_key(|&k| sums[k])?;
+/// The candidate with the least sum, and its cost over the highest; none that costs too much.
+fn lowest(sums: &[u16], costs: &[u16], allowed: Range<usize>) -> Option<(usize, f32)> {
+    let best = allowed.min_by_key(|&k| sums[k])?;
     let cost = f32::from(costs[best]) / f32::from(HIGHEST);
-    if cost > REFUSED {
-        return None;
-    }
+    (cost <= REFUSED).then_some((best, cost))
+}
+
+/// Where the least sum is: beside, or at, the candidate that has it.
+type Place = fn(&[u16], usize, Range<usize>) -> f32;
+
+/// Between candidates: where two lines of equal slope through the lowest and its neighbours meet.
+fn fitted(sums: &[u16], best: usize, allowed: Range<usize>) -> f32 {
     let inner = best > allowed.start && best + 1 < allowed.end;
     let (before, own, after) = if inner { (sums[best - 1], sums[best], sums[best + 1]) } else { (1, 0, 1) };
     let slope = 2.0 * f32::from(before.max(after) - own);
     let shift = if slope > 0.0 { (f32::from(before) - f32::from(after)) / slope } else { 0.0 };
-    Some((best as f32 + shift, cost))
+    best as f32 + shift
+}
+
+/// At the candidate itself.
+fn whole(_: &[u16], best: usize, _: Range<usize>) -> f32 {
+    best as f32
 }
 
 /// Drops every match that none of the 3 x 3 edge pixels of the other view round its place confirms.

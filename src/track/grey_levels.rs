@@ -4,13 +4,20 @@ use crate::types::{AnyFrame, Frame};
 
 /// Brightest value of a float picture whose white is 1, with room for noise and overshoot.
 const UNIT_WHITE: f64 = 1.5;
-/// Share of the samples that may exceed it all the same: single pixels that are hot or damaged say nothing of the white.
-const DAMAGED: f64 = 1e-3;
+/// Less is dark in a picture whose white is 1, and says little of it: black, noise, what a filter left round something bright.
+const LIT: f64 = 0.1;
+/// Grey levels that no overshoot of a white of 1 reaches.
+const FAR_ABOVE: f64 = 16.0;
+/// Shares of the samples that may be hot or damaged: any at all, and those far above white.
+const DAMAGED: [f64; 2] = [1e-3, 1e-2];
 
 /// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast, gradient) are in these.
 ///
-/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white: if more than a thousandth of the first frame's finite
-/// samples are above 1.5 they are grey levels already, else white is 1 and they are multiplied by 255. That is decided once, at the first frame, and kept: brightness must not jump.
+/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white. It is taken for 1, and they are multiplied by 255, unless more than a thousandth of a
+/// frame's finite samples are above 1.5 and these are at least half of those that are not dark (above .1): then they are grey levels already. Where less than a hundredth is not dark, most of what exceeds 1.5 must
+/// also be above 16; and where what is above 16 is a hundredth of the frame and most of what exceeds 1.5, dim surroundings do not matter. So patches of hot pixels decide nothing.
+///
+/// A film may begin with black, which says nothing: the first frame of grey levels after it sets that right ([`revised`](Self::revised)). The other way there is none: brightness must not jump.
 ///
 /// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be scaled beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,18 +29,17 @@ pub struct GreyLevels {
 impl GreyLevels {
     /// Decides by the first frame of a sequence.
     pub fn decide(first: &AnyFrame) -> Self {
-        let levels = match first {
-            AnyFrame::F32(frame) => exceed(frame.data().iter().map(|&value| f64::from(value))),
-            AnyFrame::F64(frame) => exceed(frame.data().iter().copied()),
-            AnyFrame::U8(_) | AnyFrame::U16(_) => true,
-        };
-        Self { float: if levels { 1.0 } else { 255.0 } }
+        Self::decide_together(std::slice::from_ref(first))
     }
 
-    /// Decides by frames of one moment, such as two views: by the first of them that is of floats, for the others' types say what white is.
+    /// Decides by frames of one moment, such as two views: grey levels if one of floats holds them, for the others' types say what white is.
     pub fn decide_together(frames: &[AnyFrame]) -> Self {
-        let floats = frames.iter().find(|frame| matches!(frame, AnyFrame::F32(_) | AnyFrame::F64(_)));
-        floats.or(frames.first()).map_or(Self { float: 1.0 }, Self::decide)
+        Self { float: 255.0 }.revised(frames)
+    }
+
+    /// The same after later frames of the sequence, which may show that floats are grey levels after all.
+    pub fn revised(self, frames: &[AnyFrame]) -> Self {
+        if self.float != 1.0 && frames.iter().any(holds_levels) { Self { float: 1.0 } } else { self }
     }
 
     /// What the samples of a frame are multiplied by.
@@ -59,14 +65,28 @@ impl GreyLevels {
     }
 }
 
-/// Whether more samples exceed a white of 1 than can be damaged ones.
-fn exceed(samples: impl Iterator<Item = f64>) -> bool {
-    let (mut above, mut all) = (0usize, 0usize);
+/// Whether a frame of floats holds grey levels.
+fn holds_levels(frame: &AnyFrame) -> bool {
+    match frame {
+        AnyFrame::F32(frame) => are_levels(frame.data().iter().map(|&value| f64::from(value))),
+        AnyFrame::F64(frame) => are_levels(frame.data().iter().copied()),
+        AnyFrame::U8(_) | AnyFrame::U16(_) => false,
+    }
+}
+
+/// Whether samples exceed a white of 1 by more than damaged ones do.
+fn are_levels(samples: impl Iterator<Item = f64>) -> bool {
+    let (mut all, mut lit, mut bright, mut high) = (0usize, 0usize, 0usize, 0usize);
     for value in samples.filter(|value| value.is_finite()) {
         all += 1;
-        above += usize::from(value > UNIT_WHITE);
+        lit += usize::from(value > LIT);
+        bright += usize::from(value > UNIT_WHITE);
+        high += usize::from(value > FAR_ABOVE);
     }
-    above as f64 > DAMAGED * all as f64
+    let more_than = |share: f64, count: usize| count as f64 > share * all as f64;
+    let mostly_high = 2 * high >= bright;
+    let mostly_bright = 2 * bright >= lit && (more_than(DAMAGED[1], lit) || mostly_high);
+    more_than(DAMAGED[0], bright) && (mostly_bright || mostly_high && more_than(DAMAGED[1], high))
 }
 
 #[cfg(test)]
@@ -100,15 +120,49 @@ mod tests {
         assert_eq!(GreyLevels::decide_together(std::slice::from_ref(&bytes)).convert(&bytes).into_data(), [7.0]);
     }
 
+    /// What .5 in the last of 320 x 240 pixels becomes, where `shown` says what is in the others.
+    fn beside(shown: impl Fn(usize, usize) -> f64) -> f64 {
+        let frame =
+            AnyFrame::F64(Frame::from_fn(320, 240, |x, y| if (x, y) == (319, 239) { 0.5 } else { shown(x, y) }));
+        levels(&frame, &frame)[320 * 240 - 1]
+    }
+
     #[test]
-    fn single_damaged_samples_do_not_decide() {
-        let with = |damaged: usize| {
-            let frame = AnyFrame::F64(Frame::from_fn(100, 30, |x, y| if 100 * y + x < damaged { 2.0 } else { 0.5 }));
-            levels(&frame, &frame)[2999]
-        };
-        assert_eq!([with(0), with(3), with(4)], [127.5, 127.5, 0.5]);
+    fn hot_patches_do_not_decide() {
+        for (side, hot) in [(1, 2.0), (9, 1.6), (9, 200.0), (27, 1.6), (80, 1.6)] {
+            let inside = |x: usize, y: usize| x < side && y < side;
+            assert_eq!(beside(|x, y| if inside(x, y) { hot } else { 0.2 + 0.002 * x as f64 }), 127.5, "{side} {hot}");
+        }
+        // On black a small patch decides if it is far above white: a small thing rather than a hot one.
+        let inside = |x: usize, y: usize| x < 9 && y < 9;
+        assert_eq!(beside(|x, y| if inside(x, y) { 1.6 } else { 0.0 }), 127.5);
+        assert_eq!(beside(|x, y| if inside(x, y) { 160.0 } else { 0.0 }), 0.5);
         let infinite = AnyFrame::F32(Frame::new(2, 1, vec![f32::INFINITY, 0.5]).unwrap());
         assert_eq!(levels(&infinite, &infinite)[1], 127.5);
+    }
+
+    #[test]
+    fn grey_levels_are_known_in_the_dark_too() {
+        let away = |x: usize, y: usize| ((x as f64 - 160.0).powi(2) + (y as f64 - 120.0).powi(2)) / 50.0;
+        // A smooth spot on black, something small before what is dim, and a picture without anything bright.
+        assert_eq!(beside(|x, y| 200.0 * (-away(x, y)).exp()), 0.5);
+        assert_eq!(beside(|x, y| if away(x, y) < 9.0 { 180.0 } else { 0.7 }), 0.5);
+        assert_eq!(beside(|x, _| 1.0 + 0.02 * x as f64), 0.5);
+    }
+
+    #[test]
+    fn a_film_that_begins_with_black_has_the_scale_of_what_follows() {
+        let frame =
+            |gain: f64| AnyFrame::F32(Frame::from_fn(64, 48, |x, y| (gain * ((7 * x + 13 * y) % 256) as f64) as f32));
+        for black in [0.0, 0.005] {
+            let begun = GreyLevels::decide(&frame(black));
+            let gain = |later: &AnyFrame| begun.revised(std::slice::from_ref(later)).gain(later);
+            assert_eq!(gain(&frame(1.0)), 1.0, "{black}");
+            assert_eq!(gain(&frame(1.0 / 255.0)), 255.0, "{black}");
+        }
+        // What is known to be grey levels stays it, however dark.
+        let known = GreyLevels::decide(&frame(1.0)).revised(&[frame(0.005)]);
+        assert_eq!(known.gain(&frame(0.005)), 1.0);
     }
 
     #[test]

@@ -176,6 +176,33 @@ fn rows_are_found_whatever_a_film_begins_with() {
     assert!(ended.err.contains("no pair shows enough to tell the row offset"), "{}", ended.err);
 }
 
+/// The right view ten rows lower, which is farther than is searched.
+#[test]
+fn rows_beyond_those_that_are_searched_are_told() {
+    let lower = |index: usize| {
+        let [left, right] = views(index);
+        [left, (0..WIDTH * HEIGHT).map(|i| right[(i / WIDTH).max(10) * WIDTH - 10 * WIDTH + i % WIDTH]).collect()]
+    };
+    let place = recorded_as(2, lower);
+    for command in [
+        "stereo left right -o a",
+        "stereo left right --method classes -o b",
+        "track left right --method stereo -o t.csv",
+    ] {
+        let line = format!("{command} --disparities -8,12");
+        let ended = place.good(&line);
+        assert!(
+            ended.err.contains("the views of 2 pairs hardly agree with any row offset"),
+            "{command}: {}",
+            ended.err
+        );
+        let summary = place.good(&format!("{line} --force --json")).json();
+        assert_eq!(summary["rows_doubtful"].as_u64(), Some(2), "{summary}");
+        let wide = place.good(&format!("{line} --force --rows -12,12"));
+        assert!(!wide.err.contains("hardly agree"), "{command}: {}", wide.err);
+    }
+}
+
 #[test]
 fn classes_give_whole_pixels_and_pictures_show_them() {
     let place = recorded(3);
@@ -192,6 +219,22 @@ fn classes_give_whole_pixels_and_pictures_show_them() {
     let again = place.line(line);
     assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("{line} --force --threads 1"));
+}
+
+#[test]
+fn semi_global_matching_gives_whole_pixels_when_asked() {
+    let place = recorded(1);
+    let fractions = |option: &str| {
+        let line = format!("stereo left right --disparities -8,12 --row-offset 0 -o d.pfm --force {option}");
+        place.good(&line);
+        let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap().disparity;
+        let found = map.data().iter().filter(|d| d.is_finite());
+        let (whole, all) = found.fold((0, 0), |(whole, all), d| (whole + usize::from(d.fract() == 0.0), all + 1));
+        assert!(all > 300, "{option}: {all}");
+        all - whole
+    };
+    assert_eq!((fractions("--whole"), fractions("--whole --unchecked")), (0, 0));
+    assert!(fractions("") > 300);
 }
 
 #[test]

@@ -110,6 +110,7 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo --cameras 3", &["--cameras"]),
         ("left right --method stereo --grid 30", &["--grid", "ROWS,COLUMNS"]),
         ("left right --method stereo --grid 0,40", &["grid", "1 to 4096"]),
+        ("left right --method stereo --grid 10,10,10", &["grid", "-40 to 24, at least 64"]),
         ("left right --method stereo --search 65", &["search", "1 to 64"]),
         ("left right --method stereo --n-init 0", &["n_init"]),
         ("left right --method stereo --tol never", &["--tol", "none"]),

@@ -260,6 +260,15 @@ def test_fractions_of_a_pixel_are_measured():
         assert np.median(np.abs(found.values - truth)) <= np.median(np.abs(coarse.values - truth)) + 0.01
 
 
+@pytest.mark.parametrize("check", [True, False])
+def test_whole_disparities_are_whole(check):
+    step = small()[0]
+    found = disparity(step.left, step.right, row_offset=1.0, subpixel=False, check=check)
+    assert len(found.values) > 4000 and (found.values % 1 == 0).all()
+    fitted = disparity(step.left, step.right, row_offset=1.0, check=check)
+    assert (fitted.values % 1 != 0).mean() > 0.9
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_prior_narrows_the_search(method):
     step = small()[0]
@@ -292,18 +301,43 @@ def test_one_hot_pixel_does_not_decide_what_white_is():
     assert len(found.values) > 0.99 * len(clean.values) > 4000
 
 
+@pytest.mark.parametrize(("side", "hot"), [(9, 1.6), (9, 40.0), (24, 1.6)])
+def test_a_hot_patch_does_not_decide_what_white_is(side, hot):
+    step = small()[0]
+    left, right = step.left / 255, step.right / 255
+    clean = disparity(left, right, row_offset=1.0)
+    left[100 : 100 + side, 100 : 100 + side] = hot
+    found = disparity(left, right, row_offset=1.0)
+    assert len(found.values) > 0.95 * len(clean.values) > 4000
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rows_beyond_those_that_are_searched_are_warned_of(method):
+    step = small()[0]
+    lower = np.roll(step.right, 5, axis=0)
+    with pytest.warns(UserWarning, match="row_range: .* -4 to 4"):
+        found = disparity(step.left, lower, row_range=(-4, 4), method=method)
+    wrong = np.abs(found.values - step.disparity[found.rows, found.cols]) > 1
+    assert wrong.mean() > 0.25
+    with pytest.warns(UserWarning, match="row_range: "):
+        stereo.estimate_row_offset(step.left, lower, disparity_range=RANGE)
+    for options in ({"row_range": (-8, 8)}, {"row_offset": 6.0}):
+        assert disparity(step.left, lower, method=method, **options).row_offset == pytest.approx(6.0, abs=0.05)
+
+
 def test_results_pickle():
     step = small()[0]
     found = disparity(step.left, step.right, row_offset=1.0)
     same(found, pickle.loads(pickle.dumps(found)))
 
 
-def test_another_gain_of_the_right_camera_costs_a_tenth_of_a_pixel_at_most():
-    """An eighth less contrast: a bias drops out of the steps along x, a gain moves them by a twentieth of a px."""
+@pytest.mark.parametrize("gain", [0.9, 0.6, 0.4, 1.6])
+def test_another_gain_of_the_right_camera_costs_a_tenth_of_a_pixel_at_most(gain):
+    """A bias drops out of everything; of a gain some hundredths are left, which move the steps along x by less than a twentieth of a px."""
     step = small()[0]
-    found = disparity(step.left, step.right, row_offset=1.0)
-    brighter = np.clip(step.right.astype(float) * 0.9 + 10, 0, 255)
-    again = disparity(step.left.astype(float), brighter, row_offset=1.0)
+    found = disparity(step.left, step.right)
+    again = disparity(step.left.astype(float), gain * step.right.astype(float) + 10)
     both = np.isfinite(found.disparity) & np.isfinite(again.disparity)
     assert both.sum() > 0.95 * len(found.rows)
     assert np.median(np.abs(found.disparity - again.disparity)[both]) < 0.1
+    assert again.row_offset == pytest.approx(found.row_offset, abs=0.02)

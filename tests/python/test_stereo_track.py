@@ -5,6 +5,7 @@ import json
 import pickle
 import sys
 from dataclasses import replace
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -84,9 +85,25 @@ def test_who_is_taken_over_by_a_component_at_its_rim_keeps_its_track(seed, label
     assert scores.id_kept(label) == scores.index_kept(label) == scores.path(label) == 6
 
 
-def scored(scene, mode, **options):
+def scored(scene, mode, film=None, **options):
     tracker = StereoTracker(mode, disparity_range=scene.disparity_range, **options)
-    return follow(scene, scene.film(), tracker, False)[0]
+    return follow(scene, film or scene.film(), tracker, False)[0]
+
+
+@lru_cache(maxsize=1)
+def crossing_film(seed):
+    """Drawing it takes longer than following it."""
+    return replace(crossing(), seed=seed).film()
+
+
+@cache
+def crossing_on_paper(seed):
+    """Purity, recalls and paths of the paper's mode on a texture of the crossing, means over three starts of the mixture."""
+    each = [scored(crossing(), "paper", crossing_film(seed), random_state=start) for start in range(3)]
+    return np.mean([[scores.purity(), *(scores.recall(label) for label in (1, 2, 3)), *(scores.path(label) for label in (1, 2, 3))] for scores in each], axis=0)
+
+
+CROSSINGS = (1, 22, 24)
 
 
 @pytest.mark.parametrize(
@@ -107,25 +124,48 @@ def test_the_specifications_figures_on_the_small_scene(mode, purity, recalls, er
 
 
 def test_who_was_hidden_is_recognised():
-    scores = scored(crossing(), "improved")
+    scores = scored(crossing(), "improved", crossing_film(1))
+    assert crossing_on_paper(1)[0] > 0.9
     assert scores.recognised(2)
+    assert scores.purity() >= 0.958
+    assert all(scores.recall(label) >= recall - 0.02 for label, recall in zip((1, 2, 3), (0.912, 0.951, 0.992), strict=True))
     assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.index_kept(label) for label in (1, 2, 3)]
     # Whose pixels are nearly all hidden at once is still who is left, as long as that is where it went.
     assert [scores.id_kept(label) for label in (1, 2, 3)] == [9, 11, 16]
     # Of the wall much is being covered, or has just come to light.
     errors = scores.motion_errors()
     assert gross(errors[0]) <= 0.011 and len(errors[0]) > 100 and gross(errors[3]) == 0
+    assert (np.median(errors[0], axis=0) <= (0.02, 0.02, 0.022)).all()
+    assert (np.median(errors[3], axis=0) <= (0.028, 0.02, 0.024)).all()
 
 
-@pytest.mark.parametrize("seed", [22, 24])
+@pytest.mark.parametrize("seed", CROSSINGS[1:])
 def test_other_textures_of_the_crossing_are_followed_as_well(seed):
-    scores = scored(replace(crossing(), seed=seed), "improved")
+    scores = scored(crossing(), "improved", crossing_film(seed))
+    assert crossing_on_paper(seed)[0] > 0.9
     assert scores.purity() >= 0.958
     assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.id_kept(label) for label in (1, 2, 3)]
     assert scores.recognised(2)
     # One of the pair is half of it: what is one object is one group.
     _, share, precision = scores.grouped(3)
     assert share >= 0.96 and precision >= 0.93 and scores.groups() <= 7
+
+
+def test_the_papers_mode_on_the_crossing_is_the_specifications_in_the_mean():
+    """Single starts of the mixture differ by steps of a path; means over starts and textures do not."""
+    purity, *recalls, first, second, pair = np.mean([crossing_on_paper(seed) for seed in CROSSINGS], axis=0)
+    assert purity >= 0.946 - 0.02
+    assert all(recall >= asked - 0.02 for recall, asked in zip(recalls, (0.685, 0.857, 0.942), strict=True))
+    assert first >= 6 and second >= 10 and pair == 16
+
+
+def test_who_goes_away_among_things_at_rest_is_followed():
+    """The cart, which recedes by three disparities a step."""
+    scores = scored(cart(), "improved")
+    assert scores.purity() >= 0.952
+    assert scores.recall(1) >= 0.956 and scores.recall(2) >= 0.959
+    assert scores.path(1) == 8 and scores.id_kept(1) == 10
+    assert (np.median(scores.motion_errors()[1], axis=0) <= (0.02, 0.02, 0.022)).all()
 
 
 @pytest.mark.parametrize(("scene", "label", "kept"), [(passing, 1, 0.93), (pillar, 1, 1.0)])
@@ -262,6 +302,7 @@ def test_a_compressed_film_that_holds_both_views_is_followed(tmp_path):
     assert np.allclose(biggest(step, 5).velocity, [-3, 0, 0], atol=0.1)
 
 
+@pytest.mark.filterwarnings("ignore:row_range")  # Of views of noise.
 def test_the_rows_of_a_film_are_not_those_of_its_title():
     card = np.full((240, 320), 20, np.uint8)
     card[100:104, 60:260] = card[120:150, 80:84] = card[120:150, 200:204] = 230
@@ -274,6 +315,58 @@ def test_the_rows_of_a_film_are_not_those_of_its_title():
             step = tracker.update(shown.left, shown.right)
             wrong = np.abs(step.values - shown.disparity[step.rows, step.cols]) > 1
             assert len(step.rows) > 4000 and wrong.mean() < 0.04
+
+
+def test_rows_that_nothing_agrees_with_are_warned_of():
+    shown = small().film()[0]
+    tracker = StereoTracker(disparity_range=(-20, 12))
+    assert tracker.row_offset is None
+    with pytest.warns(UserWarning, match="row_range: .* -4 to 4"):
+        step = tracker.update(shown.left, np.roll(shown.right, 5, axis=0))
+    assert step.rows_doubtful and tracker.row_offset is None
+    step = tracker.update(shown.left, shown.right)
+    assert not step.rows_doubtful
+    assert step.row_offset == tracker.row_offset == pytest.approx(1.0, abs=0.05)
+    assert StereoTracker(row_offset=0.5).row_offset == 0.5
+
+
+def edges_at(left, disparity):
+    """Disparities of a view's edges, NaN elsewhere."""
+    return np.where(np.hypot(*np.gradient(left.astype(float))) > 15, np.float32(disparity), np.float32(np.nan))
+
+
+def test_disparities_outside_of_the_range_are_left_out_and_told():
+    left, _ = next(film())
+    disparity = edges_at(left, 5)
+    near = np.isfinite(disparity)
+    disparity[:, 80:][near[:, 80:]] = 60
+    tracker = StereoTracker(n_components=4, **SMALL)
+    with pytest.warns(UserWarning, match=r"disparity: \d+ of \d+ are outside of disparity_range, \(-8, 8\)"):
+        step = tracker.update_disparity(left, disparity)
+    assert step.left_out == near[:, 80:].sum() > 100
+    assert len(step.rows) == len(step.cluster_of_pixel) == near[:, :80].sum() > 100
+    assert (step.values == 5).all() and all(abs(cluster.mean[2] - 5) < 0.5 for cluster in step.clusters)
+    tracker = StereoTracker(n_components=4, grid=(30, 40, 72), disparity_range=(-8, 8))
+    step = tracker.update_disparity(left, disparity)
+    assert step.left_out == 0 and {round(cluster.mean[2]) for cluster in step.clusters} == {5, 60}
+
+
+@pytest.mark.parametrize("truth", [5.0, 5.45, -3.3])
+def test_depth_is_that_of_the_pixels_and_not_of_their_layers(truth):
+    left, _ = next(film())
+    cameras = {"focal": 200.0, "baseline": 0.1, "d_infinity": -10.0}
+    for given in (truth + np.random.default_rng(3).normal(0, 0.05, left.shape), np.full(left.shape, np.rint(truth))):
+        # More components would share out the pixels by their layers.
+        tracker = StereoTracker(n_components=1, **SMALL, **cameras)
+        step = tracker.update_disparity(left, edges_at(left, given))
+        for cluster in step.clusters:
+            off = abs(cluster.mean[2] - truth)
+            # What is given in whole px is known to half of one.
+            assert off < (0.03 if given.std() > 0 else 0.46)
+            assert off < 2 * np.sqrt(cluster.covariance[2, 2])
+            assert cluster.depth == pytest.approx(20 / (cluster.mean[2] + 10))
+            assert tracker.tracks[cluster.track_id].positions[0, 2] == cluster.mean[2]
+            assert np.linalg.eigvalsh(cluster.covariance).min() > 0
 
 
 def test_known_cameras_give_depth_and_speed():
@@ -329,6 +422,33 @@ def test_nothing_to_see_is_a_step_without_clusters(mode):
         assert bool(step.clusters) == bool((left != grey).any())
         assert len(step.rows) == len(step.cluster_of_pixel)
     assert step.time == 5
+
+
+def test_nobody_knows_how_anything_moved_to_or_from_a_pair_of_nothing():
+    grey = np.full((120, 160), 90, np.uint8)
+    tracker = StereoTracker("paper", n_components=6, **SMALL)
+    views = list(film())
+    for left, right in [views[0], views[1], (grey, grey), views[3], views[4]]:
+        tracker.update(left, right)
+    nodes = tracker.graph.nodes
+    known = {name: {t: [np.isfinite(getattr(c, name)).any() for (at, _), c in nodes.items() if at == t] for t in (0, 1, 3, 4)} for name in ("velocity", "next_velocity")}
+    assert not any(known["velocity"][3]) and not any(known["next_velocity"][1])
+    assert any(known["velocity"][1]) and any(known["velocity"][4]) and any(known["next_velocity"][0]) and any(known["next_velocity"][3])
+
+
+@pytest.mark.parametrize("dark", [0.0, 0.005])
+def test_a_film_of_floats_may_begin_with_black(dark):
+    rng = np.random.default_rng(5)
+    views = [[(view + rng.normal(0, 2, view.shape)).astype(np.float32) for view in pair] for pair in film()]
+    usual, late = (StereoTracker(n_components=6, **SMALL) for _ in range(2))
+    late.update(*(np.float32(dark) * view for view in views[0]))
+    for pair in views:
+        seen, step = usual.update(*pair), late.update(*pair)
+    assert abs(len(step.rows) - len(seen.rows)) <= 0.01 * len(seen.rows)
+    for disparity, velocity in ((-4, [2, 0, 0]), (5, [-3, 0, 0])):
+        cluster = biggest(step, disparity)
+        assert np.allclose(cluster.velocity, velocity, atol=0.1)
+        assert cluster.residual < 10
 
 
 def test_a_track_rests_while_nothing_is_seen():
@@ -399,6 +519,7 @@ def test_views_that_do_not_fit_are_refused_with_both_shapes():
         ("arc_threshold", float("nan")),
         ("grid", (0, 80, None)),
         ("grid", (60, 80)),
+        ("grid", (60, 80, 63)),
         ("matching", "nothing"),
         ("tol", "quickly"),
         ("threads", 0),

@@ -6,6 +6,7 @@ use crate::cli::interrupt::Watch;
 use crate::cli::open::preprocess;
 use crate::cli::progress::Bar;
 use crate::cli::report::{Report, tell};
+use crate::cli::stereo::rows_doubted;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::pipeline::{
@@ -48,7 +49,7 @@ impl TrackCommand {
         let object = json!({
             "command": "track", "method": self.tracker.method, "mode": mode, "input": name, "fps": numbering.rate,
             "frames": summary.pairs, "edge_pixels": summary.pixels, "clusters": summary.clusters, "tracks": summary.tracks,
-            "row_offset": summary.row_offset, "files": summary.files, "seconds": summary.seconds, "output": output,
+            "row_offset": summary.row_offset, "rows_doubtful": summary.rows_doubtful, "files": summary.files, "seconds": summary.seconds, "output": output,
             "overlay": self.output.overlay, "disparity_overlay": self.stereo.disparity_overlay, "graph": self.stereo.graph,
             "interrupted": interrupted,
         });
@@ -112,5 +113,5 @@ fn in_words(summary: &StereoSummary, output: Option<&Path>) -> String {
     parts.extend(summary.row_offset.map(|rows| format!("row offset {rows:.2}")));
     parts.push(format!("{:.2} s", summary.seconds));
     parts.extend(files_in_words(summary.files, output));
-    parts.join(", ")
+    parts.join(", ") + &rows_doubted(summary.rows_doubtful)
 }

@@ -69,8 +69,7 @@ impl<T: SimdReal> Comparison<'_, T> {
 
 /// The upper median; nothing of nothing.
 fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    crate::math::median(&mut values).unwrap_or(0.0)
 }
 
 /// The share of sites around one that win, by their nearness: half the weight along each axis is its own.

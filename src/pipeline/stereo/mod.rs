@@ -69,6 +69,8 @@ pub struct StereoSummary {
     pub tracks: usize,
     /// How many rows lower the right view shows a point, where that was found or given once for all pairs.
     pub row_offset: Option<f64>,
+    /// Pairs whose views hardly agree with any row offset that was searched.
+    pub rows_doubtful: usize,
     /// Files written.
     pub files: usize,
     /// The last of them, under the name that it really has.
@@ -135,6 +137,7 @@ impl StereoRun {
             self.summary.pairs += 1;
             self.summary.pixels += step.rows.len();
             self.summary.clusters += step.clusters.len();
+            self.summary.rows_doubtful += usize::from(step.rows_doubtful);
         }
         match self.summary.pairs {
             0 | 1 => {

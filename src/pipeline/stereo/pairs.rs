@@ -17,7 +17,7 @@ pub struct GreyPair {
     pub grey: [Frame<f32>; 2],
 }
 
-/// Reads pairs ahead, on a thread of their own, and prepares them. The first left view decides what the white of floats is.
+/// Reads pairs ahead, on a thread of their own, and prepares them. The first views decide what the white of floats is, unless they are too dark to.
 pub struct GreyPairs {
     pairs: Prefetch<[AnyFrame; 2]>,
     total: usize,
@@ -48,7 +48,11 @@ impl GreyPairs {
     pub fn next(&mut self, done: usize, progress: &dyn Progress) -> Result<Option<GreyPair>> {
         progress.step(done, self.total)?;
         let Some(views) = self.pairs.next(|| progress.step(done, self.total))? else { return Ok(None) };
-        let levels = *self.levels.get_or_insert_with(|| GreyLevels::decide_together(&views));
+        let levels = match self.levels {
+            Some(known) => known.revised(&views),
+            None => GreyLevels::decide_together(&views),
+        };
+        self.levels = Some(levels);
         let prepared = |view: &AnyFrame| {
             let frame = self.threads.install(|| self.preprocess.apply(view.to_real::<f64>()));
             GreyLevels::scaled(frame, levels.gain(view)).map(|&value| value as f32)

@@ -154,7 +154,7 @@ impl TrackRun {
         };
         let first = next(0)?.ok_or_else(|| too_few(0))?;
         let mut size = Some(first.size());
-        let levels = GreyLevels::decide(&first);
+        let mut levels = GreyLevels::decide(&first);
         let Begun { mut trackers, sinks } = begin(&self.prepared(&first, levels))?;
         self.sinks = sinks;
         let states: Vec<TrackState> = trackers.iter().map(|tracker| tracker.state().clone()).collect();
@@ -162,6 +162,7 @@ impl TrackRun {
         drop(first);
         while let Some(frame) = next(self.summary.frames)? {
             check_size(&mut size, frame.size(), self.numbering.index(self.summary.frames))?;
+            levels = levels.revised(std::slice::from_ref(&frame));
             let grey = self.prepared(&frame, levels);
             let states = self.threads.install(|| {
                 trackers.par_iter_mut().map(|tracker| tracker.update(&grey)).collect::<Result<Vec<TrackState>>>()

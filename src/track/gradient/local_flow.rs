@@ -66,11 +66,7 @@ pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>) -> f64 {
 
 /// The middle value (the upper one of two); 0 of nothing.
 pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    crate::math::median(values).unwrap_or(0.0)
 }
 
 impl LocalFlowOptions {

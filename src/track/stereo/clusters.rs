@@ -2,6 +2,7 @@
 
 use super::succession::reordered;
 use super::voxels::{EdgePoints, Lattice, Voxels};
+use crate::math::median;
 
 /// Label of a place that no cluster is at.
 const NOBODY: u16 = u16::MAX;
@@ -68,6 +69,12 @@ impl Clusters {
     /// Voxels of a cluster.
     pub fn cells(&self, cluster: usize) -> impl Iterator<Item = [u16; 3]> + '_ {
         self.members[cluster].iter().map(|&n| self.voxels.cells[n as usize])
+    }
+
+    /// Median disparity of a cluster's pixels, px; `None` for a cluster without any.
+    pub fn disparity(&self, cluster: usize) -> Option<f64> {
+        let mut along: Vec<f64> = self.pixels[cluster].iter().map(|&i| self.points.at(i as usize)[2]).collect();
+        median(&mut along)
     }
 
     /// Distinct `(ix, iy)` of a cluster: its template.

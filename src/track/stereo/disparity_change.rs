@@ -1,5 +1,6 @@
 //! Motion in depth at edge pixels: the disparity at the moved pixels less that at the pixels themselves.
 
+use crate::math::median;
 use crate::types::Frame;
 
 /// Farthest that an edge pixel of the next step is from where a pixel went, px.
@@ -33,10 +34,9 @@ pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
     if values.len() < 3 {
         return None;
     }
-    let middle = values.len() / 2;
-    let mut mean = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let mut mean = median(values)?;
     let mut sizes: Vec<f64> = values.iter().map(|value| (value - mean).abs()).collect();
-    let deviation = (MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_DEVIATION);
+    let deviation = (MAD * median(&mut sizes)?).max(LEAST_DEVIATION);
     for _ in 0..ROUNDS {
         let (mut sum, mut weights) = (0.0, 0.0);
         for value in &*values {

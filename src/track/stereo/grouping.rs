@@ -2,6 +2,7 @@
 
 use super::clusters::Clusters;
 use super::options::Grouping;
+use crate::math::median;
 
 /// Motion of a cluster, as grouping needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +36,7 @@ impl GroupMotion {
 pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limits: &Grouping) -> Vec<usize> {
     let count = clusters.components();
     let mut parent: Vec<usize> = (0..count).collect();
-    let disparities: Vec<f64> = (0..count).map(|k| middle_disparity(clusters, k)).collect();
+    let disparities: Vec<f64> = (0..count).map(|k| clusters.disparity(k).unwrap_or(f64::NAN)).collect();
     let touching = neighbours(clusters, limits.reach);
     for (a, b) in touching {
         let (Some(first), Some(second)) = (motions[a], motions[b]) else { continue };
@@ -49,17 +50,6 @@ pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limit
         }
     }
     (0..count).map(|k| root(&parent, k)).collect()
-}
-
-/// Median disparity of a cluster's pixels, px.
-fn middle_disparity(clusters: &Clusters, k: usize) -> f64 {
-    median(clusters.pixels[k].iter().map(|&i| clusters.points.at(i as usize)[2]).collect()).unwrap_or(f64::NAN)
-}
-
-/// The middle one of some numbers.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 fn root(parent: &[usize], mut k: usize) -> usize {
@@ -111,14 +101,14 @@ fn neighbours(clusters: &Clusters, reach: f64) -> Vec<(usize, usize)> {
 /// Median distance of two motions over the pixels of both clusters, px.
 fn median_difference(clusters: &Clusters, both: [usize; 2], motions: [&GroupMotion; 2]) -> f64 {
     let pixels = both.iter().flat_map(|&k| &clusters.pixels[k]);
-    let differences: Vec<f64> = pixels
+    let mut differences: Vec<f64> = pixels
         .map(|&i| {
             let [x, y, _] = clusters.points.at(i as usize);
             let [[u, v], [s, t]] = [motions[0].at(x, y), motions[1].at(x, y)];
             (u - s).hypot(v - t)
         })
         .collect();
-    median(differences).unwrap_or(f64::INFINITY)
+    median(&mut differences).unwrap_or(f64::INFINITY)
 }
 
 #[cfg(test)]

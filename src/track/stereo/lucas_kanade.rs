@@ -5,6 +5,7 @@ mod visible;
 pub(super) use visible::{following, visible_motion};
 
 use crate::image::GaussianSmoother;
+use crate::math::median;
 use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
 
@@ -108,8 +109,7 @@ pub(super) fn affine_motion(
 pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|i| {
         let mut along: Vec<f64> = pixels.iter().map(|pixel| pixel[i]).collect();
-        let half = along.len() / 2;
-        if along.is_empty() { f64::NAN } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
+        median(&mut along).unwrap_or(f64::NAN)
     })
 }
 

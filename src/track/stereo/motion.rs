@@ -6,6 +6,7 @@ use super::disparity_change::{nearest, robust_mean};
 use super::lucas_kanade::{PlaneMotion, SmoothedLevels, affine_motion, following, visible_motion};
 use super::options::StereoTrackerOptions;
 use super::overlap::{Row, depth_motion};
+use crate::math::median;
 use crate::types::{AffineFlow, Frame};
 use rayon::prelude::*;
 
@@ -37,8 +38,12 @@ pub(super) struct CellMotion {
     pub overlaps: Row,
 }
 
-/// Motion in cells of all clusters towards another step: (29), then (30) to (32). `None` for empty ones and those whose template leaves the picture.
+/// Motion in cells of all clusters towards another step: (29), then (30) to (32). `None` for empty ones, those whose template leaves the picture, and all where the other step has no
+/// edge pixels: every template fits somewhere in a picture of nothing.
 pub(super) fn cell_motions(from: &Seen, to: &Seen, options: &StereoTrackerOptions) -> Vec<Option<CellMotion>> {
+    if to.clusters.points.is_empty() {
+        return vec![None; from.clusters.components()];
+    }
     let reach = options.search as i32;
     let one = |k: usize| {
         let template = from.clusters.template(k);
@@ -69,12 +74,9 @@ impl FineMotion {
     /// From both parts of a motion and the pixels `(x, y)` that follow it.
     fn new(plane: PlaneMotion, depth: f64, following: &[[f64; 2]]) -> Self {
         let flows = following.iter().map(|[x, y]| plane.flow.at_offset(x - plane.centre[0], y - plane.centre[1]));
-        let (along_x, along_y): (Vec<f64>, Vec<f64>) = flows.unzip();
-        let median = |mut along: Vec<f64>, otherwise: f64| {
-            let half = along.len() / 2;
-            if along.is_empty() { otherwise } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
-        };
-        let typical = [median(along_x, plane.flow.u), median(along_y, plane.flow.v), depth];
+        let (mut along_x, mut along_y): (Vec<f64>, Vec<f64>) = flows.unzip();
+        let typical =
+            [median(&mut along_x).unwrap_or(plane.flow.u), median(&mut along_y).unwrap_or(plane.flow.v), depth];
         Self { plane, depth, typical }
     }
 
@@ -235,6 +237,21 @@ fn starts(from: &Seen, next: &CellLuminance, k: usize, guess: Guess, options: &S
 mod tests {
     use super::super::clusters::tests::made_up;
     use super::*;
+
+    #[test]
+    fn a_picture_of_nothing_has_no_motion_either_way() {
+        let cells: Vec<_> = (0..40).map(|i| ([20 + i % 5, 30 + i / 5, 40], 0)).collect();
+        let options = StereoTrackerOptions::new(super::super::options::StereoMode::Paper);
+        let seen = |clusters: Clusters, level: &dyn Fn(usize, usize) -> f32| {
+            let luminance = CellLuminance::new(&Frame::from_fn(640, 480, level), clusters.lattice(), 64);
+            Seen { clusters, luminance, levels: None }
+        };
+        let one = seen(made_up(&cells, 1), &|x, y| ((x / 8 * 37 + y / 8 * 11) % 256) as f32);
+        let nothing = seen(made_up(&[], 0), &|_, _| 0.0);
+        assert_eq!(cell_motions(&one, &nothing, &options), [None]);
+        assert_eq!(cell_motions(&nothing, &one, &options), []);
+        assert_eq!(cell_motions(&one, &one, &options)[0].as_ref().map(|motion| motion.shift), Some([0, 0, 0]));
+    }
 
     #[test]
     fn the_noise_is_that_of_most_pixels() {

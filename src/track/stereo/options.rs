@@ -37,7 +37,7 @@ pub struct VoxelGrid {
     pub columns: usize,
     /// Cells along y; default 60.
     pub rows: usize,
-    /// Layers of one disparity each; default 64. Farther disparities are counted in the last one.
+    /// Layers of one disparity each; default 64. The disparity after the last layer's is counted in it, and so is what refinement led at most 1.5 px farther; anything else is left out.
     pub layers: usize,
     /// Disparity of the first layer, px; default -40.
     pub first_disparity: i32,
@@ -256,6 +256,14 @@ impl StereoTrackerOptions {
             let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
             return Err(Error::argument("grid", expected, format!("({rows}, {columns}, {layers})")));
         }
+        let ([least, greatest], first) = (self.disparity_range, i64::from(self.grid.first_disparity));
+        if i64::from(least) < first || i64::from(greatest) > first + layers as i64 {
+            let expected = format!(
+                "layers for the disparities {least} to {greatest}, at least {}",
+                i64::from(greatest) - i64::from(least)
+            );
+            return Err(Error::argument("grid", expected, format!("{layers} from {first}")));
+        }
         if !(1..=64).contains(&self.search) {
             return Err(Error::argument("search", "1 to 64 cells", self.search));
         }
@@ -313,6 +321,11 @@ mod tests {
             options.check().unwrap_err().to_string()
         };
         assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
+        let message = with(|o| o.grid.layers = 63);
+        assert!(message.starts_with("grid: ") && message.contains("-40 to 24, at least 64"), "{message}");
+        assert!(with(|o| o.grid.first_disparity = -39).starts_with("grid: "));
+        assert!(with(|o| o.disparity_range = [0, 40]).starts_with("grid: "));
+        assert!(StereoTrackerOptions::default().with_disparities([3, 3]).check().is_ok());
         for wrong in [0, MOST_COMPONENTS + 1, 100_000] {
             let options = StereoTrackerOptions { components: wrong, ..StereoTrackerOptions::default() };
             let message = options.check().unwrap_err().to_string();

@@ -17,6 +17,12 @@ pub struct Step {
     pub disparities: Vec<f32>,
     /// The component that each belongs to.
     pub labels: Vec<u32>,
+    /// Disparities that no layer of the grid holds, which take no part.
+    pub left_out: usize,
+    /// How many rows lower the right view shows a point, px, as the views were matched; none where disparities were given.
+    pub row_offset: Option<f64>,
+    /// Whether that was searched and the views hardly agree with it, see [`EdgeDisparity`](crate::stereo::EdgeDisparity::rows_doubtful).
+    pub rows_doubtful: bool,
     /// Rounds of the mixture; 0 where there was nothing to cluster.
     pub rounds: usize,
 }

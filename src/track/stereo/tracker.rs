@@ -85,11 +85,13 @@ impl StereoTracker {
     pub fn update(&mut self, left: &Frame<f32>, right: &Frame<f32>) -> Result<Step> {
         self.check(left, &EdgePoints::default())?;
         let found = self.rows.match_next(left, right, &self.options.matching_options(None))?;
-        let EdgeDisparity { rows, columns, values: disparities, .. } = found;
-        self.update_edges(left, EdgePoints { columns, rows, disparities })
+        let EdgeDisparity { rows, columns, values: disparities, row_offset, rows_doubtful, .. } = found;
+        let step = self.update_edges(left, EdgePoints { columns, rows, disparities })?;
+        Ok(Step { row_offset: Some(row_offset), rows_doubtful, ..step })
     }
 
-    /// The next step from the left view (grey levels, 0 to 255) and the disparities of its edge pixels. No edge pixels give a step without clusters.
+    /// The next step from the left view (grey levels, 0 to 255) and the disparities of its edge pixels. No edge pixels give a step without clusters; those more than 1.5 px beyond the disparities that
+    /// the grid has layers for are left out, and counted.
     ///
     /// # Errors
     /// [`Error::Argument`] named `left` for a view of another size than before, `points` for pixels outside of it, disparities that are not finite or lists of different length.
@@ -128,12 +130,14 @@ impl StereoTracker {
     }
 
     fn advance(&mut self, left: &Frame<f32>, points: EdgePoints, lattice: Lattice) -> Result<Step> {
+        let (points, left_out) = points.within(&lattice);
         let voxels = Voxels::count(&points, lattice);
         let luminance = CellLuminance::new(left, &lattice, self.options.luminance_levels);
-        let (step, seen, posterior) = match self.options.mode {
+        let (mut step, seen, posterior) = match self.options.mode {
             StereoMode::Paper => self.advance_as_printed(points, voxels, luminance)?,
             StereoMode::Improved => self.advance_carried(left, points, voxels, luminance)?,
         };
+        step.left_out = left_out;
         self.lattice = Some(lattice);
         self.last = Some(seen);
         self.posterior = posterior;

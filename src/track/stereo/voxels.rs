@@ -5,6 +5,8 @@ use crate::types::Frame;
 
 /// Mark of a voxel that nothing is in.
 const EMPTY: u32 = u32::MAX;
+/// Farthest from a whole disparity that its refinement leads: half a pixel by the fit between candidates, one by Lucas-Kanade, px.
+const REFINED: f64 = 1.5;
 
 /// Edge pixels of the left view with their disparities: points `(x, y, d)`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,6 +31,21 @@ impl EdgePoints {
             }
         }
         points
+    }
+
+    /// Those whose disparity is in one of the grid's layers, and how many others there were.
+    pub(super) fn within(self, lattice: &Lattice) -> (Self, usize) {
+        let all = self.len();
+        let held: Vec<bool> = self.disparities.iter().map(|&d| lattice.holds(f64::from(d))).collect();
+        if held.iter().all(|held| *held) {
+            return (self, 0);
+        }
+        let kept =
+            |values: Vec<u32>| values.into_iter().zip(&held).filter(|(_, held)| **held).map(|(v, _)| v).collect();
+        let disparities = self.disparities.into_iter().zip(&held).filter(|(_, held)| **held).map(|(d, _)| d).collect();
+        let points = Self { columns: kept(self.columns), rows: kept(self.rows), disparities };
+        let left_out = all - points.len();
+        (points, left_out)
     }
 
     /// How many.
@@ -69,6 +86,12 @@ impl Lattice {
     /// Row of cells of each row of pixels: `floor(60 y / H)`.
     pub fn cell_rows(&self) -> Vec<u16> {
         (0..self.size.1).map(|y| (y * self.grid.rows / self.size.1) as u16).collect()
+    }
+
+    /// Whether a disparity is in one of the layers: as far beyond the first and the last one as fractions of a pixel may lead from a whole disparity that was looked for.
+    pub fn holds(&self, disparity: f64) -> bool {
+        let from_first = disparity - f64::from(self.grid.first_disparity);
+        (-REFINED..=self.grid.layers as f64 + REFINED).contains(&from_first)
     }
 
     /// Layer of a disparity: `round(d)` less the first, the ends taken in.
@@ -210,6 +233,20 @@ pub(super) mod tests {
             assert_eq!(lattice().cell_at(points.at(i)), cell.map(f64::from));
         }
         assert_eq!((voxels.counts, voxels.of_point), (vec![2, 1, 1], vec![0, 0, 1, 2]));
+    }
+
+    #[test]
+    fn what_no_layer_holds_is_left_out_and_counted() {
+        let points = |disparities: &[f32]| EdgePoints {
+            columns: (1..=disparities.len() as u32).collect(),
+            rows: vec![2; disparities.len()],
+            disparities: disparities.to_vec(),
+        };
+        // The last of 64 layers from -40 holds 24 too; refined, what was found there may be 1.5 px farther.
+        let (kept, left_out) = points(&[-41.6, -41.5, 0.0, 25.4, 25.6, 90.0]).within(&lattice());
+        assert_eq!((kept.disparities, kept.columns, kept.rows), (vec![-41.5, 0.0, 25.4], vec![2, 3, 4], vec![2; 3]));
+        assert_eq!(left_out, 3);
+        assert_eq!(points(&[-40.0, 24.0]).within(&lattice()), (points(&[-40.0, 24.0]), 0));
     }
 
     #[test]

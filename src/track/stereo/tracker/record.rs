@@ -8,7 +8,11 @@ use super::super::motion::places;
 use super::super::step::Step;
 use super::StereoTracker;
 use crate::error::Result;
+use crate::math::median;
 use crate::mixture::Posterior;
+
+/// Variance of what is spread evenly over a length of 1.
+const EVEN: f64 = 1.0 / 12.0;
 
 /// What is known of how each cluster came to a step.
 pub(super) struct Arrival {
@@ -83,7 +87,7 @@ impl StereoTracker {
         let mut nodes = Vec::new();
         for (k, arrival) in arrivals.iter().enumerate() {
             let (Some(posterior), false) = (posterior, clusters.pixels[k].is_empty()) else { continue };
-            let mean = lattice.pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
+            let mean = mean(clusters, posterior, k);
             let (depth, metric_velocity) = self.metric(mean, arrival.velocity, lattice.size);
             nodes.push(Node {
                 time: self.time,
@@ -119,6 +123,9 @@ impl StereoTracker {
             columns: clusters.points.columns.clone(),
             disparities: clusters.points.disparities.clone(),
             labels: clusters.of_point.clone(),
+            left_out: 0,
+            row_offset: None,
+            rows_doubtful: false,
             rounds,
         }
     }
@@ -169,18 +176,22 @@ fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], [f64; 3])) 
 fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     let places: Vec<[f64; 3]> =
         clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
-    let median = |mut along: Vec<f64>| {
-        let half = along.len() / 2;
-        if along.is_empty() { f64::NAN } else { *along.select_nth_unstable_by(half, f64::total_cmp).1 }
-    };
-    let middle: [f64; 3] = std::array::from_fn(|i| median(places.iter().map(|place| place[i]).collect()));
-    let off = |i: usize| median(places.iter().map(|place| (place[i] - middle[i]).abs()).collect());
+    let median = |along: &mut dyn Iterator<Item = f64>| median(&mut along.collect::<Vec<_>>()).unwrap_or(f64::NAN);
+    let middle: [f64; 3] = std::array::from_fn(|i| median(&mut places.iter().map(|place| place[i])));
+    let off = |i: usize| median(&mut places.iter().map(|place| (place[i] - middle[i]).abs()));
     (middle, std::array::from_fn(off))
 }
 
-/// Covariance `W_k^-1 / nu_k` of a component in px and disparity.
+/// Mean of a component along x and y, px, and the median disparity of its pixels: the mean of what was counted in whole layers is off by up to half of one, all pixels of a flat thing alike.
+fn mean(clusters: &Clusters, posterior: &Posterior, k: usize) -> [f64; 3] {
+    let [x, y, d] = clusters.lattice().pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
+    [x, y, clusters.disparity(k).unwrap_or(d)]
+}
+
+/// Covariance `W_k^-1 / nu_k` of a component in px and disparity, and what counting in cells hides: that of places spread evenly over a cell.
 fn covariance(posterior: &Posterior, k: usize, cell: [f64; 3]) -> [[f64; 3]; 3] {
     let matrix = &posterior.scale_inverses[9 * k..9 * k + 9];
     let nu = posterior.degrees_of_freedom[k];
-    std::array::from_fn(|i| std::array::from_fn(|j| matrix[3 * i + j] / nu * cell[i] * cell[j]))
+    let within = |i: usize, j: usize| if i == j { EVEN } else { 0.0 };
+    std::array::from_fn(|i| std::array::from_fn(|j| (matrix[3 * i + j] / nu + within(i, j)) * cell[i] * cell[j]))
 }

@@ -1,0 +1,86 @@
+//! Cameras of different gain: the right view with the contrast of the left one.
+
+use crate::types::Frame;
+use std::borrow::Cow;
+
+/// Every how many pixels along x and y one is looked at.
+const SAMPLED: usize = 2;
+/// Shares of the differences in brightness that are above those which are compared.
+const SHARES: [f64; 4] = [0.01, 0.02, 0.04, 0.08];
+/// Smaller differences are noise, grey levels.
+const LEAST: f32 = 2.0;
+/// Factors between which contrasts count as equal: what one view shows beside the other makes as much.
+const EQUAL: [f32; 2] = [0.92, 1.08];
+/// By what factor the ratios may differ; where they do by more, the views differ otherwise than by a gain.
+const ALIKE: f32 = 1.15;
+
+/// The right view times the ratio of both views' contrasts, unless that is nearly 1 or is none. Matching compares gradients, which a gain changes; a bias they do not see.
+pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, Frame<f32>> {
+    match ratio(left, right) {
+        Some(ratio) if !(EQUAL[0]..=EQUAL[1]).contains(&ratio) => Cow::Owned(right.map(|&value| value * ratio)),
+        _ => Cow::Borrowed(right),
+    }
+}
+
+/// Contrast of the left view over that of the right one, where it can be told: the middle of the ratios of both views' greatest differences in brightness, at the same ranks. Only a gain makes all of them alike:
+/// not what covers part of a view, nor a white at which one is cut off.
+fn ratio(left: &Frame<f32>, right: &Frame<f32>) -> Option<f32> {
+    let (left, right) = (greatest_differences(left)?, greatest_differences(right)?);
+    let mut ratios: [f32; SHARES.len()] = std::array::from_fn(|i| left[i] / right[i]);
+    ratios.sort_unstable_by(f32::total_cmp);
+    let [least, below, above, most] = ratios;
+    (most <= ALIKE * least).then_some(0.5 * (below + above))
+}
+
+/// Sizes of the differences across two pixels along x that the shares are above; `None` where these are noise.
+fn greatest_differences(view: &Frame<f32>) -> Option<[f32; SHARES.len()]> {
+    let rows = (0..view.height()).step_by(SAMPLED).map(|y| view.row(y));
+    let sizes = rows.flat_map(|row| row.windows(3).step_by(SAMPLED).map(|three| (three[2] - three[0]).abs()));
+    let mut sizes: Vec<f32> = sizes.filter(|size| size.is_finite()).collect();
+    let count = sizes.len();
+    let mut at = |share: f64| {
+        let place = ((1.0 - share) * count as f64) as usize;
+        let size = (place < count).then(|| *sizes.select_nth_unstable_by(place, f32::total_cmp).1);
+        size.filter(|size| *size >= LEAST)
+    };
+    Some([at(SHARES[0])?, at(SHARES[1])?, at(SHARES[2])?, at(SHARES[3])?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waves, differently arranged for each view.
+    fn view(shift: usize, of: impl Fn(f64) -> f64) -> Frame<f32> {
+        Frame::from_fn(160, 120, |x, y| {
+            let (x, y) = ((x + shift) as f64, y as f64);
+            let waves = 50.0 * (0.31 * x + 0.11 * y).sin() + 35.0 * (0.47 * x - 0.2 * y).cos() + 15.0 * (0.9 * x).sin();
+            of(110.0 + waves * (0.6 + 0.4 * (0.05 * y).sin())) as f32
+        })
+    }
+
+    #[test]
+    fn a_gain_is_taken_out_and_a_bias_left() {
+        let left = view(0, |level| level);
+        for gain in [0.3, 0.5, 0.8, 1.6] {
+            let right = view(9, |level| gain * level + 11.0);
+            let same = balanced(&left, &right);
+            assert!(matches!(same, Cow::Owned(_)), "{gain}");
+            let found = f64::from(same.get(50, 50) / right.get(50, 50)) * gain;
+            assert!((found - 1.0).abs() < 0.05, "{found} for {gain}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_gain_changes_nothing() {
+        let left = view(0, |level| level);
+        let untouched = |right: &Frame<f32>| matches!(balanced(&left, right), Cow::Borrowed(_));
+        assert!(untouched(&view(9, |level| 1.02 * level + 2.0)));
+        assert!(untouched(&view(9, |_| 80.0)) && untouched(&view(9, |_| f64::NAN)));
+        // Most of it covered, or cut off at white.
+        assert!(untouched(&Frame::from_fn(160, 120, |x, y| if x < 130 { 0.0 } else { left.get(x, y) })));
+        assert!(untouched(&view(9, |level| (2.5 * level).min(255.0))));
+        let flat = left.map(|_| 9.0f32);
+        assert!(matches!(balanced(&flat, &left), Cow::Borrowed(_)));
+    }
+}
