@@ -56,7 +56,9 @@ impl Around {
                 for cell in cells {
                     let members = &tree.order()[cell.clone()];
                     let out = members.iter().filter(|&&k| !obeys[k as usize]).count();
-                    members.iter().for_each(|&k| shares[k as usize] = out as f64 / members.len() as f64);
+                    for &k in members {
+                        shares[k as usize] = out as f64 / members.len() as f64;
+                    }
                 }
             }
         }
@@ -87,7 +89,9 @@ fn without(observations: &Observations, found: &Consensus, around: &Around, most
         let obeying = obeying(observations, &motion);
         let obeying: Vec<u32> = obeying.into_iter().filter(|k| found.inliers.binary_search(k).is_ok()).collect();
         let mut obeys = vec![false; observations.n];
-        obeying.iter().for_each(|&k| obeys[k as usize] = true);
+        for &k in &obeying {
+            obeys[k as usize] = true;
+        }
         let rejected = around.rejected(&obeys);
         let mut shares: Vec<f64> = obeying.iter().map(|&k| rejected[k as usize]).collect();
         let usual = median(&mut shares);
