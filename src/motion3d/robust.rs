@@ -177,7 +177,7 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     }
     found.rivals = rivals;
     if found.inliers.len() >= LEAST {
-        let before = coherence::rival(observations, &mut found);
+        let before = coherence::rival(observations, &found);
         found.rivals.extend(before);
     }
     (found.inliers.len() >= LEAST).then_some(found)

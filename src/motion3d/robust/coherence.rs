@@ -66,15 +66,13 @@ impl Around {
     }
 }
 
-/// Leaves inliers out most of whose neighbours are rejected, more than chance would have it. Then the motion of those with hardly a rejected neighbour is compared: it is another where points on the border of a thing belong to that.
-pub(super) fn rival(observations: &Observations, found: &mut Consensus) -> Option<Rival> {
+/// The motion of the inliers with hardly a rejected neighbour, where it is another than that of all: then points on the border of a thing belong to that.
+pub(super) fn rival(observations: &Observations, found: &Consensus) -> Option<Rival> {
     if observations.n < ENOUGH {
         return None;
     }
     let around = Around::new(observations);
-    let (motion, inliers) = without(observations, found, &around, 0.5);
-    (found.motion, found.inliers) = (motion, inliers);
-    let (inner, fewer) = without(observations, found, &around, 0.0);
+    let (inner, fewer) = without(observations, found, &around);
     (fewer.len() < found.inliers.len() && differ(observations, found, &inner, &fewer)?).then_some(Rival {
         motion: inner,
         excess: 0.0,
@@ -82,8 +80,8 @@ pub(super) fn rival(observations: &Observations, found: &mut Consensus) -> Optio
     })
 }
 
-/// The motion and the inliers without those that have a larger share of rejected neighbours than `most`, and than is usual.
-fn without(observations: &Observations, found: &Consensus, around: &Around, most: f64) -> (Motion, Vec<u32>) {
+/// The motion and the inliers without those that have a larger share of rejected neighbours than is usual.
+fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
     for _ in 0..ROUNDS {
         let obeying = obeying(observations, &motion);
@@ -96,7 +94,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Around, most
         let mut shares: Vec<f64> = obeying.iter().map(|&k| rejected[k as usize]).collect();
         let usual = median(&mut shares);
         let deviation = (usual.max(1.0 / NEAREST as f64) * (1.0 - usual) / NEAREST as f64).sqrt();
-        let limit = most.max(usual + MORE * deviation);
+        let limit = usual + MORE * deviation;
         let kept: Vec<u32> = obeying.into_iter().filter(|&k| rejected[k as usize] <= limit).collect();
         if kept == inliers || kept.len() < LEAST {
             break;
