@@ -206,6 +206,7 @@ def pixels(trials: int) -> list[Row]:
         columns: dict[str, list[float]] = {column: [] for column in ("ML", "efficient", *rivals.METHODS)}
         turns: dict[str, list[float]] = {column: [] for column in ("efficient", *rivals.METHODS)}
         labels, ideal, bounds = [], [], []
+        inside: dict[str, list[bool]] = {"sigma": [], "unknown sigma": []}
         for seed in range(trials):
             make = scenes.two_views(depth, name, sigma, median, seed, **disturbed)  # type: ignore[arg-type]
             found = motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=bool(disturbed), method="efficient")
@@ -213,7 +214,12 @@ def pixels(trials: int) -> list[Row]:
             columns["efficient"].append(angle(found.translation, make.u))
             turns["efficient"].append(1e3 * float(np.linalg.norm(found.rotation - make.w)))
             labels.append(float(np.mean(found.inliers == make.inliers)))
-            if not disturbed:
+            if disturbed:
+                unknown = motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="efficient")
+                for kind, told in zip(inside, (found, unknown), strict=True):
+                    if told.status == "ok":
+                        inside[kind].append(squared(error(make, told.translation, told.rotation, told.tangent), told.covariance) < 11.070)
+            else:
                 near = {"initial": (make.u, make.w), "weight_inv_depth": make.depths}
                 ideal.append(angle(motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, method="efficient", **near).translation, make.u))  # type: ignore[arg-type]
                 bounds.append(float(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, sigma=sigma).direction_std[0]))
@@ -232,6 +238,9 @@ def pixels(trials: int) -> list[Row]:
         row["rot mrad eff."] = round(float(np.median(turns["efficient"])), 2)
         row["rot mrad MAGSAC"] = round(float(np.nanmedian(turns["USAC_MAGSAC"])), 2) if turns["USAC_MAGSAC"] else ""
         row["right labels %"] = round(100 * float(np.mean(labels)), 1) if disturbed else ""
+        for kind, values in inside.items():
+            row[f"coverage, {kind}"] = round(float(np.mean(values)), 2) if values else ""
+            row[f"ok, {kind}"] = len(values) if disturbed else ""
         rows.append(row)
     return rows
 

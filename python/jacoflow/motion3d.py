@@ -17,6 +17,7 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -178,13 +179,13 @@ def estimate_motion(
     method : "auto", "ml" or "efficient"
         "auto": "efficient" from 30 points (5 patches) on, else "ml".
     robust : bool
-        Find the points that obey one motion among up to 60 % that do not.
+        Find the points that obey one motion among up to 60 % that do not. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
     placement : "midpoint" or "start"
         Where on its path a displacement is taken to be the instantaneous flow: half way, exact to second order, or at the start, for flow that is instantaneous. Bearings and their flow are taken as given.
     smoother : "auto", "prior" or "neighbours"
         What depths in the weights are drawn to: one normal distribution, regressions on 8 to 64 neighbours, or the better of them.
     weight_inv_depth : array (N,), units of |u| per frame
-        Inverse depths for the weights, known from elsewhere; noise in them costs variance and causes no bias.
+        Inverse depths for the weights, known from elsewhere, in any unit: a common factor is found. What is wrong with them costs variance, which the covariance tells, and causes no bias; where they have nothing to do with the flow's depths, `ml` is returned (`fell_back`). Points whose value is not finite are left out.
     rotation_prior : (rotation (3,) in rad/frame, covariance (3, 3))
         The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides.
     initial : (translation (3,), rotation (3,) in rad/frame)
@@ -202,7 +203,7 @@ def estimate_motion(
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
         "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "seed": seed, "threads": threads,
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
@@ -212,14 +213,34 @@ def estimate_motion(
 def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLike, ArrayLike] | None:
     if given is None:
         return None
-    if len(given) != 2:
-        raise ValueError(f"{name}: expected two arrays, got {len(given)}")
-    return given[0], given[1]
+    try:
+        parts = tuple(given)
+    except TypeError:
+        raise TypeError(f"{name}: expected two arrays, got {given!r}") from None
+    if len(parts) != 2:
+        raise ValueError(f"{name}: expected two arrays, got {len(parts)}")
+    return parts[0], parts[1]
+
+
+def _whole(name: str, value: int) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected an integer, got {value!r}") from None
+
+
+def _count(name: str, value: int) -> int:
+    count = _whole(name, value)
+    if count < 1:
+        raise ValueError(f"{name}: expected a positive integer, got {count}")
+    return count
 
 
 def _sigma(sigma: float | None) -> float | None:
     if sigma is None:
         return None
+    if isinstance(sigma, str | bytes | bool | np.bool_):
+        raise TypeError(f"sigma: expected a number, got {sigma!r}")
     try:
         return float(sigma)
     except (TypeError, ValueError):
@@ -358,9 +379,9 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px. Points closer than that get larger covariances: times `4 pi l^2 / spacing^2` with the correlation length `l`.
+        Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than that get larger covariances: times `4 pi l^2 / spacing^2` with the correlation length `l`.
     max_points : int or None
-        Most points; the grid is made coarser to keep to it.
+        Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
         Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
     scene : MotionEstimate or None

@@ -14,7 +14,7 @@ impl Intrinsics {
     /// From `K`, row by row, px.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `K` unless its last row is `(0, 0, 1)`, everything is finite and its determinant is positive.
+    /// [`Error::Argument`] naming `K` unless it is an upper triangle with the last row `(0, 0, 1)`, finite and with positive focal lengths.
     pub fn new(matrix: [[f64; 3]; 3]) -> Result<Self> {
         let k = Matrix3::from_fn(|i, j| matrix[i][j]);
         let refuse =
@@ -25,12 +25,15 @@ impl Intrinsics {
         if matrix[2] != [0.0, 0.0, 1.0] {
             return refuse(format!("the last row {:?}", matrix[2]));
         }
-        let determinant = k[(0, 0)] * k[(1, 1)] - k[(0, 1)] * k[(1, 0)];
+        if matrix[1][0] != 0.0 {
+            return refuse(format!("K[1][0] = {}", matrix[1][0]));
+        }
+        if !(matrix[0][0] > 0.0 && matrix[1][1] > 0.0) {
+            return refuse(format!("the focal lengths {} and {}", matrix[0][0], matrix[1][1]));
+        }
         match k.try_inverse() {
-            Some(inverse) if determinant > 0.0 && inverse.iter().all(|value| value.is_finite()) => {
-                Ok(Self { matrix: k, inverse })
-            }
-            _ => refuse(format!("one with the determinant {determinant}")),
+            Some(inverse) if inverse.iter().all(|value| value.is_finite()) => Ok(Self { matrix: k, inverse }),
+            _ => refuse("one without an inverse".into()),
         }
     }
 
@@ -112,6 +115,8 @@ mod tests {
             [[500.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
             [[f64::NAN, 0.0, 0.0], [0.0, 500.0, 0.0], [0.0, 0.0, 1.0]],
             [[-500.0, 0.0, 0.0], [0.0, 500.0, 0.0], [0.0, 0.0, 1.0]],
+            [[-500.0, 0.0, 0.0], [0.0, -500.0, 0.0], [0.0, 0.0, 1.0]],
+            [[500.0, 0.0, 0.0], [10.0, 500.0, 0.0], [0.0, 0.0, 1.0]],
         ] {
             let message = Intrinsics::new(wrong).unwrap_err().to_string();
             assert!(message.starts_with("K: expected a camera matrix"), "{message}");

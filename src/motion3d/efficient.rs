@@ -47,7 +47,22 @@ impl WeightDepths<'_> {
             Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()] },
         }
     }
+
+    /// What known depths are to be multiplied with to be in the unit of the translation, by least squares against the depths of the flow; `None` where these do not tell: such depths say nothing about the scene.
+    fn unit(&self, observations: &Observations, motion: &Motion) -> Option<f64> {
+        let Self::Known(given) = self else { return Some(1.0) };
+        let own = depths(observations, motion);
+        let (mut along, mut square) = (0.0, 0.0);
+        for k in 0..observations.n {
+            along += own.s2[k] * own.nu[k] * given[k];
+            square += own.s2[k] * given[k] * given[k];
+        }
+        (along.abs() > RELATED * square.sqrt()).then(|| along / square)
+    }
 }
+
+/// Deviations from zero of the factor between known depths and those of the flow, below which they have nothing to do with each other.
+const RELATED: f64 = 3.0;
 
 /// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.
 ///
@@ -59,12 +74,18 @@ pub(super) fn efficient(
 ) -> Option<Efficient> {
     let mut motion = *start;
     let mut smooth = weights.at(observations, &motion);
+    let unit = weights.unit(observations, start)?;
     for round in 0..ROUNDS {
         if round > 0 {
             smooth = weights.at(observations, &motion);
         }
         let before = motion;
-        motion = solve(observations, &before, &smooth.nu)?;
+        motion = if unit == 1.0 {
+            solve(observations, &before, &smooth.nu)?
+        } else {
+            let scaled: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
+            solve(observations, &before, &scaled)?
+        };
         if motion.angle_to(start).to_degrees() > FARTHEST {
             return None;
         }
@@ -72,7 +93,7 @@ pub(super) fn efficient(
             break;
         }
     }
-    told(observations, motion, smooth)
+    told(observations, motion, smooth, matches!(weights, WeightDepths::Known(_)).then_some(unit))
 }
 
 /// The same without a solution: what the weights say about the covariance at `motion`.
@@ -82,17 +103,27 @@ pub(super) fn unsolved(
     mut weights: WeightDepths<'_>,
 ) -> Option<Efficient> {
     let smooth = weights.at(observations, motion);
-    told(observations, *motion, smooth)
+    told(observations, *motion, smooth, None)
 }
 
-fn told(observations: &Observations, motion: Motion, smooth: Smoothed) -> Option<Efficient> {
+/// `known`: the unit of depths that are known from elsewhere.
+fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Option<f64>) -> Option<Efficient> {
     let tangent = tangents(&motion.u());
-    let covariance = sandwich(observations, &motion, &tangent, &smooth)?;
+    let covariance = match known {
+        Some(unit) => {
+            let nu: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
+            known_sandwich(observations, &motion, &tangent, &nu)?
+        }
+        None => sandwich(observations, &motion, &tangent, &smooth)?,
+    };
     Some(Efficient { motion, tangent, covariance, smooth: smooth.nu })
 }
 
 /// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are too noisy to tell it.
 const SLOPES: std::ops::Range<f64> = 0.25..4.0;
+
+/// The least singular value of the slope relative to the largest at which known depths determine the motion.
+const DETERMINED: f64 = 1e-3;
 
 /// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation: `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off, depths from elsewhere).
 fn sandwich(
@@ -113,6 +144,23 @@ fn sandwich(
     let Some(back) = slope.try_inverse() else { return Some(plain) };
     let covariance = back * squares * back.transpose();
     Some(0.5 * (covariance + covariance.transpose()))
+}
+
+/// The same for depths from elsewhere, which no noise of the flow is in: however wrong they are, only what they leave undetermined is not known.
+fn known_sandwich(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> Option<Matrix5> {
+    let squares = information(observations, motion, tangent, nu);
+    let slope = slope(observations, motion, tangent, nu, &vec![0.0; nu.len()]);
+    let whiten = squares.cholesky()?.l().try_inverse()?;
+    let sizes = (whiten * slope * whiten.transpose()).singular_values();
+    let back = slope.try_inverse().filter(|_| sizes.min() > DETERMINED * sizes.max())?;
+    let covariance = back * squares * back.transpose();
+    let covariance = 0.5 * (covariance + covariance.transpose());
+    covariance.cholesky().map(|_| covariance)
 }
 
 /// The root of the equation whose weights are frozen at `start`.

@@ -1,7 +1,7 @@
 //! The whole way from flow to motion.
 
-use super::covariance::plugged;
-use super::efficient::{WeightDepths, unsolved};
+use super::covariance::{Plugged, direction_deviation, plugged};
+use super::efficient::{Efficient, WeightDepths, unsolved};
 use super::intake::whiten;
 use super::likelihood::{Candidate, choose, different, minima};
 use super::motion::Motion;
@@ -13,7 +13,7 @@ use super::result::{Alternative, MotionEstimate, Status};
 use super::robust::{self, Consensus, Rival};
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
-use super::trial::{Trial, close, smoothed};
+use super::trial::{DISTINCT, Trial, close, smoothed};
 use super::verdict::{Evidence, judge};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
@@ -57,6 +57,9 @@ fn check(flow: &Flow<'_>, options: &MotionOptions) -> Result<()> {
         Some(_) if options.robust => {
             Err(Error::argument("initial", "none, as a robust search looks everywhere", "a motion"))
         }
+        Some(m) if m.translation == [0.0; 3] => {
+            Err(Error::argument("initial", "a translation with a direction", "zero"))
+        }
         Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
             Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
         }
@@ -90,6 +93,13 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         sigma,
         unknown: matches!(noise, Noise::Unknown),
     };
+    if let Some(depths) = &options.weight_depths {
+        let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
+        let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
+        if chosen.len() < scaled.observations.n {
+            scaled.observations = scaled.observations.subset(&chosen);
+        }
+    }
     if scaled.observations.n < LEAST {
         let sigma = if scaled.unknown { f64::NAN } else { sigma };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
@@ -109,7 +119,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inliers = scaled.observations.subset(&kept.inliers);
-        on(flow, options, &mut scaled, inliers, Some(&kept), rng)
+        let found = on(flow, options, &mut scaled, inliers, Some(&kept), rng);
+        if kept.doubtful { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -193,8 +204,13 @@ fn on(
     };
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
-    let trial = if wanted || low { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
-    let (improved, undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
+    let several = close(&candidates, inliers.n).len() > 1;
+    let trial = if wanted || low || several { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let (improved, mut undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
+    if let Some(best) = improved.as_ref().filter(|_| !wanted) {
+        undecided = preferred(best, &chosen, plugged.as_ref()).or(undecided);
+    }
+    let improved = improved.filter(|_| wanted || low);
     let unknown = low && improved.is_none();
     let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
     if unknown {
@@ -206,9 +222,19 @@ fn on(
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
         .collect();
-    let evidence = Evidence { likelihood: (*chosen.motion(), chosen.minimum.equations.behind), low, rivals, undecided };
+    let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+    let likelihood = (*chosen.motion(), chosen.minimum.equations.behind);
+    let evidence = Evidence { likelihood, deviation, low, rivals, undecided };
     judge(&inliers, &mut solution, &evidence, rng.stream(4));
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
+}
+
+/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may be true.
+fn preferred(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
+    let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+    let deviation = deviation.max(direction_deviation(&best.covariance));
+    let apart = best.motion.angle_to(chosen.motion()).to_degrees() > DISTINCT * deviation;
+    apart.then_some(Alternative { motion: best.motion, excess: 0.0 })
 }
 
 /// The minimum that a robust search led to, and those that other minima for the same points lead to.

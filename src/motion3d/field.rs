@@ -10,14 +10,20 @@ const INDEPENDENT: f64 = 4.0;
 /// Least spacing, px, where the field does not know how far its errors go together.
 const LEAST_SPACING: f64 = 8.0;
 
+/// Points closer than this many correlation lengths share so much of their errors that neither chance nor outliers can be judged with them as if they did not, and they would tell hardly more.
+const FINEST: f64 = 1.0;
+
+/// Points of a region that a grid which nobody asked for is made finer for.
+const WANTED: usize = 30;
+
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FieldOptions {
-    /// Distance of the points along rows and columns, px; default: 4 correlation lengths of the field, at least 8 px.
+    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 4 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
     pub spacing: Option<f64>,
     /// Only points in this rectangle of pixels.
     pub region: Option<Rect>,
-    /// Most points; the grid is made coarser to keep to it. Default: no limit.
+    /// Most points, of the region if there is one; the grid is made coarser to keep to it. Default: no limit.
     pub most: Option<usize>,
 }
 
@@ -57,10 +63,22 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         return Err(Error::argument("spacing", "a positive number", spacing));
     }
     let step = match field.layout.sites {
-        Sites::Grid { stride, .. } => coarse_enough(field, (spacing / stride as f64).ceil() as usize, options.most),
+        Sites::Grid { stride, .. } => {
+            let steps = |px: f64| ((px / stride as f64).ceil() as usize).max(1);
+            let finest = steps(FINEST * field.layout.correlation_length);
+            let mut step = steps(spacing).max(finest);
+            if options.spacing.is_none() && options.region.is_some() {
+                step = fine_enough(field, step, finest, options.region);
+            }
+            coarse_enough(field, step, options)
+        }
         Sites::Points(_) => 1,
     };
     let shared = shared_by(field, step);
+    let spacing = match field.layout.sites {
+        Sites::Grid { stride, .. } => (step * stride) as f64,
+        Sites::Points(_) => spacing,
+    };
     let mut out = FieldPoints { spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
@@ -71,7 +89,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             let Some(covariance) = field.covariance_at(site) else { continue };
             let m = field.affine(site).to_array().map(Real::to_f64);
             let (x, y) = field.layout.sites.pixel(column, row);
-            if !options.region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y)) {
+            if !within(options.region, x, y) {
                 continue;
             }
             out.points.push([x as f64, y as f64]);
@@ -93,11 +111,32 @@ fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
     (4.0 * std::f64::consts::PI * length * length / (spacing * spacing)).max(1.0)
 }
 
-/// The least step of at least `step` that leaves no more than `most` points.
-fn coarse_enough<T>(field: &FlowField<T>, step: usize, most: Option<usize>) -> usize {
-    let count = |step: usize| (field.width.div_ceil(step)) * (field.height.div_ceil(step));
+/// Whether a pixel lies in the region, which is everything where there is none.
+fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
+    region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
+}
+
+/// Sites of a grid with that step inside the region.
+fn count<T>(field: &FlowField<T>, step: usize, region: Option<Rect>) -> usize {
+    let rows = |column: usize| {
+        let inside = |row: &usize| {
+            let (x, y) = field.layout.sites.pixel(column, *row);
+            within(region, x, y)
+        };
+        (step / 2..field.height).step_by(step).filter(inside).count()
+    };
+    (step / 2..field.width).step_by(step).map(rows).sum()
+}
+
+/// The largest step of at most `step` that has points enough in the region, down to `finest`.
+fn fine_enough<T>(field: &FlowField<T>, step: usize, finest: usize, region: Option<Rect>) -> usize {
+    (finest..=step).rev().find(|&step| count(field, step, region) >= WANTED).unwrap_or(finest)
+}
+
+/// The least step of at least `step` that leaves no more than the most points wanted.
+fn coarse_enough<T>(field: &FlowField<T>, step: usize, options: &FieldOptions) -> usize {
     let mut step = step.max(1);
-    while most.is_some_and(|most| count(step) > most.max(1)) {
+    while options.most.is_some_and(|most| count(field, step, options.region) > most.max(1)) {
         step += 1;
     }
     step
@@ -138,8 +177,26 @@ mod tests {
         let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
         let covariance = field_points(&field, &dense).unwrap().covariances[0];
         assert!((covariance / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{covariance}");
+        let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
+        assert_eq!(field_points(&field, &denser).unwrap().spacing, 3.0);
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
+    }
+
+    #[test]
+    fn a_region_has_its_own_grid_and_its_own_most() {
+        let field = field();
+        let region = Some(Rect { x: 10, y: 5, width: 40, height: 30 });
+        let inside = |options: FieldOptions| field_points(&field, &options).unwrap();
+        let found = inside(FieldOptions { region, ..FieldOptions::default() });
+        assert!(found.points.len() >= 30 && found.spacing < 10.0, "{} {}", found.points.len(), found.spacing);
+        assert!(found.covariances[0] > 0.25);
+        // As many as are wanted in the region, whatever the rest of the field has.
+        let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
+        assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
+        // Asked for, a spacing stays.
+        let asked = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
+        assert_eq!((asked.spacing, asked.points.len()), (10.0, 12));
     }
 
     #[test]

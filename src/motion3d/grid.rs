@@ -87,7 +87,7 @@ pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion
 }
 
 /// The 0.95 quantile of chi-squared with five degrees of freedom.
-const PLAUSIBLE: f64 = 11.07;
+pub(super) const PLAUSIBLE: f64 = 11.07;
 
 /// The largest angle, degrees, between the direction of one of `motions` (the first: the estimate) and any direction of the half sphere that explains the flow as well as the best of them, depth signs included.
 ///
@@ -105,7 +105,7 @@ pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion]
     let Some(least) = motions.iter().filter_map(|m| cost(&m.u())).map(|(_, j, b)| j + b).reduce(f64::min) else {
         return 0.0;
     };
-    let limit = least + PLAUSIBLE * searched.n as f64 / observations.n as f64;
+    let limit = least + PLAUSIBLE;
     let first = motions[0].u();
     let angles = evaluate(|u| {
         // Signs are looked at only where the residuals alone would do.

@@ -83,7 +83,7 @@ pub struct MotionOptions {
     pub placement: Placement,
     /// Which predictors smooth depths for the weights; default: the better one.
     pub smoother: Smoother,
-    /// Inverse depths for the weights, one for each point, known from elsewhere up to a common factor's noise; default: smoothed from the flow.
+    /// Inverse depths for the weights, one for each point, known from elsewhere up to a common factor; points whose value is not finite are left out; default: smoothed from the flow.
     pub weight_depths: Option<Vec<f64>>,
     /// A motion near which the minimum is looked for, instead of everywhere; not with `robust`.
     pub initial: Option<Motion>,

@@ -2,22 +2,27 @@
 //!
 //! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum likelihood worse than flow alone, so that they are shrunk.
 
+mod report;
 mod shrink;
 mod system;
+mod verdict;
 
 use super::bound::{MotionBound, check_truth, not_determined};
 use super::camera::Intrinsics;
-use super::covariance::{Matrix5, direction_deviation, inverse, plugged_in};
+use super::covariance::{inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement};
-use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
-use super::special::by_chance;
+use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use super::special::{RotationOnly, by_chance};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
-use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
+use report::{tell, turning_report};
 use shrink::shrunk;
+use std::collections::HashSet;
 use system::{Patch, System};
+use verdict::{Evidence, judge};
 
 /// Patches with their affine flow, N of each.
 #[derive(Debug, Clone, Copy)]
@@ -41,9 +46,6 @@ const SMOOTHED: usize = 5;
 const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
-
-/// Standard deviation of the direction, degrees, beyond which it is not known.
-const WIDE: f64 = 20.0;
 
 impl AffinePatches<'_> {
     fn check(&self) -> Result<()> {
@@ -94,7 +96,7 @@ impl AffinePatches<'_> {
 /// The rigid motion that explains the affine flow of patches.
 ///
 /// As [`estimate_motion`](super::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5 patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches. Patches should
-/// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so.
+/// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so. Other minima and opposite directions that no patch behind the camera excludes are told as for points.
 ///
 /// # Errors
 /// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth` and `rotation_prior`, which this form does not have.
@@ -110,19 +112,23 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         _ => {}
     }
     let system = patches.system(options.placement);
-    Ok(options.threads.check()?.install(|| estimate(&system, patches.points.len(), options)))
+    Ok(options.threads.check()?.install(|| estimate(&system, patches.points, options)))
 }
 
-fn estimate(system: &System, n: usize, options: &MotionOptions) -> MotionEstimate {
-    let used = system.patches.len();
+fn estimate(system: &System, points: &[[f64; 2]], options: &MotionOptions) -> MotionEstimate {
+    let (used, n) = (system.patches.len(), points.len());
     if used < LEAST {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
-    if let Some((rotation, covariance)) = turning(system) {
-        return turning_report(system, n, rotation, &covariance);
+    if let Some(rotation) = turning(system) {
+        return turning_report(system, n, &rotation);
     }
-    let near = options.initial.map(|initial| system.refine(&Motion::new(initial.translation, initial.rotation)));
-    let Some(best) = near.or_else(|| minimum(system, CounterRng::new(options.seed))) else {
+    let rng = CounterRng::new(options.seed);
+    let minima = match options.initial {
+        Some(initial) => vec![system.refine(&Motion::new(initial.translation, initial.rotation))],
+        None => minima(system, rng),
+    };
+    let Some(&best) = minima.first() else {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     };
     let tangent = tangents(&best.u());
@@ -153,126 +159,44 @@ fn estimate(system: &System, n: usize, options: &MotionOptions) -> MotionEstimat
         tangent: axes(&tangent),
         cost: at_best.cost,
     };
-    out.status = if used < FEW {
-        Status::FewPoints
-    } else if planar {
-        Status::Ambiguous
-    } else if out.direction_std.is_nan() || out.direction_std > WIDE {
-        Status::IllConditioned
-    } else if low {
-        Status::LowSnr
-    } else {
-        Status::Ok
-    };
+    let evidence = Evidence { minima: &minima, few: places(system, points) < FEW, planar, low };
+    judge(&mut out, system, &evidence, rng.stream(1));
     out
 }
 
-fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
-    std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
+/// Patches at different places: those at one tell of no more surfaces, and of no more constraints, than one of less noise.
+fn places(system: &System, points: &[[f64; 2]]) -> usize {
+    let place = |&k: &u32| points[k as usize].map(f64::to_bits);
+    system.source.iter().map(place).collect::<HashSet<_>>().len()
 }
 
-/// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
-fn tell(
-    out: &mut MotionEstimate,
-    system: &System,
-    motion: &Motion,
-    covariance: Option<Matrix5>,
-    surfaces: Option<&[Vector3<f64>]>,
-) -> bool {
-    let tangent = tangents(&motion.u());
-    out.motion = *motion;
-    out.tangent = axes(&tangent);
-    if let Some(covariance) = covariance {
-        out.covariance = nested(&covariance);
-        out.direction_std = direction_deviation(&covariance);
-        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
-    }
-    let here = system.equations(motion, &tangent, None);
-    if let Some(plugged) = plugged_in(&here.h, &here.p) {
-        out.bound = nested(&plugged.bound);
-    }
-    out.surfaces = vec![[f64::NAN; 3]; out.inliers.len()];
-    for (k, (patch, &source)) in system.patches.iter().zip(&system.source).enumerate() {
-        let (source, seen) = (source as usize, patch.seen(motion));
-        let surface = surfaces.map_or(seen.surface, |surfaces| surfaces[k]);
-        out.inverse_depth[source] = seen.surface[0];
-        out.inverse_depth_std[source] = seen.covariance[(0, 0)].sqrt();
-        out.inverse_depth_smooth[source] = surface[0];
-        out.surfaces[source] = surface.into();
-        out.residuals[source] = seen.cost.sqrt();
-        out.inliers[source] = true;
-        let rate = surface[0] * motion.translation[2];
-        out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
-        let slopes = Vector2::new(surface[0] * tangent[(0, 2)], surface[0] * tangent[(1, 2)]);
-        let of_direction =
-            covariance.map_or(f64::NAN, |c| (slopes.transpose() * c.fixed_view::<2, 2>(0, 0) * slopes)[0]);
-        let variance = motion.translation[2].powi(2) * seen.covariance[(0, 0)] + of_direction;
-        out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
-    }
-    let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
-    match system.twin(motion) {
-        Some(twin) if twin.angle_to(motion).min(twin.reversed().angle_to(motion)) > distinct => {
-            out.alternatives.push(Alternative { motion: twin, excess: 0.0 });
-            true
-        }
-        _ => false,
-    }
-}
-
-/// The best motion of the whole half sphere, with the sign that has fewer patches behind the camera.
-fn minimum(system: &System, rng: CounterRng) -> Option<Motion> {
+/// The minima that are reached from the best directions of the half sphere, both signs each, the cheapest first.
+fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
-    let starts = apart(found, APART, STARTS);
-    let refined =
-        starts.into_iter().map(|(start, _)| system.refine(&start)).flat_map(|motion| [motion, motion.reversed()]);
-    refined
-        .map(|motion| {
-            let here = system.equations(&motion, &tangents(&motion.u()), None);
-            (motion, here.cost + here.behind)
-        })
-        .filter(|(_, cost)| cost.is_finite())
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(motion, _)| motion)
+    let refined = apart(found, APART, STARTS).into_iter().map(|(start, _)| system.refine(&start));
+    let cost = |motion: Motion| {
+        let here = system.equations(&motion, &tangents(&motion.u()), None);
+        (motion, here.cost + here.behind)
+    };
+    let mut minima: Vec<(Motion, f64)> = refined.flat_map(|motion| [motion, motion.reversed()]).map(cost).collect();
+    minima.retain(|(_, cost)| cost.is_finite());
+    minima.sort_by(|a, b| a.1.total_cmp(&b.1));
+    minima.into_iter().map(|(motion, _)| motion).collect()
 }
 
 /// The rotation alone, where chance explains what it leaves.
-fn turning(system: &System) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+fn turning(system: &System) -> Option<RotationOnly> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for patch in &system.patches {
         normal += patch.r.transpose() * patch.r;
         right += patch.r.transpose() * patch.f;
     }
     let factor = normal.cholesky()?;
-    let w = factor.solve(&right);
-    let chi2: f64 = system.patches.iter().map(|patch| (patch.f - patch.r * w).norm_squared()).sum();
-    by_chance(chi2, (6 * system.patches.len() - 3) as f64).then(|| (w, factor.inverse()))
-}
-
-fn turning_report(system: &System, n: usize, rotation: Vector3<f64>, covariance: &Matrix3<f64>) -> MotionEstimate {
-    let mut out = MotionEstimate::nothing(n, Status::RotationOnly, 1.0);
-    out.motion.rotation = rotation.into();
-    out.likelihood.motion = out.motion;
-    out.surfaces = vec![[f64::NAN; 3]; n];
-    for i in 0..3 {
-        for j in 0..3 {
-            out.covariance[2 + i][2 + j] = covariance[(i, j)];
-        }
-        out.rotation_std[i] = covariance[(i, i)].sqrt();
-    }
-    out.bound = out.covariance;
-    for (patch, &source) in system.patches.iter().zip(&system.source) {
-        let source = source as usize;
-        out.inverse_depth[source] = 0.0;
-        out.inverse_depth_smooth[source] = 0.0;
-        out.surfaces[source] = [0.0; 3];
-        out.inverse_depth_std[source] = f64::INFINITY;
-        out.time_to_contact[source] = f64::INFINITY;
-        out.time_to_contact_std[source] = f64::INFINITY;
-        out.residuals[source] = (patch.f - patch.r * rotation).norm();
-        out.inliers[source] = true;
-    }
-    out
+    let rotation = factor.solve(&right);
+    let chi2: f64 = system.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
+    let found = || RotationOnly { rotation, covariance: factor.inverse(), chi2 };
+    by_chance(chi2, (6 * system.patches.len() - 3) as f64).then(found)
 }
 
 /// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given; their flow is not looked at.

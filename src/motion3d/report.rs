@@ -7,9 +7,9 @@ use super::likelihood::Candidate;
 use super::motion::Motion;
 use super::observations::{Observations, Row};
 use super::options::Flow;
-use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, nested};
+use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::RotationOnly;
-use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 /// A motion found on the inliers.
 pub(super) struct Solution {
@@ -23,10 +23,6 @@ pub(super) struct Solution {
     /// Depths in the weights, where they were smoothed.
     smooth: Option<Vec<f64>>,
     fell_back: bool,
-}
-
-fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
-    std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
 }
 
 impl Solution {
@@ -163,29 +159,42 @@ pub(super) fn rotation_report(
     sigma: f64,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, sigma);
-    out.motion.rotation = rotation.rotation.into();
-    for i in 0..3 {
-        for j in 0..3 {
-            out.covariance[2 + i][2 + j] = rotation.covariance[(i, j)];
-        }
-        out.rotation_std[i] = rotation.covariance[(i, i)].sqrt();
-    }
-    out.bound = out.covariance;
+    turned(&mut out, &rotation.rotation, &rotation.covariance, rotation.chi2, &all.source);
     let rest = |k: usize| {
         let row = all.row(k);
         (row.f - row.r * rotation.rotation).norm()
     };
     scatter(&mut out.residuals, all, rest);
-    scatter(&mut out.inverse_depth, all, |_| 0.0);
-    scatter(&mut out.inverse_depth_smooth, all, |_| 0.0);
-    scatter(&mut out.inverse_depth_std, all, |_| f64::INFINITY);
-    scatter(&mut out.time_to_contact, all, |_| f64::INFINITY);
-    scatter(&mut out.time_to_contact_std, all, |_| f64::INFINITY);
     for &source in &inliers.source {
         out.inliers[source as usize] = true;
     }
     out.approach = (0.0, f64::INFINITY);
-    out.likelihood.motion = out.motion;
-    out.likelihood.cost = rotation.chi2;
     out
+}
+
+/// A rotation alone: its covariance, and no depth for any of the usable points `source`.
+pub(super) fn turned(
+    out: &mut MotionEstimate,
+    rotation: &Vector3<f64>,
+    covariance: &Matrix3<f64>,
+    cost: f64,
+    source: &[u32],
+) {
+    out.motion.rotation = (*rotation).into();
+    for i in 0..3 {
+        for j in 0..3 {
+            out.covariance[2 + i][2 + j] = covariance[(i, j)];
+        }
+        out.rotation_std[i] = covariance[(i, i)].sqrt();
+    }
+    out.bound = out.covariance;
+    out.likelihood.motion = out.motion;
+    out.likelihood.cost = cost;
+    for &source in source {
+        let source = source as usize;
+        (out.inverse_depth[source], out.inverse_depth_smooth[source]) = (0.0, 0.0);
+        out.inverse_depth_std[source] = f64::INFINITY;
+        out.time_to_contact[source] = f64::INFINITY;
+        out.time_to_contact_std[source] = f64::INFINITY;
+    }
 }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
 pub enum Status {
     /// A motion with its covariance.
     Ok,
-    /// Fewer than 12 points (or 5 patches): several motions may explain them exactly.
+    /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly. Also too few to tell outliers from large noise, where that is not known.
     FewPoints,
     /// Fewer than 5 points (or 2 patches): no motion.
     TooFewPoints,
@@ -108,6 +108,11 @@ pub struct MotionEstimate {
 }
 
 pub(super) const UNKNOWN: [[f64; 5]; 5] = [[f64::NAN; 5]; 5];
+
+/// The axes of `psi`, row by row.
+pub(super) fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
+    std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
+}
 
 pub(super) fn nested(matrix: &SMatrix<f64, 5, 5>) -> [[f64; 5]; 5] {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))

@@ -1,7 +1,9 @@
 //! Points that obey one motion among points that do not.
 
+mod coherence;
 mod gate;
 mod search;
+mod whole;
 
 use super::estimate::Scaled;
 use super::grid::{apart, sample};
@@ -50,6 +52,20 @@ const CUT_VARIANCE: f64 = 0.911;
 const SIGMA_ROUNDS: usize = 4;
 const SIGMA_STEPS: usize = 50;
 
+/// What residuals that estimate noise are fewer by: the unknowns of a motion.
+const UNKNOWNS: usize = 5;
+
+/// Below so many points a few of them can agree by chance far better than the noise of all is: see [`whole`].
+const SELECTED: usize = 100;
+
+/// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be sure; the factor between both noises that makes a difference.
+const WORTH: f64 = 4.0;
+const SURE: f64 = 10.0;
+const APART_NOISE: f64 = 1.5;
+
+/// Inliers below which a selection of them, whose noise is not known either, is not believed in.
+const FEWEST: usize = 15;
+
 /// A motion and the points that obey it.
 #[derive(Debug, Clone)]
 pub(super) struct Consensus {
@@ -58,6 +74,8 @@ pub(super) struct Consensus {
     pub inliers: Vec<u32>,
     /// Other motions that about as many points obey, and how much more each costs, in squared units of noise; the best first.
     pub rivals: Vec<Rival>,
+    /// Whether the points are too few to tell outliers from large noise.
+    pub doubtful: bool,
 }
 
 /// Another motion of many points.
@@ -74,6 +92,24 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     if !scaled.unknown {
         return in_known_noise(&scaled.observations, rng);
     }
+    let whole = (scaled.observations.n < SELECTED).then(|| whole::sigma(&scaled.observations, rng)).flatten();
+    let whole = whole.map(|sigma| sigma * scaled.sigma);
+    let found = in_unknown_noise(scaled, rng)?;
+    let Some(sigma) = whole.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
+    let shorter = whole::shortening(&scaled.observations, &found, sigma);
+    // Whatever is the case, one noise that hardly differs from the other does no harm.
+    let (n, k) = (scaled.observations.n, found.inliers.len());
+    let doubtful = k < n && sigma > APART_NOISE && (shorter < SURE || k < FEWEST);
+    if shorter < WORTH {
+        scaled.take(sigma);
+        let found = in_known_noise(&scaled.observations, rng)?;
+        return Some(Consensus { doubtful, ..found });
+    }
+    Some(Consensus { doubtful, ..found })
+}
+
+/// From a small share of the flow on, the noise that the inliers leave.
+fn in_unknown_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     scaled.take(FIRST_SHARE * scaled.observations.median_flow());
     let mut found = in_known_noise(&scaled.observations, rng)?;
     for _ in 0..SIGMA_ROUNDS {
@@ -87,7 +123,7 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     Some(found)
 }
 
-/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution".
+/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution"; the five unknowns take their share away.
 fn noise(residuals: &[f64]) -> f64 {
     let mut sigma = 1.0;
     for _ in 0..SIGMA_STEPS {
@@ -96,10 +132,10 @@ fn noise(residuals: &[f64]) -> f64 {
             sum += e * e;
             count += 1;
         }
-        if count == 0 || sum <= 0.0 {
+        if count <= UNKNOWNS || sum <= 0.0 {
             break;
         }
-        let next = (sum / (CUT_VARIANCE * count as f64)).sqrt();
+        let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
         let settled = (next - sigma).abs() < 1e-6 * sigma;
         sigma = next;
         if settled {
@@ -133,13 +169,17 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         }
         let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
         let obeying = obeying(observations, &motion);
-        found = Consensus { motion, inliers: obeying, rivals: Vec::new() };
+        found = Consensus { motion, inliers: obeying, rivals: Vec::new(), doubtful: false };
     }
     let inliers = gate.passed(&found);
     if inliers.len() >= LEAST {
         found.inliers = inliers;
     }
     found.rivals = rivals;
+    if found.inliers.len() >= LEAST {
+        let before = coherence::rival(observations, &found);
+        found.rivals.extend(before);
+    }
     (found.inliers.len() >= LEAST).then_some(found)
 }
 
@@ -210,5 +250,5 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
             break;
         }
     }
-    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers, rivals: Vec::new() })
+    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers, rivals: Vec::new(), doubtful: false })
 }

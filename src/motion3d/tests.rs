@@ -3,5 +3,6 @@
 mod confidence;
 mod degenerate;
 mod estimators;
+mod patches;
 mod published;
 pub(super) mod scenes;

@@ -1,7 +1,7 @@
 //! How far a motion can be trusted.
 
 use super::covariance::direction_deviation;
-use super::grid::reach_of_plausible;
+use super::grid::{SEARCHED, reach_of_plausible};
 use super::kernels::equations;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
@@ -17,11 +17,14 @@ use nalgebra::{SMatrix, SymmetricEigen};
 const FEW: usize = 12;
 
 /// Standard deviation of the direction, degrees, beyond which it is not known.
-const WIDE: f64 = 20.0;
+pub(super) const WIDE: f64 = 20.0;
 
 /// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are [`SPACING`] degrees apart, half of that from one of them.
-const FAR: f64 = 4.0;
-const SPACING: f64 = 4.0;
+pub(super) const FAR: f64 = 4.0;
+pub(super) const SPACING: f64 = 4.0;
+
+/// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
+const MOST: f64 = 1.5;
 
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
@@ -33,6 +36,8 @@ const DETERMINED: f64 = 1e-12;
 pub(super) struct Evidence<'a> {
     /// Maximum likelihood's motion, and its depths behind the camera in squared deviations.
     pub likelihood: (Motion, f64),
+    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
+    pub deviation: f64,
     /// Whether the depths are mostly noise.
     pub low: bool,
     /// Motions that other points obey.
@@ -67,7 +72,10 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
         Status::IllConditioned
     } else if planar || others.count() > 0 {
         Status::Ambiguous
-    } else if deviation.is_nan() || deviation > WIDE || far(inliers, &motions, deviation, rng.stream(1)) {
+    } else if deviation.is_nan()
+        || deviation > WIDE
+        || far(inliers, &motions, deviation.max(evidence.deviation.min(MOST * deviation)), rng.stream(1))
+    {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
         Status::Ambiguous
@@ -90,9 +98,12 @@ fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct
     true
 }
 
-/// Whether directions explain the flow as well as the estimate that are farther than its covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
+/// Whether directions explain the flow as well as the estimate that are farther than the covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
+///
+/// `deviation`: that of maximum likelihood, whose residuals are looked at; of the points that the search sees it is that much larger.
 fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
-    reach_of_plausible(inliers, motions, rng) > FAR * deviation + SPACING
+    let fewer = (inliers.n as f64 / inliers.n.min(SEARCHED) as f64).sqrt();
+    reach_of_plausible(inliers, motions, rng) > FAR * deviation * fewer + SPACING
 }
 
 /// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.

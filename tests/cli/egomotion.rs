@@ -72,6 +72,21 @@ fn rows_go_to_standard_output_and_do_not_depend_on_threads() {
     assert!(ml[0]["method"] == "ml" && ml[0]["points"].parse::<usize>().unwrap() <= 40);
 }
 
+/// A region gets a grid of its own, and its own most points.
+#[test]
+fn a_region_has_points_enough() {
+    let place = Place::new();
+    approach(&place, "frames", 3);
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --region 20,16,88,64 --quiet";
+    let points = |line: &str| -> Vec<usize> {
+        rows(&place.good(line).out).iter().map(|row| row["points"].parse().unwrap()).collect()
+    };
+    let (own, coarse) = (points(line), points(&format!("{line} --spacing 20")));
+    assert!(own.iter().all(|&n| n >= 24) && own[0] > coarse[0], "{own:?} {coarse:?}");
+    let few = points(&format!("{line} --max-points 20"));
+    assert!(few.iter().all(|&n| (8..=20).contains(&n)), "{few:?}");
+}
+
 #[test]
 fn mistakes_are_told_before_any_work() {
     let place = Place::new();

@@ -299,6 +299,12 @@ def test_arguments_of_another_kind_are_refused():
         motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
     with pytest.raises(TypeError, match=r"^sigma\b"):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
+    for wrong in ({"sigma": "0.3"}, {"sigma": True}, {"seed": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
+        with pytest.raises(TypeError, match=f"^{next(iter(wrong))}: "):
+            motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
+    for wrong in ({"threads": -1}, {"seed": -1}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
+        with pytest.raises(ValueError, match=f"^{next(iter(wrong))}: "):
+            motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
     with pytest.raises(jacoflow.NotObservableError):
         motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6), sigma=0.1)
     with pytest.raises(ValueError, match="^sigma"):
@@ -327,6 +333,8 @@ def test_a_field_gives_the_motion_and_the_points():
     assert len(fewer) <= 9 and coarse.inv_depth.shape == (len(fewer),)
     _, inside = motion3d.estimate_field_motion(field, camera, region=(20, 10, 60, 50), spacing=8, robust=False)
     assert (inside >= [20, 10]).all() and (inside < [80, 60]).all() and len(inside) > 20
+    _, few = motion3d.estimate_field_motion(field, camera, region=(20, 10, 60, 50), max_points=24, robust=False)
+    assert 10 <= len(few) <= 24
     with pytest.raises(ValueError, match="^field"):
         motion3d.estimate_field_motion(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), camera)
     with pytest.raises(ValueError, match="^spacing"):

@@ -80,8 +80,8 @@ fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<M
             return None;
         }
         if step.norm() < STEP {
-            break;
+            return Some(motion);
         }
     }
-    Some(motion)
+    None
 }

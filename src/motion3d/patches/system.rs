@@ -72,7 +72,22 @@ impl Patch {
     }
 
     pub fn seen(&self, motion: &Motion) -> SeenPatch {
-        let a = self.depth(&motion.u());
+        self.explained(motion, self.depth(&motion.u()))
+    }
+
+    /// The same with a surface that is not behind the camera.
+    pub fn seen_in_front(&self, motion: &Motion) -> SeenPatch {
+        let free = self.seen(motion);
+        if free.surface[0] >= 0.0 {
+            return free;
+        }
+        // The best of those with nu = 0.
+        let mut slopes = self.depth(&motion.u());
+        slopes.set_column(0, &Vector6::zeros());
+        self.explained(motion, slopes)
+    }
+
+    fn explained(&self, motion: &Motion, a: Matrix6x3) -> SeenPatch {
         let mut normal = a.transpose() * a;
         normal += Matrix3::identity() * (RIDGE * normal.trace()).max(f64::MIN_POSITIVE);
         let covariance = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
@@ -121,6 +136,16 @@ impl System {
         tangent: &Matrix2x3<f64>,
         surfaces: Option<&[Vector3<f64>]>,
     ) -> PatchEquations {
+        self.sums(motion, tangent, surfaces, Patch::seen)
+    }
+
+    fn sums(
+        &self,
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        surfaces: Option<&[Vector3<f64>]>,
+        see: impl Fn(&Patch, &Motion) -> SeenPatch,
+    ) -> PatchEquations {
         let mut sums = PatchEquations {
             h: Matrix5::zeros(),
             gradient: SMatrix::zeros(),
@@ -129,7 +154,7 @@ impl System {
             behind: 0.0,
         };
         for (k, patch) in self.patches.iter().enumerate() {
-            let seen = patch.seen(motion);
+            let seen = see(patch, motion);
             let slopes = patch.slopes(tangent, &surfaces.map_or(seen.surface, |surfaces| surfaces[k]));
             let weighted = slopes.transpose() * seen.across;
             sums.h += weighted * slopes;
@@ -159,9 +184,18 @@ impl System {
 
     /// The minimum that is reached from `start`, by Levenberg-Marquardt.
     pub fn refine(&self, start: &Motion) -> Motion {
+        self.descend(start, Patch::seen).0
+    }
+
+    /// The same with no patch behind the camera, and what it costs.
+    pub fn refine_in_front(&self, start: &Motion) -> (Motion, f64) {
+        self.descend(start, Patch::seen_in_front)
+    }
+
+    fn descend(&self, start: &Motion, see: fn(&Patch, &Motion) -> SeenPatch) -> (Motion, f64) {
         let mut motion = *start;
         let mut tangent = tangents(&motion.u());
-        let mut here = self.equations(&motion, &tangent, None);
+        let mut here = self.sums(&motion, &tangent, None, see);
         let mut damping = 1e-4;
         for _ in 0..STEPS {
             let mut h = here.h;
@@ -171,7 +205,7 @@ impl System {
             let Some(step) = h.cholesky().map(|factor| factor.solve(&here.gradient)) else { break };
             let next = motion.stepped(&tangent, &step);
             let axes = tangents(&next.u());
-            let there = self.equations(&next, &axes, None);
+            let there = self.sums(&next, &axes, None, see);
             if there.cost <= here.cost {
                 (motion, tangent, here) = (next, axes, there);
                 damping *= 0.1;
@@ -182,7 +216,7 @@ impl System {
                 break;
             }
         }
-        motion
+        (motion, here.cost)
     }
 
     /// `sum (Pi G_i E)^t B M^-1 B^t (Pi G_j E) C_ij`: the noise that is left with ideal weights (25).

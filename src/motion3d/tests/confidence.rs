@@ -3,6 +3,7 @@
 use super::super::*;
 use super::estimators::mahalanobis;
 use super::scenes::Scene;
+use crate::math::random::CounterRng;
 
 fn options() -> MotionOptions {
     MotionOptions { placement: Placement::Start, ..MotionOptions::default() }
@@ -109,4 +110,95 @@ fn a_robust_search_tells_what_else_many_points_obey() {
             estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &MotionOptions { robust: true, ..options() }).unwrap();
         assert!(found.motion.angle_to(&ahead).to_degrees() < 2.0, "{seed}: {:?}", found.motion);
     }
+}
+
+/// A few of few points always agree by chance: where the noise is not known, it must not be theirs.
+#[test]
+fn few_points_do_not_choose_their_own_noise() {
+    let options = MotionOptions { robust: true, ..options() };
+    for n in [20, 30] {
+        let (mut confident, mut wrong, mut small) = (0, 0, 0);
+        for seed in 0..60 {
+            let scene = Scene::oblique(n, 0.1, seed);
+            let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
+            if found.status == Status::Ok {
+                confident += 1;
+                wrong += u32::from(mahalanobis(&found, &scene.motion) > 45.0);
+                small += u32::from(found.sigma < 0.05);
+            }
+        }
+        assert!(confident >= 15 && wrong <= 3 && small <= 1, "{n}: {wrong} and {small} of {confident}");
+    }
+    // Outliers that are far out are seen all the same.
+    let mut right = 0;
+    for seed in 0..20 {
+        let (mut scene, rng) = (Scene::oblique(40, 0.02, seed), CounterRng::new(900 + seed));
+        for k in 0..8 {
+            scene.flow[k] = [0, 1].map(|j| 4.0 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
+        }
+        let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
+        right += u32::from(found.status == Status::Ok && (0.012..0.03).contains(&found.sigma));
+    }
+    assert!(right >= 18, "{right} of 20");
+}
+
+/// Two minima of one scene are as hard to tell for maximum likelihood as they are for the smoothed weights.
+#[test]
+fn maximum_likelihood_tells_of_other_minima_too() {
+    let (mut undecided, mut sure) = (0, 0);
+    for seed in 0..150 {
+        let rng = CounterRng::new(4000 + seed);
+        let normal = |k: u64| [0, 1, 2].map(|j| rng.normal(3 * k + j));
+        let motion = Motion::new(normal(0), normal(1).map(|w| 0.02 * w));
+        let scene = Scene::new(motion, 100, 0.6, 0.2, seed, |_, y, _| 0.3 + 1.2 * y.max(0.0));
+        let status = |method| {
+            let options = MotionOptions { method, ..options() };
+            estimate_motion(&scene.flow(), &Noise::Sigma(0.2), &options).unwrap().status
+        };
+        if status(Method::Efficient) == Status::Ambiguous {
+            undecided += 1;
+            sure += u32::from(status(Method::MaximumLikelihood) == Status::Ok);
+        }
+    }
+    assert!(undecided >= 15 && sure <= 2, "{sure} of {undecided}");
+}
+
+/// The residuals that tell of other directions are maximum likelihood's, on a sample of the points.
+#[test]
+fn many_points_are_no_reason_for_doubt() {
+    let oblique = Motion::new([0.6, 0.2, 0.75], W);
+    let mut trusted = 0;
+    for seed in 0..12 {
+        let scene = Scene::new(oblique, 8000, 0.6, 0.2, seed, |x, y, _| smooth(x, y));
+        let found = run(&scene, &Noise::Sigma(0.2));
+        trusted += u32::from(found.status != Status::IllConditioned);
+    }
+    assert!(trusted >= 11, "{trusted} of 12");
+}
+
+/// Points of a mover that obey the scene's motion by chance lie together and pull the same way: with a slow mover that is not seen in their residuals.
+#[test]
+fn a_slow_mover_is_found_or_told() {
+    let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
+    let options = MotionOptions { robust: true, ..options() };
+    let (mut silent, mut trusted) = (0, 0);
+    for seed in 0..12 {
+        let scene = |moves: bool| {
+            let depth = |x: f64, y: f64, _: f64| 0.0095 * smooth(x, y);
+            let mut scene = Scene::new(camera, 1000, 0.6, 0.0006, seed, depth);
+            let other = Motion::new(aside, [0.0, 0.01, 0.02]);
+            let moving = Scene::new(other, 1000, 0.6, 0.0006, seed, |x, y, r| 1.5 * depth(x, y, r));
+            for k in
+                (0..1000).filter(|&k| moves && (scene.points[k][0] + 0.2).abs().max(scene.points[k][1].abs()) < 0.27)
+            {
+                scene.flow[k] = moving.flow[k];
+            }
+            scene
+        };
+        let run = |scene: &Scene| estimate_motion(&scene.flow(), &Noise::Sigma(0.0006), &options).unwrap();
+        let found = run(&scene(true));
+        silent += u32::from(found.status == Status::Ok && mahalanobis(&found, &camera) > 45.0);
+        trusted += u32::from(run(&scene(false)).status == Status::Ok);
+    }
+    assert!(silent <= 2 && trusted >= 11, "{silent} {trusted}");
 }

@@ -198,3 +198,46 @@ fn weights_may_have_their_depths_from_elsewhere() {
     let error = estimate_motion(&scene.flow(), &Noise::Sigma(0.2), &short).unwrap_err().to_string();
     assert!(error.starts_with("weight_inv_depth: "), "{error}");
 }
+
+/// Whatever is given for the weights, the covariance is that of what comes out.
+#[test]
+fn weights_of_any_unit_and_quality_leave_the_covariance_honest() {
+    let noise = CounterRng::new(55);
+    let run = |scene: &Scene, depths: Vec<f64>| {
+        let with = MotionOptions { weight_depths: Some(depths), ..options(Method::Efficient) };
+        estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &with).unwrap()
+    };
+    let scene = Scene::oblique(300, 0.03, 5);
+    let want = run(&scene, scene.inverse_depth.clone());
+    for factor in [-1.0, 0.01, 0.2, 3.0, 10.0, 100.0] {
+        let found = run(&scene, scene.inverse_depth.iter().map(|nu| factor * nu).collect());
+        assert!(found.efficient, "{factor}");
+        assert!((found.direction_std / want.direction_std - 1.0).abs() < 1e-3, "{factor}: {}", found.direction_std);
+        assert!(found.motion.angle_to(&want.motion) < 1e-6, "{factor}");
+    }
+    let (mut inside, trials) = (0, 60);
+    for seed in 0..trials {
+        let scene = Scene::oblique(300, 0.03, seed);
+        let depths = scene.inverse_depth.iter().enumerate();
+        let noisy = depths.map(|(k, nu)| nu + noise.stream(seed).normal(k as u64)).collect();
+        inside += u64::from(mahalanobis(&run(&scene, noisy), &scene.motion) < 11.07);
+    }
+    assert!(inside * 100 >= trials * 85, "{inside} of {trials}");
+}
+
+/// A depth that is not known for the weights leaves its point out and no other.
+#[test]
+fn a_weight_that_is_not_finite_leaves_its_point_out() {
+    let scene = Scene::oblique(200, 0.05, 5);
+    let mut depths = scene.inverse_depth.clone();
+    depths[3] = f64::NAN;
+    let with = |weight_depths| MotionOptions { weight_depths: Some(weight_depths), ..options(Method::Efficient) };
+    let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.05), &with(depths)).unwrap();
+    assert!(found.efficient && !found.fell_back && !found.inliers[3] && found.inverse_depth[3].is_nan());
+    let mut without = scene.clone();
+    without.points.remove(3);
+    without.flow.remove(3);
+    without.inverse_depth.remove(3);
+    let want = estimate_motion(&without.flow(), &Noise::Sigma(0.05), &with(without.inverse_depth.clone())).unwrap();
+    assert_eq!(found.motion, want.motion);
+}

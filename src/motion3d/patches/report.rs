@@ -1,0 +1,71 @@
+//! What is told about a motion of patches.
+
+use super::super::covariance::{Matrix5, direction_deviation, plugged_in};
+use super::super::motion::{Motion, tangents};
+use super::super::report::turned;
+use super::super::result::{Alternative, MotionEstimate, Status, axes, nested};
+use super::super::special::RotationOnly;
+use super::system::System;
+use nalgebra::{Vector2, Vector3};
+
+/// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
+pub(super) fn tell(
+    out: &mut MotionEstimate,
+    system: &System,
+    motion: &Motion,
+    covariance: Option<Matrix5>,
+    surfaces: Option<&[Vector3<f64>]>,
+) -> bool {
+    let tangent = tangents(&motion.u());
+    out.motion = *motion;
+    out.tangent = axes(&tangent);
+    if let Some(covariance) = covariance {
+        out.covariance = nested(&covariance);
+        out.direction_std = direction_deviation(&covariance);
+        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
+    }
+    let here = system.equations(motion, &tangent, None);
+    if let Some(plugged) = plugged_in(&here.h, &here.p) {
+        out.bound = nested(&plugged.bound);
+    }
+    out.surfaces = vec![[f64::NAN; 3]; out.inliers.len()];
+    for (k, (patch, &source)) in system.patches.iter().zip(&system.source).enumerate() {
+        let (source, seen) = (source as usize, patch.seen(motion));
+        let surface = surfaces.map_or(seen.surface, |surfaces| surfaces[k]);
+        out.inverse_depth[source] = seen.surface[0];
+        out.inverse_depth_std[source] = seen.covariance[(0, 0)].sqrt();
+        out.inverse_depth_smooth[source] = surface[0];
+        out.surfaces[source] = surface.into();
+        out.residuals[source] = seen.cost.sqrt();
+        out.inliers[source] = true;
+        let rate = surface[0] * motion.translation[2];
+        out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
+        let slopes = Vector2::new(surface[0] * tangent[(0, 2)], surface[0] * tangent[(1, 2)]);
+        let of_direction =
+            covariance.map_or(f64::NAN, |c| (slopes.transpose() * c.fixed_view::<2, 2>(0, 0) * slopes)[0]);
+        let variance = motion.translation[2].powi(2) * seen.covariance[(0, 0)] + of_direction;
+        out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
+    }
+    let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
+    match system.twin(motion) {
+        Some(twin) if twin.angle_to(motion).min(twin.reversed().angle_to(motion)) > distinct => {
+            out.alternatives.push(Alternative { motion: twin, excess: 0.0 });
+            true
+        }
+        _ => false,
+    }
+}
+
+/// What is told about a camera that only turns, or stands still.
+pub(super) fn turning_report(system: &System, n: usize, rotation: &RotationOnly) -> MotionEstimate {
+    let mut out = MotionEstimate::nothing(n, Status::RotationOnly, 1.0);
+    turned(&mut out, &rotation.rotation, &rotation.covariance, rotation.chi2, &system.source);
+    out.surfaces = vec![[f64::NAN; 3]; n];
+    for (patch, &source) in system.patches.iter().zip(&system.source) {
+        let source = source as usize;
+        out.surfaces[source] = [0.0; 3];
+        out.residuals[source] = (patch.f - patch.r * rotation.rotation).norm();
+        out.inliers[source] = true;
+    }
+    out
+}
