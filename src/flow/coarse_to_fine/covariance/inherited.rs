@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn only_directions_without_texture_inherit() {
-        let side = 97;
+        let side = 97usize;
         let (slanted, above) = ([0.5, 0.5, 0.5], [constant(49, 0.5 * 1.1, 0.01)]);
         let sites = |here: Directions| -> Vec<Directions> {
             (0..side * side).map(|n| if (24..73).contains(&(n % side)) { here } else { NONE }).collect()
