@@ -925,16 +925,16 @@ class _GaussMarkovFilter:
 @final
 class _StereoTracker:
     def __new__(cls, options: dict[str, Any]) -> _StereoTracker: ...
-    def update(self, left: NDArray[Any], right: NDArray[Any]) -> dict[str, Any]:
-        """The next step from both views, as a dictionary."""
-    def update_disparity(self, left: NDArray[Any], disparity: NDArray[Any]) -> dict[str, Any]:
-        """The next step from the left view and its disparities, NaN where there is none, as a dictionary."""
+    def update(self, left: NDArray[Any], right: NDArray[Any], dt: float | None) -> dict[str, Any]:
+        """The next step from both views, `dt` after the last one, as a dictionary."""
+    def update_disparity(self, left: NDArray[Any], disparity: NDArray[Any], dt: float | None) -> dict[str, Any]:
+        """The next step from the left view and its disparities, NaN where there is none, `dt` after the last one, as a dictionary."""
     def row_offset(self) -> float | None:
         """How many rows lower the right view shows a point, where that is known."""
     def graph(self) -> _TrackGraph:
         """Clusters of all steps so far and their arcs."""
-    def tracks(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]:
-        """Tracks by id: times (T,), positions (T, 3) and velocities (T, 3)."""
+    def tracks(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
+        """Tracks by id: times (T,), positions (T, 3), velocities (T, 3) and when that was (T,)."""
 
 @final
 class _TrackGraph:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
 """Counts, no unit; None where the default depends on the mode."""
 NUMBERS = (
-    "weight_concentration_prior", "mean_precision_prior", "degrees_of_freedom_prior", "covariance_prior", "prune_weight", "row_offset", "arc_threshold", "reseed_below", "least_overlap", "focal", "baseline", "d_infinity",
+    "weight_concentration_prior", "mean_precision_prior", "degrees_of_freedom_prior", "covariance_prior", "prune_weight", "row_offset", "arc_threshold", "reseed_below", "least_overlap", "focal", "baseline", "d_infinity", "step_time",
 )  # fmt: skip
 """Numbers, in the units that `StereoTracker` tells; None where one may be missing."""
 TUPLES = {"disparity_range": 2, "row_range": 2, "grid": 3, "tolerance": 3, "tolerance_per_step": 3, "jump": 2, "group_limits": 3}

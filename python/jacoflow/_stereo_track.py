@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class StereoCluster:
-    """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times in steps; NaN where nothing was measured."""
+    """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times in steps (velocities, per step: for the unit of the tracker's `step_time`, which by default is one); NaN where nothing was measured."""
 
     time: int
     """Step, from 0 (no unit)."""
@@ -39,9 +39,9 @@ class StereoCluster:
     covariance: Array
     """Covariance of (x, y, disparity), (3, 3), px^2: the component's, and a twelfth of a cell and of a disparity squared for what counting in voxels hides."""
     velocity: Array
-    """Motion (u, v, w) since the last step, medians over the pixels that it had then, (3,), px/step and disparity/step. Of what grows or turns, `affine` says what each pixel does."""
+    """Motion (u, v, w) since the last step at `middle`, (3,), px/step and disparity/step: what `affine` begins with, and the motion in depth. Of what grows or turns, `affine` says what each pixel does."""
     next_velocity: Array
-    """Motion (u, v, w) to the next step, medians over its pixels, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    """Motion (u, v, w) to the next step at `middle`, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
     middle: Array
     """Medians of its pixels along x and y, (2,), px."""
     affine: Array
@@ -64,6 +64,8 @@ class StereoStep:
 
     time: int
     """Step, from 0 (no unit)."""
+    clock: float
+    """Time since the first step, in the unit of the tracker's `step_time`; `time` unless `dt` was given."""
     clusters: list[StereoCluster]
     """Clusters with edge pixels, by component; none where the views show no edges (no unit)."""
     rows: NDArray[np.uint32]
@@ -93,7 +95,9 @@ class StereoTrack:
     positions: Array
     """`mean` (x, y, disparity) of its cluster there, (T, 3), px."""
     velocities: Array
-    """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step; NaN where not measured."""
+    """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step (for the unit of time, if that is no step); NaN where not measured."""
+    clock: Array
+    """When that was, time since the first step, (T,), in the unit of the tracker's `step_time`: `times` unless `dt` was given."""
 
 
 class TrackGraph:
@@ -233,6 +237,9 @@ class StereoTracker:
         Whether clusters that move alike are grouped; default yes ("paper": no). `group_limits`: farthest apart (cells), motions in the picture (px) and in depth (disparity) that differ at most.
     focal, baseline, d_infinity : float
         Focal length (px), distance of the cameras (the unit of depths), disparity of a point at infinity (px; default 0). With the first two, clusters have a depth and a velocity in space.
+    step_time : float
+        Time between ordinary steps, in the unit in which `update` is told `dt` and velocities are counted; default 1: all of them in steps. What is counted in steps here (`patience`, `coast`, `tolerance_per_step`, motions that `jump` or differ in a group) means these: with
+        times in seconds and every frame taken of 30 a second, give 1/30.
     threads : int
         Number of threads; default the environment's, else all.
 
@@ -288,6 +295,7 @@ class StereoTracker:
         focal: float | None = None,
         baseline: float | None = None,
         d_infinity: float = 0.0,
+        step_time: float = 1.0,
         threads: int | None = None,
     ) -> None:
         options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
@@ -295,29 +303,31 @@ class StereoTracker:
         self._tracker = _StereoTracker(given)
         self._disparity_range, self._row_range = given["disparity_range"], given["row_range"]
 
-    def update(self, left: ArrayLike, right: ArrayLike) -> StereoStep:
+    def update(self, left: ArrayLike, right: ArrayLike, dt: float | None = None) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
         Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
         cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
+        `dt`: time since the last step, in the unit of `step_time`; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; where things go is foreseen, and what is lost waited for, over that time. Of the first step it means nothing.
+
         Raises
         ------
         ValueError
-            For views of different size or of another size than before, naming both shapes.
+            For views of different size or of another size than before, naming both shapes, and a `dt` that is not above 0.
 
         Warns
         -----
         UserWarning
             Where views with edges hardly agree at any row offset in `row_range`; what is then found is mostly wrong.
         """
-        step = _step(self._tracker.update(*checked_views(left, right)))
+        step = _step(self._tracker.update(*checked_views(left, right), _waited(dt)))
         if step.rows_doubtful:
             tell_doubt(self._row_range)
         return step
 
-    def update_disparity(self, left: ArrayLike, disparity: ArrayLike) -> StereoStep:
-        """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part.
+    def update_disparity(self, left: ArrayLike, disparity: ArrayLike, dt: float | None = None) -> StereoStep:
+        """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part; `dt` as in `update`.
 
         Disparities farther than 1.5 px outside of the layers of the grid, which are those of `disparity_range` unless `grid` has more, take no part either: `StereoStep.left_out` counts them.
 
@@ -331,7 +341,7 @@ class StereoTracker:
         UserWarning
             Where disparities were left out.
         """
-        step = _step(self._tracker.update_disparity(as_array(left), as_array(disparity)))
+        step = _step(self._tracker.update_disparity(as_array(left), as_array(disparity), _waited(dt)))
         if step.left_out:
             all_of_them = step.left_out + len(step.rows)
             warnings.warn(f"disparity: {step.left_out} of {all_of_them} are outside of disparity_range, {self._disparity_range}, and were left out", UserWarning, stacklevel=2)
@@ -354,6 +364,10 @@ class StereoTracker:
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("StereoTracker: expected its graph, its tracks or its steps to be kept, got a tracker to pickle; it holds the last views smoothed at several levels")
+
+
+def _waited(dt: float | None) -> float | None:
+    return None if dt is None else real_number("dt", dt)
 
 
 def _step(told: dict[str, Any]) -> StereoStep:

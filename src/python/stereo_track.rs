@@ -1,135 +1,18 @@
 //! The stereo tracker for Python: views in, plain values out; the classes a user meets are in `jacoflow.track`.
 
+mod options;
+
+use self::options::Given;
 use super::arrays::{self, ColourRule};
 use super::stereo::in_levels;
 use crate::error::Error;
-use crate::parallel::Threads;
-use crate::stereo::Method;
 use crate::track::GreyLevels;
-use crate::track::stereo::{
-    EdgePoints, Grouping, Node, Recognition, Step, StereoCamera, StereoMode, StereoTracker, StereoTrackerOptions,
-    TrackGraph,
-};
+use crate::track::stereo::{EdgePoints, Node, Step, StereoTracker, TrackGraph};
 use crate::types::{AnyFrame, Frame};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-/// The keyword options of `jacoflow.track.StereoTracker`; none: the mode's default.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-struct Given {
-    mode: String,
-    n_components: Option<usize>,
-    weight_concentration_prior: f64,
-    mean_precision_prior: f64,
-    degrees_of_freedom_prior: f64,
-    covariance_prior: f64,
-    max_iter: usize,
-    warm_max_iter: usize,
-    tol: Tolerance,
-    n_init: usize,
-    prune_weight: f64,
-    random_state: u64,
-    disparity_range: [i32; 2],
-    row_range: [i32; 2],
-    row_offset: Option<f64>,
-    matching: Option<String>,
-    grid: (usize, usize, Option<usize>),
-    search: usize,
-    luminance_levels: usize,
-    arc_threshold: f64,
-    reseed_below: f64,
-    recognition: Option<bool>,
-    least_overlap: f64,
-    patience: usize,
-    tolerance: [f64; 3],
-    tolerance_per_step: [f64; 3],
-    coast: usize,
-    jump: (f64, f64),
-    grouping: Option<bool>,
-    group_limits: (f64, f64, f64),
-    focal: Option<f64>,
-    baseline: Option<f64>,
-    d_infinity: f64,
-    threads: Option<usize>,
-}
-
-/// `tol="auto"`, a number or None.
-#[derive(FromPyObject)]
-enum Tolerance {
-    Word(String),
-    Number(Option<f64>),
-}
-
-impl Given {
-    fn options(self) -> PyResult<StereoTrackerOptions> {
-        let Some(mode) = StereoMode::ALL.into_iter().find(|mode| mode.name() == self.mode) else {
-            return Err(Error::argument("mode", "\"improved\" or \"paper\"", format!("{:?}", self.mode)).into());
-        };
-        let mut options = StereoTrackerOptions::new(mode);
-        options.tol = match self.tol {
-            Tolerance::Number(tol) => tol,
-            Tolerance::Word(word) if word == "auto" => options.tol,
-            Tolerance::Word(word) => {
-                return Err(Error::argument("tol", "\"auto\", a number or None", format!("{word:?}")).into());
-            }
-        };
-        options = options.with_disparities(self.disparity_range);
-        let (rows, columns, layers) = self.grid;
-        options.grid.rows = rows;
-        options.grid.columns = columns;
-        options.grid.layers = layers.unwrap_or(options.grid.layers);
-        options.row_range = self.row_range;
-        options.row_offset = self.row_offset;
-        if let Some(matching) = self.matching {
-            options.matching = Method::ALL
-                .into_iter()
-                .find(|method| method.name() == matching)
-                .ok_or_else(|| Error::argument("matching", "\"classes\" or \"sgm\"", format!("{matching:?}")))?;
-        }
-        options.components = self.n_components.unwrap_or(options.components);
-        options.weight_concentration_prior = self.weight_concentration_prior;
-        options.mean_precision_prior = self.mean_precision_prior;
-        options.degrees_of_freedom_prior = self.degrees_of_freedom_prior;
-        options.covariance_prior = self.covariance_prior;
-        options.max_iter = self.max_iter;
-        options.warm_max_iter = self.warm_max_iter;
-        options.n_init = self.n_init;
-        options.prune_weight = self.prune_weight;
-        options.seed = self.random_state;
-        options.search = self.search;
-        options.luminance_levels = self.luminance_levels;
-        options.arc_threshold = self.arc_threshold;
-        options.reseed_below = self.reseed_below;
-        options.recognition = self.recognition.unwrap_or(options.recognition.is_some()).then_some(Recognition {
-            least_overlap: self.least_overlap,
-            patience: self.patience,
-            tolerance: self.tolerance,
-            tolerance_per_step: self.tolerance_per_step,
-            coast: self.coast,
-            jump: self.jump.0,
-            jump_disparity: self.jump.1,
-            ..Recognition::default()
-        });
-        let (reach, motion, depth_motion) = self.group_limits;
-        options.grouping =
-            self.grouping.unwrap_or(options.grouping.is_some()).then_some(Grouping { reach, motion, depth_motion });
-        options.camera = match (self.focal, self.baseline) {
-            (Some(focal), Some(baseline)) => Some(StereoCamera { focal, baseline, d_infinity: self.d_infinity }),
-            (None, None) => None,
-            (None, Some(_)) => {
-                return Err(Error::argument("focal", "a length in px beside the baseline", "None").into());
-            }
-            (Some(_), None) => {
-                return Err(Error::argument("baseline", "a length beside the focal length", "None").into());
-            }
-        };
-        options.threads = Threads::new(self.threads)?;
-        Ok(options)
-    }
-}
 
 /// The compiled part of `jacoflow.track.StereoTracker`.
 #[pyclass(name = "_StereoTracker", module = "jacoflow._jacoflow", frozen)]
@@ -148,16 +31,18 @@ impl PyStereoTracker {
 }
 
 impl Tracking {
-    /// A step from views, the left one first, in grey levels: views with which no step can be taken say nothing of the scale of floats.
+    /// A step from views, the left one first, in grey levels, `dt` after the last one: views with which no step can be taken say nothing of the scale of floats.
     fn step<const N: usize>(
         &mut self,
         views: &[AnyFrame; N],
+        dt: Option<f64>,
         take: impl FnOnce(&mut StereoTracker, [Frame<f32>; N]) -> crate::error::Result<Step>,
     ) -> crate::error::Result<Step> {
         let levels = match self.levels {
             Some(known) => known.revised(views),
             None => GreyLevels::decide_together(views),
         };
+        self.tracker.after(dt.unwrap_or(self.tracker.options().step_time))?;
         let step = take(&mut self.tracker, views.each_ref().map(|view| in_levels(view, levels.gain(view))))?;
         self.levels = Some(levels);
         Ok(step)
@@ -172,22 +57,28 @@ impl PyStereoTracker {
         Ok(Self(Mutex::new(Tracking { tracker: StereoTracker::new(options)?, levels: None })))
     }
 
-    /// The next step from both views, as a dictionary.
-    fn update<'py>(&self, left: &Bound<'py, PyAny>, right: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    /// The next step from both views, `dt` after the last one, as a dictionary.
+    fn update<'py>(
+        &self,
+        left: &Bound<'py, PyAny>,
+        right: &Bound<'py, PyAny>,
+        dt: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let py = left.py();
         let views = [
             arrays::frame("left", left, ColourRule::Luminance)?,
             arrays::frame("right", right, ColourRule::Luminance)?,
         ];
-        let step = py.detach(|| self.lock().step(&views, |tracker, [left, right]| tracker.update(&left, &right)))?;
+        let step = py.detach(|| self.lock().step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
         told(py, step)
     }
 
-    /// The next step from the left view and its disparities, NaN where there is none, as a dictionary.
+    /// The next step from the left view and its disparities, NaN where there is none, `dt` after the last one, as a dictionary.
     fn update_disparity<'py>(
         &self,
         left: &Bound<'py, PyAny>,
         disparity: &Bound<'py, PyAny>,
+        dt: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let py = left.py();
         let left = arrays::frame("left", left, ColourRule::Luminance)?;
@@ -204,7 +95,7 @@ impl PyStereoTracker {
             return Err(Error::argument("disparity", expected, told(disparity.size())).into());
         }
         let points = EdgePoints::from_map(&disparity);
-        let step = py.detach(|| self.lock().step(&[left], |tracker, [left]| tracker.update_edges(&left, points)))?;
+        let step = py.detach(|| self.lock().step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
         told(py, step)
     }
 
@@ -218,7 +109,7 @@ impl PyStereoTracker {
         PyTrackGraph(self.lock().tracker.graph().clone())
     }
 
-    /// Tracks by id: times (T,), positions (T, 3) and velocities (T, 3).
+    /// Tracks by id: times (T,), positions (T, 3), velocities (T, 3) and when that was (T,).
     fn tracks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
         for (id, track) in self.lock().tracker.tracks() {
@@ -229,6 +120,7 @@ impl PyStereoTracker {
                 arrays::owned::<i64>(py, &[count], times)?,
                 arrays::owned::<f64>(py, &[count, 3], flat(&track.positions))?,
                 arrays::owned::<f64>(py, &[count, 3], flat(&track.velocities))?,
+                arrays::owned::<f64>(py, &[count], track.clock.clone())?,
             );
             out.set_item(id, parts)?;
         }
@@ -271,6 +163,7 @@ fn told(py: Python<'_>, step: Step) -> PyResult<Bound<'_, PyDict>> {
     let count = [step.rows.len()];
     let clusters = step.clusters.iter().map(|node| cluster(py, node)).collect::<PyResult<Vec<_>>>()?;
     out.set_item("time", step.time)?;
+    out.set_item("clock", step.clock)?;
     out.set_item("clusters", clusters)?;
     out.set_item("rows", arrays::owned(py, &count, step.rows)?)?;
     out.set_item("cols", arrays::owned(py, &count, step.columns)?)?;

@@ -1,19 +1,20 @@
 //! Which track each component is: kept while it covers its moved self, rested when lost, recognised; section 6.6 of the stereo tracker's design.
 
+use super::moment::Moment;
 use super::options::Recognition;
 
 /// What is known of the track of a component.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Identity {
     pub id: u64,
-    /// Step at which it began.
-    pub born: usize,
-    /// Last good motion, cells along x, y and disparity per step.
+    /// When it began, ordinary steps.
+    pub born: f64,
+    /// Last good motion, cells along x, y and disparity per ordinary step.
     pub velocity: Option<[f64; 3]>,
     /// Steps of like motion.
     pub steady: usize,
-    /// Steps coasted in a row.
-    pub coasted: usize,
+    /// Time coasted without a break, ordinary steps.
+    pub coasted: f64,
     /// Where it is, cells: its middle, or where it went since while it is mostly covered, which shifts the middle.
     pub position: [f64; 3],
     /// Most edge pixels of late.
@@ -42,13 +43,16 @@ const AS_THICK: (f64, f64) = (2.0, 0.5);
 const AS_LARGE: f64 = 1.5;
 /// Half the extent of something even, over its median deviation.
 const HALF_EXTENT: f64 = 2.0;
-/// What the memory of the most pixels loses each step.
+/// What the memory of the most pixels keeps for each ordinary step.
 const FORGET: f64 = 0.9;
+
+/// Times differ by more than this, ordinary steps, unless they are the same one summed up otherwise.
+const SAME_TIME: f64 = 1e-6;
 
 /// What a component does from one step to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Carried {
-    /// Motion, cells.
+    /// Motion, cells per ordinary step.
     pub motion: [f64; 3],
     /// Whether it is an extrapolation.
     pub coasting: bool,
@@ -58,8 +62,8 @@ pub(super) struct Carried {
 #[derive(Debug, Clone, PartialEq)]
 struct Resting {
     identity: Identity,
-    /// Step at which it was last where its position says.
-    since: usize,
+    /// When it was last where its position says, ordinary steps.
+    since: f64,
 }
 
 /// All tracks: those of the components, and the lost ones.
@@ -70,7 +74,7 @@ pub(super) struct Identities {
     next: u64,
 }
 
-/// Whether two motions differ by a jump; both in cells.
+/// Whether two motions differ by a jump; both in cells per ordinary step.
 fn jumps(a: [f64; 3], b: [f64; 3], cell: [f64; 3], limits: &Recognition) -> bool {
     let plane = ((a[0] - b[0]) * cell[0]).hypot((a[1] - b[1]) * cell[1]);
     plane > limits.jump || (a[2] - b[2]).abs() > limits.jump_disparity
@@ -83,11 +87,11 @@ impl Identities {
         self.next - 1
     }
 
-    /// The motion that carries component `k` on: what was measured, or the last good motion of a steady track for a few steps after that jumped or was not measured.
+    /// The motion that carries component `k` on over a gap of so many ordinary steps: what was measured, or the last good motion of a steady track for a while after that jumped or was not measured.
     pub fn carry(
         &mut self,
         k: usize,
-        measured: Option<[f64; 3]>,
+        (measured, gap): (Option<[f64; 3]>, f64),
         cell: [f64; 3],
         limits: Option<&Recognition>,
     ) -> Option<Carried> {
@@ -104,26 +108,27 @@ impl Identities {
         };
         if let Some(last) = identity.velocity.filter(|_| !like) {
             let steady = identity.steady >= limits.steady || measured.is_none();
-            if steady && identity.coasted < limits.coast {
-                identity.coasted += 1;
+            let coasted = identity.coasted + gap;
+            if steady && coasted <= limits.coast as f64 + SAME_TIME {
+                identity.coasted = coasted;
                 return Some(Carried { motion: last, coasting: true });
             }
         }
-        identity.coasted = 0;
+        identity.coasted = 0.0;
         identity.steady = if like { identity.steady + 1 } else { usize::from(measured.is_some()) };
         identity.velocity = measured.or(identity.velocity);
         measured.map(|motion| Carried { motion, coasting: false })
     }
 
-    /// Takes the tracks of the components for which `lost` holds, to be waited for.
-    pub fn rest(&mut self, time: usize, lost: impl Fn(usize) -> bool) {
+    /// Takes the tracks of the components for which `lost` holds, to be waited for; they were last seen at `since`, ordinary steps.
+    pub fn rest(&mut self, since: f64, lost: impl Fn(usize) -> bool) {
         for k in 0..self.live.len() {
             if lost(k)
                 && let Some(identity) = self.live[k].take()
             {
                 // Who never moved steadily is not known well enough to be recognised.
                 if identity.steady > 0 {
-                    self.resting.push(Resting { identity, since: time });
+                    self.resting.push(Resting { identity, since });
                 }
             }
         }
@@ -131,18 +136,19 @@ impl Identities {
 
     /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track or one that has only just begun; which
     /// its own component gets in exchange.
-    fn pass_to_larger_parts(&mut self, time: usize, seen: &[Sighting], least: f64, limits: &Recognition) {
+    fn pass_to_larger_parts(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(identity) = self.live[own.component].as_ref() else { continue };
             if own.pixels as f64 >= COVERED * identity.peak {
                 continue;
             }
-            let young = |other: &Identity| other.born > identity.born && time <= other.born + limits.coast;
+            let young =
+                |other: &Identity| other.born > identity.born && at.now <= other.born + limits.coast as f64 + SAME_TIME;
             let larger = seen.iter().filter(|new| {
                 let free = self.live[new.component].as_ref().is_none_or(young);
                 free && new.pixels > own.pixels
                     && new.pixels as f64 >= least
-                    && identity.distance(1, new, limits).is_some()
+                    && identity.distance(at.gap, new, limits).is_some()
             });
             if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
                 self.live.swap(own.component, new.component);
@@ -152,13 +158,15 @@ impl Identities {
 
     /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one.
     /// Then all are where they were seen.
-    pub fn name_all(&mut self, time: usize, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
-        self.resting.retain(|resting| limits.is_some_and(|limits| time - resting.since <= limits.patience));
+    pub fn name_all(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
+        self.resting.retain(|resting| {
+            limits.is_some_and(|limits| at.now - resting.since <= limits.patience as f64 + SAME_TIME)
+        });
         if let Some(limits) = limits {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
                 for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
-                    if let Some(distance) = resting.identity.distance(time - resting.since, new, limits) {
+                    if let Some(distance) = resting.identity.distance(at.now - resting.since, new, limits) {
                         pairs.push((new.pixels, distance, r, new.component));
                     }
                 }
@@ -168,32 +176,35 @@ impl Identities {
             for (_, _, r, k) in pairs {
                 if !taken[r] && self.live[k].is_none() {
                     taken[r] = true;
-                    self.live[k] = Some(self.resting[r].awake(time));
+                    self.live[k] = Some(self.resting[r].awake(at));
                 }
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
-            self.pass_to_larger_parts(time, seen, least, limits);
+            self.pass_to_larger_parts(at, seen, least, limits);
         }
         for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
                 let id = self.name();
-                let born = time;
-                let unknown = Identity { id, born, velocity: None, steady: 0, coasted: 0, position, peak: 0.0, spread };
+                let (born, velocity) = (at.now, None);
+                let unknown = Identity { id, born, velocity, steady: 0, coasted: 0.0, position, peak: 0.0, spread };
                 self.live[component] = Some(unknown);
             }
             if let Some(identity) = &mut self.live[component] {
-                identity.see(position, pixels as f64, spread);
+                identity.see((position, pixels as f64, spread), at.gap);
             }
         }
     }
 }
 
 impl Identity {
-    fn see(&mut self, position: [f64; 3], pixels: f64, spread: [f64; 3]) {
-        self.peak = pixels.max(FORGET * self.peak);
+    /// Takes over where it is seen, with how many pixels and how far spread, so many ordinary steps after it was last.
+    fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 3]), gap: f64) {
+        self.peak = pixels.max(FORGET.powf(gap) * self.peak);
         self.position = match self.velocity {
-            Some(velocity) if pixels < COVERED * self.peak => std::array::from_fn(|i| self.position[i] + velocity[i]),
+            Some(velocity) if pixels < COVERED * self.peak => {
+                std::array::from_fn(|i| self.position[i] + gap * velocity[i])
+            }
             _ => {
                 self.spread = spread;
                 position
@@ -201,16 +212,16 @@ impl Identity {
         };
     }
 
-    /// How far a component is from where the track is expected after so many steps, in tolerances; `None` beyond them, and for one that does not resemble it.
-    fn distance(&self, steps: usize, seen: &Sighting, limits: &Recognition) -> Option<f64> {
+    /// How far a component is from where the track is expected after so many ordinary steps, in tolerances; `None` beyond them, and for one that does not resemble it.
+    fn distance(&self, steps: f64, seen: &Sighting, limits: &Recognition) -> Option<f64> {
         let velocity = self.velocity.filter(|_| self.resembles(seen))?;
         // The middle of what is not covered is as far from that of the whole as the other part allows.
         let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
         let mut sum = 0.0;
         for i in 0..3 {
-            let expected = self.position[i] + steps as f64 * velocity[i];
+            let expected = self.position[i] + steps * velocity[i];
             let part = if i < 2 { covered * HALF_EXTENT * self.spread[i] } else { 0.0 };
-            let tolerance = limits.tolerance[i] + steps as f64 * limits.tolerance_per_step[i] + part;
+            let tolerance = limits.tolerance[i] + steps * limits.tolerance_per_step[i] + part;
             let off = (seen.position[i] - expected).abs() / tolerance;
             if off > 1.0 {
                 return None;
@@ -230,10 +241,10 @@ impl Identity {
 
 impl Resting {
     /// The track as it goes on where it is expected; how much there is of it is remembered.
-    fn awake(&self, time: usize) -> Identity {
-        let mut identity = Identity { coasted: 0, ..self.identity.clone() };
+    fn awake(&self, at: Moment) -> Identity {
+        let mut identity = Identity { coasted: 0.0, ..self.identity.clone() };
         if let Some(velocity) = identity.velocity {
-            let steps = (time - self.since).saturating_sub(1) as f64;
+            let steps = (at.before() - self.since).max(0.0);
             (0..3).for_each(|i| identity.position[i] += steps * velocity[i]);
         }
         identity

@@ -10,10 +10,13 @@
 mod cell_luminance;
 mod clusters;
 mod disparity_change;
+mod fine_motion;
 mod graph;
 mod grouping;
 mod identity;
 mod lucas_kanade;
+mod measured_motion;
+mod moment;
 mod motion;
 mod options;
 mod overlap;

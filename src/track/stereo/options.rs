@@ -1,11 +1,9 @@
 //! How the stereo tracker works.
 
-use crate::error::{Error, Result};
+mod check;
+
 use crate::parallel::Threads;
 use crate::stereo::Method;
-
-/// Most components: far fewer than a mixture may have, as every two of them are compared at each step.
-const MOST_COMPONENTS: usize = 4096;
 
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -79,19 +77,19 @@ impl StereoCamera {
 pub struct Recognition {
     /// A component that covers less of its moved self loses its track; default 0.2.
     pub least_overlap: f64,
-    /// Steps that a lost track is waited for; default 10.
+    /// Ordinary steps that a lost track is waited for; default 10.
     pub patience: usize,
     /// How far from where it is expected a new component may be to be the lost one, cells along x, y and disparity; default (3, 4, 1).
     pub tolerance: [f64; 3],
-    /// How much farther for each step since it was lost; default (0.5, 0.5, 0.2).
+    /// How much farther for each ordinary step since it was lost; default (0.5, 0.5, 0.2).
     pub tolerance_per_step: [f64; 3],
     /// Steps of like motion after which a track is steady; default 2.
     pub steady: usize,
-    /// Most steps that a steady track coasts through a jump; default 3.
+    /// Most ordinary steps that a steady track coasts through a jump; default 3.
     pub coast: usize,
-    /// A jump in the picture, px; default 24.
+    /// A jump in the picture: change of the motion, px per ordinary step; default 24.
     pub jump: f64,
-    /// A jump in disparity; default 1.5.
+    /// A jump in disparity, per ordinary step; default 1.5.
     pub jump_disparity: f64,
 }
 
@@ -115,9 +113,9 @@ impl Default for Recognition {
 pub struct Grouping {
     /// Farthest that clusters which touch are apart in the picture, cells; default 3.5.
     pub reach: f64,
-    /// Most that their affine motions differ, median over the pixels of both, px; default 1.
+    /// Most that their affine motions differ, median over the pixels of both, px per ordinary step; default 1.
     pub motion: f64,
-    /// Most that their motions in depth differ, disparity per step; default 0.15.
+    /// Most that their motions in depth differ, disparity per ordinary step; default 0.15.
     pub depth_motion: f64,
 }
 
@@ -164,7 +162,7 @@ pub struct StereoTrackerOptions {
     pub prune_weight: f64,
     /// Seed of the cold starts; default 0.
     pub seed: u64,
-    /// How far templates and depths are searched, cells and disparities; default 8.
+    /// How far templates and depths are searched from one ordinary step to the next, cells and disparities; default 8. Over a gap farther in proportion, at most 64.
     pub search: usize,
     /// Levels of the reduced luminance; default 64.
     pub luminance_levels: usize,
@@ -178,6 +176,8 @@ pub struct StereoTrackerOptions {
     pub grouping: Option<Grouping>,
     /// The cameras, if depths are wanted.
     pub camera: Option<StereoCamera>,
+    /// Time between ordinary steps, in the unit that times are told and velocities are counted in; default 1, a step. Everything here that is counted in steps means these; 1/30 where times are in seconds and every frame is taken of 30 a second.
+    pub step_time: f64,
     /// Number of threads; results do not depend on it.
     pub threads: Threads,
 }
@@ -217,6 +217,7 @@ impl StereoTrackerOptions {
             recognition: improved.then(Recognition::default),
             grouping: improved.then(Grouping::default),
             camera: None,
+            step_time: 1.0,
             threads: Threads::default(),
         }
     }
@@ -229,131 +230,11 @@ impl StereoTrackerOptions {
         self.grid.layers = greatest.saturating_sub(least).max(1) as usize;
         self
     }
-
-    /// Checks every option by itself.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option.
-    pub fn check(&self) -> Result<()> {
-        self.matching_options(self.row_offset).check()?;
-        if !(1..=MOST_COMPONENTS).contains(&self.components) {
-            let expected = format!("a positive integer up to {MOST_COMPONENTS}");
-            return Err(Error::argument("n_components", expected, self.components));
-        }
-        self.mixture_options(false, 0).check()?;
-        if self.warm_max_iter == 0 {
-            return Err(Error::argument("warm_max_iter", "a positive integer", 0));
-        }
-        if !(self.degrees_of_freedom_prior > 2.0 && self.degrees_of_freedom_prior.is_finite()) {
-            let expected = "a finite number above 2, one less than there are coordinates";
-            return Err(Error::argument("degrees_of_freedom_prior", expected, self.degrees_of_freedom_prior));
-        }
-        if !(self.covariance_prior > 0.0 && self.covariance_prior.is_finite()) {
-            return Err(Error::argument("covariance_prior", "a finite number above 0, cells^2", self.covariance_prior));
-        }
-        let VoxelGrid { columns, rows, layers, .. } = self.grid;
-        if [columns, rows, layers].iter().any(|side| !(1..=4096).contains(side)) || columns * rows * layers > 1 << 26 {
-            let expected = "1 to 4096 cells along y, x and disparity, at most 2^26 in all";
-            return Err(Error::argument("grid", expected, format!("({rows}, {columns}, {layers})")));
-        }
-        let ([least, greatest], first) = (self.disparity_range, i64::from(self.grid.first_disparity));
-        if i64::from(least) < first || i64::from(greatest) > first + layers as i64 {
-            let expected = format!(
-                "layers for the disparities {least} to {greatest}, at least {}",
-                i64::from(greatest) - i64::from(least)
-            );
-            return Err(Error::argument("grid", expected, format!("{layers} from {first}")));
-        }
-        if !(1..=64).contains(&self.search) {
-            return Err(Error::argument("search", "1 to 64 cells", self.search));
-        }
-        if !(2..=256).contains(&self.luminance_levels) {
-            return Err(Error::argument("luminance_levels", "2 to 256", self.luminance_levels));
-        }
-        if !(self.arc_threshold >= 0.0 && self.arc_threshold <= 2.0) {
-            return Err(Error::argument("arc_threshold", "a score, 0 to 2", self.arc_threshold));
-        }
-        if let Some(limits) = &self.recognition {
-            let lengths = limits.tolerance.iter().chain(&limits.tolerance_per_step);
-            if !(0.0..=1.0).contains(&limits.least_overlap) {
-                return Err(Error::argument("least_overlap", "a share, 0 to 1", limits.least_overlap));
-            }
-            let each = [("jump", limits.jump), ("jump", limits.jump_disparity)];
-            not_negative(each.into_iter().chain(lengths.map(|length| ("tolerance", *length))))?;
-        }
-        if let Some(Grouping { reach, motion, depth_motion }) = self.grouping {
-            not_negative([reach, motion, depth_motion].into_iter().map(|limit| ("group_limits", limit)))?;
-        }
-        not_negative([("reseed_below", self.reseed_below)].into_iter())?;
-        if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
-            for (name, value) in [("focal", focal), ("baseline", baseline)] {
-                if !(value > 0.0 && value.is_finite()) {
-                    return Err(Error::argument(name, "a length above 0", value));
-                }
-            }
-            if !d_infinity.is_finite() {
-                return Err(Error::argument("d_infinity", "a disparity, px", d_infinity));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Refuses NaN and what is below 0.
-fn not_negative(limits: impl Iterator<Item = (&'static str, f64)>) -> Result<()> {
-    for (name, value) in limits {
-        if value.is_nan() || value < 0.0 {
-            return Err(Error::argument(name, "a number that is not negative", value));
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn each_option_out_of_range_is_named() {
-        let with = |change: fn(&mut StereoTrackerOptions)| {
-            let mut options = StereoTrackerOptions::default();
-            change(&mut options);
-            options.check().unwrap_err().to_string()
-        };
-        assert!(with(|o| o.grid.layers = 0).starts_with("grid: "));
-        let message = with(|o| o.grid.layers = 63);
-        assert!(message.starts_with("grid: ") && message.contains("-40 to 24, at least 64"), "{message}");
-        assert!(with(|o| o.grid.first_disparity = -39).starts_with("grid: "));
-        assert!(with(|o| o.disparity_range = [0, 40]).starts_with("grid: "));
-        assert!(StereoTrackerOptions::default().with_disparities([3, 3]).check().is_ok());
-        for wrong in [0, MOST_COMPONENTS + 1, 100_000] {
-            let options = StereoTrackerOptions { components: wrong, ..StereoTrackerOptions::default() };
-            let message = options.check().unwrap_err().to_string();
-            assert!(message.starts_with("n_components: ") && message.contains("up to 4096"), "{message}");
-        }
-        assert!(with(|o| o.search = 0).starts_with("search: "));
-        assert!(with(|o| o.disparity_range = [5, -5]).starts_with("disparity_range: "));
-        assert!(with(|o| o.max_iter = 0).starts_with("max_iter: "));
-        assert!(with(|o| o.warm_max_iter = 0).starts_with("warm_max_iter: "));
-        assert!(with(|o| o.reseed_below = -1.0).starts_with("reseed_below: "));
-        let nowhere = |reach| Some(Grouping { reach, ..Grouping::default() });
-        let options = StereoTrackerOptions { grouping: nowhere(f64::NAN), ..StereoTrackerOptions::default() };
-        assert!(options.check().unwrap_err().to_string().starts_with("group_limits: "));
-        let limits = Recognition { tolerance: [3.0, -4.0, 1.0], ..Recognition::default() };
-        let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
-        assert!(options.check().unwrap_err().to_string().starts_with("tolerance: "));
-        let limits = Recognition { least_overlap: 1.1, ..Recognition::default() };
-        let options = StereoTrackerOptions { recognition: Some(limits), ..StereoTrackerOptions::default() };
-        assert!(options.check().unwrap_err().to_string().starts_with("least_overlap: "));
-        assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
-        assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
-        assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
-        assert!(with(|o| o.arc_threshold = f64::NAN).starts_with("arc_threshold: "));
-        let camera = StereoCamera { focal: 0.0, baseline: 0.075, d_infinity: 0.0 };
-        let options = StereoTrackerOptions { camera: Some(camera), ..StereoTrackerOptions::default() };
-        assert!(options.check().unwrap_err().to_string().starts_with("focal: "));
-        assert!(StereoTrackerOptions::new(StereoMode::Paper).check().is_ok());
-    }
 
     #[test]
     fn depth_is_that_of_two_cameras() {

@@ -7,6 +7,8 @@ use super::graph::Node;
 pub struct Step {
     /// Step, from 0.
     pub time: usize,
+    /// Time since the first step, in the unit of the tracker's `step_time`: by default steps, and the same number where none is late or early.
+    pub clock: f64,
     /// Clusters with edge pixels, by component.
     pub clusters: Vec<Node>,
     /// Rows of the N edge pixels with a disparity, px.
@@ -32,8 +34,10 @@ pub struct Step {
 pub struct Track {
     /// Steps at which it was seen, ascending.
     pub times: Vec<usize>,
+    /// When these were, [`Step::clock`].
+    pub clock: Vec<f64>,
     /// Mean `(x, y, d)` there, px.
     pub positions: Vec<[f64; 3]>,
-    /// Motion `(u, v, w)` since the step before, px/step; NaN where not measured.
+    /// Motion `(u, v, w)` since the step before, px for each unit of time; NaN where not measured.
     pub velocities: Vec<[f64; 3]>,
 }

@@ -2,11 +2,14 @@
 
 mod advance;
 mod cluster;
+mod expected;
+mod meeting;
 mod record;
 
 use super::cell_luminance::CellLuminance;
 use super::graph::TrackGraph;
 use super::identity::Identities;
+use super::moment::Moment;
 use super::motion::Seen;
 use super::options::{StereoMode, StereoTrackerOptions};
 use super::step::{Step, Track};
@@ -25,6 +28,10 @@ pub struct StereoTracker {
     options: StereoTrackerOptions,
     lattice: Option<Lattice>,
     time: usize,
+    /// When the step that is being taken is, or the last one was.
+    moment: Moment,
+    /// Time from the last step to the next, where that was told.
+    waited: Option<f64>,
     /// Offset of the right view's rows.
     rows: FilmRows,
     last: Option<Seen>,
@@ -42,6 +49,8 @@ impl StereoTracker {
         options.check()?;
         Ok(Self {
             rows: FilmRows::new(options.row_offset),
+            moment: Moment { now: 0.0, gap: 1.0, step_time: options.step_time },
+            waited: None,
             options,
             lattice: None,
             time: 0,
@@ -76,6 +85,19 @@ impl StereoTracker {
     /// Tracks by their ids.
     pub fn tracks(&self) -> &BTreeMap<u64, Track> {
         &self.tracks
+    }
+
+    /// Says how long after the last step the next one is, in the unit of [`StereoTrackerOptions::step_time`]: 2 where a frame is missing. Without it, an ordinary step. Velocities are for the unit of time, motions are
+    /// predicted and limits that are counted in steps hold over the time that went by. Of the first step it means nothing.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `dt` unless it is a time above 0.
+    pub fn after(&mut self, dt: f64) -> Result<&mut Self> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::argument("dt", "a time above 0", dt));
+        }
+        self.waited = Some(dt);
+        Ok(self)
     }
 
     /// The next step from both views, grey levels 0 to 255.
@@ -129,7 +151,16 @@ impl StereoTracker {
         }
     }
 
+    /// When the next step is.
+    fn next_moment(&self) -> Moment {
+        let Moment { now, step_time, .. } = self.moment;
+        let gap = self.waited.map_or(1.0, |dt| dt / step_time);
+        let now = if self.time == 0 { 0.0 } else { now + gap };
+        Moment { now, gap, step_time }
+    }
+
     fn advance(&mut self, left: &Frame<f32>, points: EdgePoints, lattice: Lattice) -> Result<Step> {
+        self.moment = self.next_moment();
         let (points, left_out) = points.within(&lattice);
         let voxels = Voxels::count(&points, lattice);
         let luminance = CellLuminance::new(left, &lattice, self.options.luminance_levels);
@@ -142,6 +173,7 @@ impl StereoTracker {
         self.last = Some(seen);
         self.posterior = posterior;
         self.time += 1;
+        self.waited = None;
         Ok(step)
     }
 }

@@ -10,7 +10,12 @@ fn at(component: usize, position: [f64; 3]) -> Sighting {
 
 fn identities() -> Identities {
     let mut all = Identities { live: vec![None; 3], ..Identities::default() };
-    all.name_all(0, &[at(0, [10.0, 10.0, 30.0]), at(1, [40.0, 10.0, 20.0])], LEAST, Some(&Recognition::default()));
+    all.name_all(
+        Moment::at(0),
+        &[at(0, [10.0, 10.0, 30.0]), at(1, [40.0, 10.0, 20.0])],
+        LEAST,
+        Some(&Recognition::default()),
+    );
     all
 }
 
@@ -18,28 +23,28 @@ fn identities() -> Identities {
 fn a_hidden_track_is_recognised_where_it_is_expected() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
-    all.carry(0, Some([2.0, 0.0, 0.5]), CELL, Some(&limits)).unwrap();
-    all.name_all(1, &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
+    all.carry(0, (Some([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (Some([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
+    all.name_all(Moment::at(1), &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
     // Gone at steps 2 to 4.
-    all.rest(1, |k| k == 0);
+    all.rest(1.0, |k| k == 0);
     for time in 2..5 {
-        all.name_all(time, &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
+        all.name_all(Moment::at(time), &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
         assert_eq!(all.live[0], None);
     }
     let (mut elsewhere, mut small) = (all.clone(), all.clone());
-    small.name_all(5, &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
+    small.name_all(Moment::at(5), &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
     assert_eq!(small.live[2].as_ref().unwrap().id, 2);
     // Half of it, whose middle is farther from the expected one than that of all of it may be.
     let upper = at(2, [20.5, 1.0, 32.6]);
     for (pixels, id) in [(100, 2), (40, 0)] {
         let mut part = all.clone();
-        part.name_all(5, &[Sighting { pixels, ..upper }], LEAST, Some(&limits));
+        part.name_all(Moment::at(5), &[Sighting { pixels, ..upper }], LEAST, Some(&limits));
         assert_eq!(part.live[2].as_ref().unwrap().id, id);
     }
-    all.name_all(5, &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
+    all.name_all(Moment::at(5), &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 0);
-    elsewhere.name_all(5, &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
+    elsewhere.name_all(Moment::at(5), &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
     assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
 }
 
@@ -48,9 +53,9 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
+        all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
     }
-    all.rest(0, |k| k == 0);
+    all.rest(0.0, |k| k == 0);
     let there = at(2, [16.0, 10.0, 30.0]);
     for (seen, known) in [
         (there, true),
@@ -60,7 +65,7 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
         (Sighting { spread: [2.0, 4.0, 4.0], ..there }, false),
     ] {
         let mut all = all.clone();
-        all.name_all(3, &[seen], LEAST, Some(&limits));
+        all.name_all(Moment::at(3), &[seen], LEAST, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id == 0, known, "{seen:?}");
     }
 }
@@ -70,24 +75,44 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits));
+        all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
     }
-    all.rest(0, |k| k == 0);
+    all.rest(0.0, |k| k == 0);
     // At step 2 two parts of it, at step 3 another one that is larger; at last it is whole.
     let part = |component, position, pixels| Sighting { pixels, ..at(component, position) };
     let ids = |all: &Identities| all.live.iter().map(|live| live.as_ref().map(|live| live.id)).collect::<Vec<_>>();
-    all.name_all(2, &[part(0, [14.5, 5.0, 30.0], 20), part(2, [14.5, 14.0, 30.0], 30)], LEAST, Some(&limits));
+    all.name_all(
+        Moment::at(2),
+        &[part(0, [14.5, 5.0, 30.0], 20), part(2, [14.5, 14.0, 30.0], 30)],
+        LEAST,
+        Some(&limits),
+    );
     assert_eq!(ids(&all), [Some(2), Some(1), Some(0)]);
     all.live[0] = None;
-    all.name_all(3, &[part(0, [16.5, 5.0, 30.0], 60), part(2, [16.5, 14.0, 30.0], 30)], LEAST, Some(&limits));
+    all.name_all(
+        Moment::at(3),
+        &[part(0, [16.5, 5.0, 30.0], 60), part(2, [16.5, 14.0, 30.0], 30)],
+        LEAST,
+        Some(&limits),
+    );
     assert_eq!(ids(&all), [Some(0), Some(1), Some(3)]);
     assert_eq!(all.live[0].as_ref().unwrap().position, [16.0, 10.0, 30.0]);
     // The one that it was taken for is larger after all.
     let mut other = all.clone();
-    other.name_all(4, &[part(0, [18.5, 5.0, 30.0], 40), part(2, [18.5, 14.0, 30.0], 50)], LEAST, Some(&limits));
+    other.name_all(
+        Moment::at(4),
+        &[part(0, [18.5, 5.0, 30.0], 40), part(2, [18.5, 14.0, 30.0], 50)],
+        LEAST,
+        Some(&limits),
+    );
     assert_eq!(ids(&other), [Some(3), Some(1), Some(0)]);
     all.live[2] = None;
-    all.name_all(4, &[part(0, [18.5, 10.0, 30.0], 95), part(2, [18.0, 5.0, 30.0], 98)], LEAST, Some(&limits));
+    all.name_all(
+        Moment::at(4),
+        &[part(0, [18.5, 10.0, 30.0], 95), part(2, [18.0, 5.0, 30.0], 98)],
+        LEAST,
+        Some(&limits),
+    );
     assert_eq!(ids(&all), [Some(0), Some(1), Some(4)]);
 }
 
@@ -95,12 +120,12 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
 fn nobody_waits_for_ever_nor_without_a_history() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.rest(0, |k| k == 1);
-    all.name_all(3, &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
+    all.rest(0.0, |k| k == 1);
+    all.name_all(Moment::at(3), &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-    all.carry(0, Some([0.0; 3]), CELL, Some(&limits)).unwrap();
-    all.rest(3, |k| k == 0);
-    all.name_all(14, &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
+    all.carry(0, (Some([0.0; 3]), 1.0), CELL, Some(&limits)).unwrap();
+    all.rest(3.0, |k| k == 0);
+    all.name_all(Moment::at(14), &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
     assert_eq!(all.live[1].as_ref().unwrap().id, 3);
 }
 
@@ -109,7 +134,7 @@ fn steady_tracks_coast_through_jumps_for_three_steps() {
     let limits = Recognition::default();
     let mut all = identities();
     let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
-    let mut carry = |motion| all.carry(0, motion, CELL, Some(&limits));
+    let mut carry = |motion| all.carry(0, (motion, 1.0), CELL, Some(&limits));
     for _ in 0..3 {
         assert_eq!(carry(Some(good)), Some(Carried { motion: good, coasting: false }));
     }
@@ -123,19 +148,19 @@ fn steady_tracks_coast_through_jumps_for_three_steps() {
 fn what_is_mostly_covered_goes_on_where_it_went() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, Some([2.0, 0.0, 0.0]), CELL, Some(&limits)).unwrap();
-    all.name_all(1, &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
+    all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits)).unwrap();
+    all.name_all(Moment::at(1), &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
-    all.name_all(2, &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
+    all.name_all(Moment::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);
 }
 
 #[test]
 fn without_recognition_what_is_measured_counts() {
     let mut all = identities();
-    all.carry(0, Some([1.0; 3]), CELL, None);
-    assert_eq!(all.carry(0, None, CELL, None), None);
-    all.rest(1, |k| k == 0);
-    all.name_all(4, &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
+    all.carry(0, (Some([1.0; 3]), 1.0), CELL, None);
+    assert_eq!(all.carry(0, (None, 1.0), CELL, None), None);
+    all.rest(1.0, |k| k == 0);
+    all.name_all(Moment::at(4), &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
     assert_eq!(all.live[0].as_ref().unwrap().id, 2);
 }

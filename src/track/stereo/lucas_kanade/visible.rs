@@ -1,6 +1,7 @@
 //! Motion of what is still visible of a cluster: where more than half of it is being covered, a deviation taken from its own residuals makes all of it look sound.
 
-use super::{AFFINE_PIXELS, FINE, FINE_STEPS, PlaneMotion, SETTLED, SmoothedLevels, Task, Voter};
+use super::task::{Task, Voter};
+use super::{AFFINE_PIXELS, FINE, FINE_STEPS, PlaneMotion, SETTLED, SmoothedLevels};
 
 /// Deviations over the noise, one after another: from what lets an expectation be a pixel wrong to what is left at the end.
 const NARROWING: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
@@ -31,24 +32,6 @@ pub(in super::super) fn visible_motion(
         }
     }
     (best.1 as f64 >= LEAST_AGREEING * voters.len() as f64).then_some(best.0)
-}
-
-/// The pixels `(x, y)` that agree with a motion, that is, leave no more than what it leaves in general explains: not those of something else.
-pub(in super::super) fn following(
-    before: &SmoothedLevels,
-    after: &SmoothedLevels,
-    pixels: &[[f64; 2]],
-    motion: &PlaneMotion,
-) -> Vec<[f64; 2]> {
-    let Some(task) = Task::new(before, after, pixels) else { return vec![] };
-    let voters = task.voters(FINE);
-    let mut residuals = Vec::with_capacity(voters.len());
-    if task.residuals(&voters, &task.after.0[FINE], &task.map_of(motion), &mut residuals).is_none() {
-        return vec![];
-    }
-    let agree =
-        voters.iter().zip(&residuals).filter(|(_, residual)| f64::from(residual.abs()) <= AGREEING * motion.deviation);
-    agree.map(|(voter, _)| [task.centre[0] + f64::from(voter.x), task.centre[1] + f64::from(voter.y)]).collect()
 }
 
 impl Task<'_> {
@@ -122,19 +105,6 @@ mod tests {
         assert!((x - 46.5).abs() < 0.1 && (y - 50.5).abs() < 0.1, "{seen:?}");
         // Without an expectation nothing is said: hardly a pixel agrees with what was found.
         assert_eq!(visible_motion(&first, &second, &pixels(), (found, &[]), LEAST_DEVIATION), None);
-    }
-
-    #[test]
-    fn what_moves_otherwise_does_not_follow() {
-        let (first, second) = covered(70);
-        let found = affine_motion(&first, &second, &pixels(), &[[1.0, 0.0]]).unwrap();
-        let places = following(&first, &second, &pixels(), &found);
-        let beyond = |places: &[[f64; 2]]| places.iter().filter(|place| place[0] >= 70.0).count() as f64;
-        let share = (places.len() as f64 - beyond(&places)) / (pixels().len() as f64 - beyond(&pixels()));
-        assert!(share > 0.7, "{share}");
-        assert!(beyond(&places) < 0.3 * beyond(&pixels()), "{} of {}", beyond(&places), beyond(&pixels()));
-        let all = following(&first, &pair([1.5, 0.5], [0.0; 4]).1, &pixels(), &found);
-        assert!(all.len() as f64 > 0.9 * pixels().len() as f64);
     }
 
     #[test]

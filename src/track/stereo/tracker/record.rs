@@ -1,10 +1,10 @@
 //! Names, graph and tracks: what is kept of a step.
 
 use super::super::clusters::Clusters;
+use super::super::fine_motion::places;
 use super::super::graph::{Arc, Node};
 use super::super::identity::Sighting;
 use super::super::lucas_kanade::middle;
-use super::super::motion::places;
 use super::super::step::Step;
 use super::StereoTracker;
 use crate::error::Result;
@@ -17,7 +17,7 @@ const EVEN: f64 = 1.0 / 12.0;
 /// What is known of how each cluster came to a step.
 pub(super) struct Arrival {
     /// Motion since the last step, px and disparity.
-    pub velocity: Option<[f64; 3]>,
+    pub motion: Option<[f64; 3]>,
     pub affine: Option<[f64; 6]>,
     pub residual: Option<f64>,
     pub coasting: bool,
@@ -27,12 +27,12 @@ pub(super) struct Arrival {
 #[derive(Clone, Copy)]
 pub(super) struct Departure {
     /// Motion to this step, px and disparity.
-    pub velocity: [f64; 3],
+    pub motion: [f64; 3],
     pub affine: Option<[f64; 6]>,
 }
 
 impl Arrival {
-    pub const UNKNOWN: Self = Self { velocity: None, affine: None, residual: None, coasting: false };
+    pub const UNKNOWN: Self = Self { motion: None, affine: None, residual: None, coasting: false };
 }
 impl StereoTracker {
     /// Tracks of the paper's mode: a cluster goes on the track of another if each is the other's strongest arc, and that is strong enough.
@@ -55,17 +55,17 @@ impl StereoTracker {
         }
         self.identities.live = live;
         let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 3]));
-        self.identities.name_all(self.time, &seen, 0.0, None);
+        self.identities.name_all(self.moment, &seen, 0.0, None);
     }
 
     /// Tracks of the improved mode: a component is its track until it is empty or `lost`.
     pub(super) fn name_by_components(&mut self, clusters: &Clusters, lost: &[bool]) {
         let limits = self.options.recognition.as_ref();
         let lost = |k: usize| lost.get(k).is_none_or(|lost| *lost) || clusters.pixels[k].is_empty();
-        self.identities.rest(self.time.saturating_sub(1), lost);
+        self.identities.rest(self.moment.before(), lost);
         self.identities.live.resize(clusters.components(), None);
         let seen = sightings(clusters, |k| middle_and_deviation(clusters, k));
-        self.identities.name_all(self.time, &seen, self.options.reseed_below, limits);
+        self.identities.name_all(self.moment, &seen, self.options.reseed_below, limits);
     }
 
     /// Puts the clusters into the graph and the tracks, and tells of them.
@@ -88,7 +88,7 @@ impl StereoTracker {
         for (k, arrival) in arrivals.iter().enumerate() {
             let (Some(posterior), false) = (posterior, clusters.pixels[k].is_empty()) else { continue };
             let mean = mean(clusters, posterior, k);
-            let (depth, metric_velocity) = self.metric(mean, arrival.velocity, lattice.size);
+            let (depth, metric_velocity) = self.metric(mean, arrival.motion, lattice.size);
             nodes.push(Node {
                 time: self.time,
                 index: k,
@@ -98,10 +98,10 @@ impl StereoTracker {
                 weight: posterior.weight_concentration[k] / posterior.weight_concentration.iter().sum::<f64>(),
                 mean,
                 covariance: covariance(posterior, k, lattice.cell()),
-                velocity: arrival.velocity,
+                velocity: arrival.motion.map(|motion| self.moment.velocity(motion)),
                 next_velocity: None,
                 middle: middle(&places(clusters, k)),
-                affine: arrival.affine,
+                affine: arrival.affine.map(|affine| self.moment.velocity(affine)),
                 next_affine: None,
                 residual: arrival.residual,
                 coasting: arrival.coasting,
@@ -113,11 +113,13 @@ impl StereoTracker {
             self.graph.insert(node.clone());
             let track = self.tracks.entry(node.track_id).or_default();
             track.times.push(self.time);
+            track.clock.push(self.moment.clock());
             track.positions.push(node.mean);
             track.velocities.push(node.velocity.unwrap_or([f64::NAN; 3]));
         }
         Step {
             time: self.time,
+            clock: self.moment.clock(),
             clusters: nodes,
             rows: clusters.points.rows.clone(),
             columns: clusters.points.columns.clone(),
@@ -134,15 +136,15 @@ impl StereoTracker {
     fn metric(
         &self,
         mean: [f64; 3],
-        velocity: Option<[f64; 3]>,
+        motion: Option<[f64; 3]>,
         (width, height): (usize, usize),
     ) -> (Option<f64>, Option<[f64; 3]>) {
         let Some(camera) = self.options.camera else { return (None, None) };
         let middle = [0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)];
-        let speed = velocity.map(|velocity| {
-            let before = camera.place(std::array::from_fn(|i| mean[i] - velocity[i]), middle);
+        let speed = motion.map(|motion| {
+            let before = camera.place(std::array::from_fn(|i| mean[i] - motion[i]), middle);
             let now = camera.place(mean, middle);
-            std::array::from_fn(|i| now[i] - before[i])
+            self.moment.velocity(std::array::from_fn(|i| now[i] - before[i]))
         });
         let finite = |speed: &[f64; 3]| speed.iter().all(|value| value.is_finite());
         (Some(camera.depth(mean[2])).filter(|depth| depth.is_finite()), speed.filter(finite))
@@ -153,8 +155,9 @@ impl StereoTracker {
         if let Some(before) = self.time.checked_sub(1) {
             for (k, &departure) in departures.iter().enumerate() {
                 if let Some(node) = self.graph.node_mut(before, k) {
-                    node.next_velocity = departure.map(|departure| departure.velocity);
-                    node.next_affine = departure.and_then(|departure| departure.affine);
+                    node.next_velocity = departure.map(|departure| self.moment.velocity(departure.motion));
+                    let affine = departure.and_then(|departure| departure.affine);
+                    node.next_affine = affine.map(|affine| self.moment.velocity(affine));
                 }
             }
         }

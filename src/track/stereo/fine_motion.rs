@@ -1,0 +1,85 @@
+//! Motion of a cluster to fractions of a pixel: affine in the picture, one change of disparity.
+
+use super::clusters::Clusters;
+use super::lucas_kanade::PlaneMotion;
+use crate::types::AffineFlow;
+
+/// Motion of a cluster to fractions of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FineMotion {
+    pub plane: PlaneMotion,
+    /// Change of the disparity.
+    pub depth: f64,
+}
+
+impl FineMotion {
+    /// `(u, v, w)` at the centre, px and disparity: medians of the pixels along x and y, which stray pixels hardly move.
+    pub fn at_centre(&self) -> [f64; 3] {
+        [self.plane.flow.u, self.plane.flow.v, self.depth]
+    }
+
+    /// A translation of a cluster whose pixels have the middle `centre`.
+    pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
+        let flow = AffineFlow { u, v, ..AffineFlow::default() };
+        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, depth: w }
+    }
+
+    /// Where a point `(x, y, d)` goes.
+    pub fn moved(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
+        let [x, y] = self.plane.moved(x, y);
+        [x, y, d + self.depth]
+    }
+
+    /// The motion as `(u, v, u_x, v_x, u_y, v_y)` at a place of the next step.
+    pub fn affine_after(&self, [x, y]: [f64; 2]) -> [f64; 6] {
+        let PlaneMotion { flow, centre, .. } = self.plane;
+        let (u, v) = flow.at_offset(x - flow.u - centre[0], y - flow.v - centre[1]);
+        AffineFlow { u, v, ..flow }.to_array()
+    }
+
+    /// Where a point `(x, y, d)` of the next step came from, to first order in the derivatives of the flow.
+    pub fn moved_back(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
+        let flow = self.plane.flow;
+        let (du, dv) = flow.at_offset(x - flow.u - self.plane.centre[0], y - flow.v - self.plane.centre[1]);
+        [x - du, y - dv, d - self.depth]
+    }
+}
+
+/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew. Counting in whole voxels moves it by up to half of one more or less than
+/// the pixels, all of a flat cluster's alike in depth. `None` for a cluster without pixels.
+pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -> Option<[f64; 3]> {
+    let (lattice, pixels) = (clusters.lattice(), &clusters.pixels[k]);
+    let mut sum = [0.0; 3];
+    for &i in pixels {
+        let place = clusters.points.at(i as usize);
+        let (now, then) = (lattice.cell_at(place), lattice.cell_at(motion.moved(place)));
+        (0..3).for_each(|axis| sum[axis] += then[axis] - now[axis]);
+    }
+    (!pixels.is_empty()).then(|| sum.map(|sum| sum / pixels.len() as f64))
+}
+
+/// Places `(x, y)` of a cluster's pixels, px.
+pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
+    let place = |&i: &u32| {
+        let [x, y, _] = clusters.points.at(i as usize);
+        [x, y]
+    };
+    clusters.pixels[k].iter().map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clusters::tests::made_up;
+    use super::*;
+
+    #[test]
+    fn voxels_move_by_what_counting_makes_of_the_motion() {
+        // Pixels at x = 84 and 92, disparity -10.
+        let clusters = made_up(&[([10, 5, 30], 0), ([11, 5, 30], 0)], 2);
+        let moved = |motion| voxel_motion(&clusters, 0, &FineMotion::translation(motion, [88.0, 44.0]));
+        assert_eq!(moved([8.0, -8.0, 2.0]), Some([1.0, -1.0, 2.0]));
+        assert_eq!(moved([3.0, 4.0, 0.4]), Some([0.0, 1.0, 0.0]));
+        assert_eq!(moved([3.6, 0.0, 0.6]), Some([1.0, 0.0, 1.0]));
+        assert_eq!(voxel_motion(&clusters, 1, &FineMotion::translation([1.0; 3], [0.0; 2])), None);
+    }
+}

@@ -1,0 +1,209 @@
+//! Descending to a minimum of what a map leaves, level by level.
+
+use super::{
+    AFFINE_PIXELS, FINE, LEAST_DEVIATION, MAD, PRIOR, PlaneMotion, SETTLED, SmoothedLevels, TRUNCATED, VOTERS, middle,
+};
+use crate::types::{AffineFlow, Frame};
+use nalgebra::{SMatrix, SVector};
+
+/// A pixel that votes: its place about the centre, brightness and gradient there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Voter {
+    x: f32,
+    y: f32,
+    value: f32,
+    gradient: [f32; 2],
+}
+
+/// A sum of a few unknowns at a time.
+type Normal<const N: usize> = (SMatrix<f64, N, N>, SVector<f64, N>);
+
+/// Mean size of residuals, each no more than [`TRUNCATED`]; NaN outside of the picture is left out.
+fn truncated_mean(residuals: &[f32]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for residual in residuals.iter().filter(|residual| residual.is_finite()) {
+        sum += f64::from(residual.abs()).min(TRUNCATED);
+        count += 1.0;
+    }
+    sum / count
+}
+
+/// What all levels share. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.
+pub(super) struct Task<'a> {
+    before: &'a SmoothedLevels,
+    pub(super) after: &'a SmoothedLevels,
+    pixels: &'a [[f64; 2]],
+    centre: [f64; 2],
+    pub(super) radius: f64,
+}
+
+impl<'a> Task<'a> {
+    /// `None` for fewer than three pixels.
+    pub(super) fn new(before: &'a SmoothedLevels, after: &'a SmoothedLevels, pixels: &'a [[f64; 2]]) -> Option<Self> {
+        if pixels.len() < 3 {
+            return None;
+        }
+        let n = pixels.len() as f64;
+        let centre = middle(pixels);
+        let spread = pixels.iter().map(|p| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2)).sum::<f64>() / n;
+        Some(Self { before, after, pixels, centre, radius: spread.sqrt().max(1.0) })
+    }
+
+    /// A map as a motion, with what it leaves at the finest level.
+    pub(super) fn told(&self, map: &[f64; 6]) -> Option<PlaneMotion> {
+        let voters = self.voters(FINE);
+        let mut residuals = Vec::with_capacity(voters.len());
+        let deviation = self.residuals(&voters, &self.after.0[FINE], map, &mut residuals)?;
+        let [u, v, u_x, v_x, u_y, v_y] = *map;
+        let r = self.radius;
+        let flow = AffineFlow { u, v, u_x: u_x / r, v_x: v_x / r, u_y: u_y / r, v_y: v_y / r };
+        Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
+    }
+
+    /// A step of the map's first `N` unknowns, two for a translation and six for an affine map, from residuals of some deviation; its length, px.
+    pub(super) fn step<const N: usize>(
+        &self,
+        voters: &[Voter],
+        (residuals, deviation): (&[f32], f64),
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+    ) -> Option<f64> {
+        let (mut matrix, mut right) = self.normal::<N>(voters, residuals, deviation);
+        for k in 0..N {
+            let (scale, from) = if k < 2 { (PRIOR[0], start[k]) } else { (PRIOR[1] * self.radius, 0.0) };
+            let prior = (deviation / scale).powi(2);
+            matrix[(k, k)] += prior;
+            right[k] -= prior * (map[k] - from);
+        }
+        let step = matrix.cholesky()?.solve(&right);
+        map.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
+        Some(step.norm())
+    }
+
+    /// At most so many steps of the map's first `N` unknowns at one level, with room for the residuals.
+    fn settle<const N: usize>(
+        &self,
+        steps: usize,
+        (voters, after): (&[Voter], &Frame<f32>),
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+        residuals: &mut Vec<f32>,
+    ) -> Option<()> {
+        for _ in 0..steps {
+            let deviation = self.residuals(voters, after, map, residuals)?;
+            if self.step::<N>(voters, (residuals, deviation), map, start)? < SETTLED {
+                break;
+            }
+        }
+        Some(())
+    }
+
+    /// Goes a way as far as the level before the finest; the truncated residual there.
+    pub(super) fn go(&self, way: &[[usize; 2]; FINE], map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
+        let mut levels = way.iter().enumerate().filter(|(_, steps)| **steps != [0, 0]);
+        levels.try_fold(f64::INFINITY, |_, (level, steps)| self.descend(level, *steps, map, start))
+    }
+
+    /// Steps at one level, with a translation and with an affine map; the truncated residual at its end.
+    pub(super) fn descend(
+        &self,
+        level: usize,
+        [translations, affine]: [usize; 2],
+        map: &mut [f64; 6],
+        start: &[f64; 2],
+    ) -> Option<f64> {
+        let voters = self.voters(level);
+        let after = &self.after.0[level];
+        let mut residuals = Vec::with_capacity(voters.len());
+        let affine = if voters.len() < AFFINE_PIXELS { 0 } else { affine };
+        self.settle::<2>(translations, (&voters, after), map, start, &mut residuals)?;
+        self.settle::<6>(affine, (&voters, after), map, start, &mut residuals)?;
+        self.residuals(&voters, after, map, &mut residuals)?;
+        map.iter().all(|value| value.is_finite()).then(|| truncated_mean(&residuals))
+    }
+
+    /// Pixels that vote at a level, evenly drawn, those beside the border or anything that is not finite left out.
+    pub(super) fn voters(&self, level: usize) -> Vec<Voter> {
+        let frame = &self.before.0[level];
+        let (width, height) = frame.size();
+        let stride = self.pixels.len().div_ceil(VOTERS[level]).max(1);
+        let mut voters = Vec::with_capacity(self.pixels.len() / stride + 1);
+        for &[px, py] in self.pixels.iter().step_by(stride) {
+            let (x, y) = (px as usize, py as usize);
+            if x == 0 || y == 0 || x + 1 >= width || y + 1 >= height {
+                continue;
+            }
+            let gradient =
+                [0.5 * (frame.get(x + 1, y) - frame.get(x - 1, y)), 0.5 * (frame.get(x, y + 1) - frame.get(x, y - 1))];
+            let value = frame.get(x, y);
+            if (value + gradient[0] + gradient[1]).is_finite() {
+                let place = [(px - self.centre[0]) as f32, (py - self.centre[1]) as f32];
+                voters.push(Voter { x: place[0], y: place[1], value, gradient });
+            }
+        }
+        voters
+    }
+
+    /// Brightness after the motion less that before, NaN outside; the deviation, robustly. `None` unless at least half of the pixels are inside.
+    pub(super) fn residuals(
+        &self,
+        voters: &[Voter],
+        after: &Frame<f32>,
+        map: &[f64; 6],
+        out: &mut Vec<f32>,
+    ) -> Option<f64> {
+        let (width, height) = after.size();
+        let (last_x, last_y) = ((width - 1) as f32, (height - 1) as f32);
+        let data = after.data();
+        let [u, v] = [map[0] + self.centre[0], map[1] + self.centre[1]].map(|value| value as f32);
+        let [u_x, v_x, u_y, v_y] = [map[2], map[3], map[4], map[5]].map(|value| (value / self.radius) as f32);
+        out.clear();
+        for voter in voters {
+            let x = voter.x + u + u_x * voter.x + u_y * voter.y;
+            let y = voter.y + v + v_x * voter.x + v_y * voter.y;
+            let inside = x >= 0.0 && y >= 0.0 && x < last_x && y < last_y;
+            out.push(if inside {
+                let (column, row) = (x as usize, y as usize);
+                let (fx, fy) = (x - column as f32, y - row as f32);
+                let at = row * width + column;
+                let upper = data[at] + fx * (data[at + 1] - data[at]);
+                let lower = data[at + width] + fx * (data[at + width + 1] - data[at + width]);
+                upper + fy * (lower - upper) - voter.value
+            } else {
+                f32::NAN
+            });
+        }
+        let mut sizes: Vec<f32> = out.iter().filter(|r| r.is_finite()).map(|r| r.abs()).collect();
+        if sizes.len() < 3 || 2 * sizes.len() < voters.len() {
+            return None;
+        }
+        let middle = sizes.len() / 2;
+        let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
+        Some((MAD * f64::from(median)).max(LEAST_DEVIATION))
+    }
+
+    /// Weighted normal equations of a step, weights `1 / (1 + (e / 2 s)^2)^2`.
+    fn normal<const N: usize>(&self, voters: &[Voter], residuals: &[f32], deviation: f64) -> Normal<N> {
+        let (mut matrix, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+        let inverse_radius = (1.0 / self.radius) as f32;
+        for (voter, &residual) in voters.iter().zip(residuals) {
+            if !residual.is_finite() {
+                continue;
+            }
+            let outlying = 1.0 + (f64::from(residual) / (2.0 * deviation)).powi(2);
+            let weight = 1.0 / (outlying * outlying);
+            let [gx, gy] = voter.gradient.map(f64::from);
+            let (x, y) = (f64::from(voter.x * inverse_radius), f64::from(voter.y * inverse_radius));
+            let columns = [gx, gy, x * gx, x * gy, y * gx, y * gy];
+            for i in 0..N {
+                let column = weight * columns[i];
+                right[i] -= column * f64::from(residual);
+                for j in i..N {
+                    matrix[(i, j)] += column * columns[j];
+                }
+            }
+        }
+        matrix.fill_lower_triangle_with_upper_triangle();
+        (matrix, right)
+    }
+}
