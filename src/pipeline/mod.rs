@@ -24,8 +24,8 @@ pub use sink::{
 };
 pub use stage::{EstimatorStage, FilterStage, Output, Stage};
 pub use stereo::{
-    BeginSinks, ClusterRows, GraphChart, GraphFile, GreyPair, GreyPairs, StereoFormat, StereoOverlays, StereoPicture,
-    StereoRun, StereoSink, StereoStep, StereoSummary,
+    BeginSinks, ClusterRows, GraphChart, GraphFile, GreyPair, GreyPairs, PairTimes, StereoFormat, StereoOverlays,
+    StereoPicture, StereoRun, StereoSink, StereoStep, StereoSummary,
 };
 pub use text_format::TextFormat;
 pub use track::{

@@ -69,7 +69,8 @@ impl PyStereoTracker {
             arrays::frame("left", left, ColourRule::Luminance)?,
             arrays::frame("right", right, ColourRule::Luminance)?,
         ];
-        let step = py.detach(|| self.lock().step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
+        let step =
+            py.detach(|| self.lock().step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
         told(py, step)
     }
 
@@ -95,7 +96,8 @@ impl PyStereoTracker {
             return Err(Error::argument("disparity", expected, told(disparity.size())).into());
         }
         let points = EdgePoints::from_map(&disparity);
-        let step = py.detach(|| self.lock().step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
+        let step =
+            py.detach(|| self.lock().step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
         told(py, step)
     }
 

@@ -44,6 +44,36 @@ fn every_layout_gives_the_same_tracks() {
     assert!((u - 2.0).abs() < 0.1 && v.abs() < 0.1 && w.abs() < 0.1 && (wall.mean[2] - 3.0).abs() < 0.5, "{wall:?}");
 }
 
+/// Views 3 and 5 of a film are missing.
+#[test]
+fn missing_frames_are_told_by_their_times() {
+    let shown = [0, 1, 2, 4, 6, 7];
+    let place = recorded_as(6, |index| moving(shown[index]));
+    let text: String =
+        shown.iter().map(|frame| format!("{},further columns\n", 7.0 + 0.04 * f64::from(*frame as u8))).collect();
+    fs::write(place.path("times.csv"), text).unwrap();
+    let speeds = |options: &str| -> Vec<f64> {
+        let out = place.good(&format!("track left right {SMALL} --format json --quiet {options}")).out;
+        let graph = TrackGraph::from_json(&out).unwrap();
+        let wall = |t: usize| graph.nodes().filter(|node| node.time == t).max_by_key(|node| node.n_pixels).unwrap();
+        (1..6).map(|t| wall(t).velocity.unwrap()[0]).collect()
+    };
+    for (options, want) in [("", [2.0, 2.0, 4.0, 4.0, 2.0]), ("--times times.csv", [2.0; 5])] {
+        let speeds = speeds(options);
+        assert!(speeds.iter().zip(want).all(|(u, want)| (u - want).abs() < 0.1), "{options}: {speeds:?}");
+    }
+    place.good(&format!("track left right {SMALL} --times times.csv --quiet -o told"));
+    let rows = fs::read_to_string(place.path("told/tracks.csv")).unwrap();
+    let last: Vec<&str> = rows.lines().next_back().unwrap().split(',').collect();
+    assert_eq!(last[1], "5");
+    assert!((last[2].parse::<f64>().unwrap() - 0.28).abs() < 1e-9, "{last:?}");
+    for (text, told) in [("1\n2\n", "times: "), ("1\n1\n", "times: "), ("soon\n", "line 1")] {
+        fs::write(place.path("wrong.txt"), text).unwrap();
+        let ended = place.line(&format!("track left right {SMALL} --times wrong.txt"));
+        assert!(ended.code != 0 && ended.err.contains(told), "{}", ended.err);
+    }
+}
+
 #[test]
 fn every_option_of_the_tracker_changes_what_it_is_said_to() {
     let place = recorded_as(3, moving);

@@ -4,6 +4,7 @@ use super::track::numbers;
 use super::{LayoutArguments, SearchArguments};
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
+use crate::pipeline::{Numbering, PairTimes};
 use crate::stereo::Method;
 use crate::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use clap::Args;
@@ -41,6 +42,9 @@ pub struct StereoTrackerArguments {
     /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and velocities in space
     #[arg(long, value_name = "FOCAL,BASELINE[,INFINITY]", allow_hyphen_values = true, value_parser = parse_cameras)]
     pub cameras: Option<StereoCamera>,
+    /// When every pair of the input was recorded, where frames are missing or come unevenly: a file with a time in each line, s, further columns being ignored. Motion is then px for an ordinary (the median) step
+    #[arg(long, value_name = "FILE")]
+    pub times: Option<PathBuf>,
     /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a film *.y4m
     #[arg(long, value_name = "FOLDER|FILM")]
     pub disparity_overlay: Option<PathBuf>,
@@ -61,6 +65,7 @@ impl StereoTrackerArguments {
             self.search.map(|_| "search"),
             self.seed.map(|_| "seed"),
             self.cameras.map(|_| "cameras"),
+            self.times.as_ref().map(|_| "times"),
             self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
             self.graph.as_ref().map(|_| "graph"),
         ];
@@ -101,6 +106,26 @@ impl StereoTrackerArguments {
         options.threads = threads;
         options.check()?;
         Ok(options)
+    }
+}
+
+impl StereoTrackerArguments {
+    /// When the pairs were recorded, where that is told.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has other lines; [`Error::Argument`] named `times` for times that do not ascend.
+    pub fn times(&self, numbering: Numbering) -> Result<Option<PairTimes>> {
+        let Some(path) = &self.times else { return Ok(None) };
+        let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+        let read = |(number, line): (usize, &str)| {
+            let first = line.split(|c: char| c.is_whitespace() || c == ',').find(|word| !word.is_empty());
+            first.and_then(|word| word.parse().ok()).ok_or_else(|| {
+                Error::format(path, format!("line {}: expected a time in seconds, got {line:?}", number + 1))
+            })
+        };
+        let times: Vec<f64> = lines.map(read).collect::<Result<_>>()?;
+        PairTimes::new(&times, numbering).map(Some)
     }
 }
 

@@ -29,11 +29,12 @@ impl TrackCommand {
         let wanted = self.output.wanted(self.tell.json, drawn)?;
         self.check_pictures(&pictures)?;
         let (views, numbering) = self.stereo.layout.open(&self.input.input, &self.input.selection, self.input.fps)?;
+        let times = self.stereo.times(numbering)?;
         let name = views.describe();
         let pairs = GreyPairs::start(views, preprocess(&self.input, None)?, threads)?;
         let threshold = options.arc_threshold;
         let mode = options.mode.name();
-        let mut run = StereoRun::new(StereoTracker::new(options)?, numbering);
+        let mut run = StereoRun::new(StereoTracker::new(options)?, numbering).with_times(times);
         let begin = || self.stereo_sinks(&wanted, &pictures, threshold, numbering.rate);
         let failure = {
             let bar = Bar::new(watch, "track", self.tell.quiet);

@@ -6,11 +6,13 @@ mod pairs;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod times;
 
 pub use graph::{GraphChart, GraphFile};
 pub use overlay::{StereoOverlays, StereoPicture};
 pub use pairs::{GreyPair, GreyPairs};
 pub use rows::{ClusterRows, StereoFormat};
+pub use times::PairTimes;
 
 use super::run::Numbering;
 use super::sink::Ending;
@@ -27,7 +29,7 @@ use std::time::Instant;
 pub struct StereoStep<'a> {
     /// Index of the pair in the input.
     pub frame_index: usize,
-    /// Its time, s from the first frame of the input; `None` where the frame rate is not known.
+    /// Its time, s from the first frame of the input; `None` where neither the frame rate nor its time is known.
     pub time: Option<f64>,
     /// The left view as it came.
     pub left: &'a AnyFrame,
@@ -83,6 +85,7 @@ pub struct StereoSummary {
 pub struct StereoRun {
     tracker: StereoTracker,
     numbering: Numbering,
+    times: Option<PairTimes>,
     sinks: Vec<Box<dyn StereoSink>>,
     summary: StereoSummary,
 }
@@ -90,7 +93,12 @@ pub struct StereoRun {
 impl StereoRun {
     /// A run of a tracker that has seen nothing yet; `numbering` says which pairs of the input come.
     pub fn new(tracker: StereoTracker, numbering: Numbering) -> Self {
-        Self { tracker, numbering, sinks: Vec::new(), summary: StereoSummary::default() }
+        Self { tracker, numbering, times: None, sinks: Vec::new(), summary: StereoSummary::default() }
+    }
+
+    /// The same where pairs come unevenly: velocities are for an ordinary step, and steps have these times.
+    pub fn with_times(self, times: Option<PairTimes>) -> Self {
+        Self { times, ..self }
     }
 
     /// What was done so far; valid after a failed or interrupted run too.
@@ -125,12 +133,19 @@ impl StereoRun {
     fn work(&mut self, pairs: &mut GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
         let mut begin = Some(begin);
         while let Some(GreyPair { views: [left, _], grey }) = pairs.next(self.summary.pairs, progress)? {
+            let frame_index = self.numbering.index(self.summary.pairs);
+            let time = match &self.times {
+                Some(times) => Some(times.at(frame_index)?),
+                None => self.numbering.time(frame_index),
+            };
+            if let Some(times) = self.times.as_ref().filter(|_| self.summary.pairs > 0) {
+                self.tracker.after(times.steps(self.numbering.index(self.summary.pairs - 1), frame_index)?)?;
+            }
             let step = self.tracker.update(&grey[0], &grey[1])?;
             if let Some(begin) = begin.take() {
                 self.sinks = begin()?;
             }
-            let frame_index = self.numbering.index(self.summary.pairs);
-            let told = StereoStep { frame_index, time: self.numbering.time(frame_index), left: &left, step: &step };
+            let told = StereoStep { frame_index, time, left: &left, step: &step };
             for sink in &mut self.sinks {
                 sink.accept(&told)?;
             }

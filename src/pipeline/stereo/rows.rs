@@ -75,11 +75,11 @@ const COLUMNS: [&str; 32] = [
 /// |---|---|
 /// | `step` | from 0 |
 /// | `frame` | index of the pair in the input, from 0 |
-/// | `time` | s from the first frame of the input; `nan` where the frame rate is not known |
+/// | `time` | s from the first frame of the input; `nan` where neither the frame rate nor the time is known |
 /// | `cluster`, `track`, `group` | numbers, as [`Node`] has them |
 /// | `pixels`, `weight` | edge pixels; weight of the component, 0 to 1 |
 /// | `x`, `y`, `disparity` | mean, px |
-/// | `u`, `v`, `w` | motion since the last step, px/step and disparity/step |
+/// | `u`, `v`, `w` | motion since the last step, px/step and disparity/step; of steps with uneven times, for an ordinary one |
 /// | `u_x`, `v_x`, `u_y`, `v_y` | derivatives of that at `(middle_x, middle_y)`, 1/step |
 /// | `residual` | grey levels |
 /// | `coasting` | `true` or `false` |

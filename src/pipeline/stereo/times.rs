@@ -1,0 +1,68 @@
+//! When pairs of views were recorded, where that is not evenly.
+
+use crate::error::{Error, Result};
+use crate::math::median;
+use crate::pipeline::run::Numbering;
+
+/// When every pair of the input was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairTimes {
+    /// s, ascending, from the first pair of the input.
+    times: Vec<f64>,
+    /// Usual time between pairs that are used, s.
+    ordinary: f64,
+}
+
+impl PairTimes {
+    /// From the times of all pairs of the input, s; `numbering` says which of them are used. An ordinary step is the median of theirs.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `times` for fewer than two that are used, and for those that do not ascend.
+    pub fn new(times: &[f64], numbering: Numbering) -> Result<Self> {
+        if let Some(i) = (0..times.len()).find(|&i| !times[i].is_finite() || i > 0 && times[i] <= times[i - 1]) {
+            let got = format!("{} in line {}", times[i], i + 1);
+            return Err(Error::argument("times", "seconds that ascend", got));
+        }
+        let used: Vec<f64> = times.iter().copied().skip(numbering.first).step_by(numbering.step.max(1)).collect();
+        let mut steps: Vec<f64> = used.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        match median(&mut steps) {
+            Some(ordinary) => Ok(Self { times: times.iter().map(|time| time - times[0]).collect(), ordinary }),
+            None => Err(Error::argument("times", "times of at least 2 pairs that are used", used.len())),
+        }
+    }
+
+    /// When pair `index` of the input was recorded, s from the first.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `times` for a pair beyond them.
+    pub fn at(&self, index: usize) -> Result<f64> {
+        let expected = || format!("a time for every pair, {} or more", index + 1);
+        self.times.get(index).copied().ok_or_else(|| Error::argument("times", expected(), self.times.len()))
+    }
+
+    /// Time from one pair of the input to another, in ordinary steps.
+    ///
+    /// # Errors
+    /// As [`PairTimes::at`].
+    pub fn steps(&self, from: usize, to: usize) -> Result<f64> {
+        Ok((self.at(to)? - self.at(from)?) / self.ordinary)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_counted_in_ordinary_ones() {
+        let every_other = Numbering { first: 1, step: 2, rate: None };
+        let times = PairTimes::new(&[5.0, 5.1, 5.2, 5.3, 5.4, 5.5, 5.9, 6.1], every_other).unwrap();
+        // Used are those at 5.1, 5.3, 5.5 and 6.1.
+        assert!((times.steps(5, 7).unwrap() - 3.0).abs() < 1e-9 && (times.steps(1, 3).unwrap() - 1.0).abs() < 1e-9);
+        assert!((times.at(7).unwrap() - 1.1).abs() < 1e-9);
+        assert!(times.at(8).unwrap_err().to_string().starts_with("times: expected a time for every pair, 9 or more"));
+        for wrong in [&[0.0, 0.0][..], &[0.0, f64::NAN], &[1.0], &[]] {
+            assert!(PairTimes::new(wrong, Numbering::default()).unwrap_err().to_string().starts_with("times: "));
+        }
+    }
+}
