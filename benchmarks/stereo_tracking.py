@@ -5,9 +5,9 @@
 Purity is the share of edge pixels in clusters of their own majority label, recall the share of an object's edge pixels in clusters where it is the majority, path the steps over which the chain of strongest arcs stays on an object until
 it is hidden, index the same for its component, id for its track from the first step on; kept is the share of the steps at which it is visible with one and the same track (of a cluster at least half as large as its largest). Recognised are films in which
 its largest cluster is on the track from before it was hidden by the third step after that, and stays on it. Grouped is the share of its edge pixels in its largest cluster, in its largest group, and the share of that group that is the object's.
-Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure: speed of the affine motion at the object's own pixels, velocity of `next_velocity`; gross are those off by more than 2 px or 1 disparity.
+Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure: speed of the affine motion at the object's own pixels beside the median of the truth there, velocity of `next_velocity` beside the truth at `middle`, median of `next_velocity` beside the median of the truth over the object's own pixels; gross are those off by more than 2 px or 1 disparity.
 
-Seeds are of the textures, the noise and the mixture's starts, all of them others; the first is the specification's. Everything is the mean over the seeds, paths are the least of them. Times are wall time, medians over steps and films.
+Seeds are of the textures, the noise and the mixture's starts, all of them others; the first is the specification's. Everything is the mean over the seeds, paths are the least of them and their mean. Times are wall time, medians over steps and films.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, from_truth: bool) 
     for label in labels:
         row[f"recall {label}"] = float(np.mean([score.recall(label) for score in scores]))
         hidden = scores[0].first_hidden(label)
-        row[f"path {label}"] = f"{min(score.path(label) for score in scores)}/{hidden}"
+        paths = [score.path(label) for score in scores]
+        row[f"path {label}"] = f"{min(paths)}/{hidden} ({np.mean(paths):.1f})"
         row[f"index {label}"] = f"{min(score.index_kept(label) for score in scores)}/{hidden}"
         row[f"id {label}"] = f"{min(score.id_kept(label) for score in scores)}/{scene.steps}"
         row[f"kept {label}"] = " ".join(f"{score.id_share(label):.2f}" for score in scores)
@@ -91,7 +92,7 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, from_truth: bool) 
             row[f"recognised {label}"] = f"{sum(map(bool, back))} of {seeds}"
         if mode == "improved":
             row[f"grouped {label}"] = " ".join(f"{np.mean(share):.2f}" for share in zip(*(score.grouped(label) for score in scores), strict=True))
-    for what, told in (("speed", "affine"), ("velocity", "velocity")):
+    for what, told in (("speed", "affine"), ("velocity", "velocity"), ("median", "median")):
         errors = [score.motion_errors(told) for score in scores]
         for label in [0, *labels]:
             of_label = [error[label] for error in errors if label in error]

@@ -87,6 +87,10 @@ class Cluster:
     rows: Integers
     columns: Integers
     motion: Array
+    place: Array
+    """Their medians along x and y, px."""
+    motion_at: Array
+    """An affine map of their true motion, (3, 3): from (x - place, y - place, 1) to (u, v, w), by least squares; exact where they are of one plane or of what grows."""
 
 
 def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
@@ -101,7 +105,11 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
         right = mine & (labels == major)
         motion = np.median(motions[right], axis=0)
         share = float(counts.max() / counts.sum())
-        out[int(component)] = Cluster(int(major), share, int(mine.sum()), clustering.rows[right], clustering.columns[right], motion)
+        rows, columns = clustering.rows[right], clustering.columns[right]
+        place = np.array([np.median(columns), np.median(rows)])
+        offsets = np.stack([columns - place[0], rows - place[1], np.ones(len(rows))], axis=1)
+        motion_at = np.linalg.lstsq(offsets, motions[right], rcond=None)[0]
+        out[int(component)] = Cluster(int(major), share, int(mine.sum()), rows, columns, motion, place, motion_at)
     return out
 
 
@@ -235,16 +243,19 @@ class Scores:
         counts = [len({node.group for (t, _), node in self.graph.nodes.items() if t == time}) for time in range(1, len(self.told))]
         return float(np.mean(counts))
 
-    def motion_errors(self, told: Literal["affine", "velocity"] = "affine") -> dict[int, Array]:
-        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority; the truth is the median over that label's pixels in it. What the cluster tells is the median of its affine motion at the same pixels, or
-        its velocity, which is a median over pixels that it chose itself: where motion changes by px within a cluster, one in a hundred of another choice makes a tenth of a px."""
+    def motion_errors(self, told: Literal["affine", "velocity", "median"] = "affine") -> dict[int, Array]:
+        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority. `affine`: the median of its affine motion over that label's pixels in it beside the median of the truth there. `velocity`: its velocity beside the
+        true motion of that label at the cluster's `middle`, where it is told. `median`: its velocity beside the median of the truth, which is that of another place: where motion changes by px within a cluster, two rows make a tenth of a px."""
         errors = defaultdict(list)
         for time, clusters in enumerate(self.told[:-1]):
             for component, cluster in clusters.items():
                 node = self.graph.nodes[time, component]
                 if cluster.purity >= PURE and node.velocity is not None:
                     said = np.median(node.motion(cluster.columns, cluster.rows), axis=0) if told == "affine" else node.velocity
-                    errors[cluster.label].append(np.abs(said - cluster.motion))
+                    true = cluster.motion
+                    if told == "velocity" and node.middle is not None:
+                        true = np.array([*(node.middle - cluster.place), 1.0]) @ cluster.motion_at
+                    errors[cluster.label].append(np.abs(said - true))
         return {label: np.array(values) for label, values in errors.items()}
 
 

@@ -164,3 +164,39 @@ fn without_recognition_what_is_measured_counts() {
     all.name_all(Moment::at(4), &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
     assert_eq!(all.live[0].as_ref().unwrap().id, 2);
 }
+
+#[test]
+fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
+    let limits = Recognition::default();
+    let late = |now: f64, gap: f64| Moment { now, gap, step_time: 1.0 };
+    let steady = || {
+        let mut all = identities();
+        for _ in 0..2 {
+            all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        }
+        all
+    };
+    // Three ordinary steps of coasting are one that is two long, and no other like it.
+    let mut all = steady();
+    assert!(all.carry(0, (None, 2.0), CELL, Some(&limits)).unwrap().coasting);
+    assert_eq!(all.carry(0, (None, 2.0), CELL, Some(&limits)), None);
+    let mut all = steady();
+    let coasted = (0..40).take_while(|_| all.carry(0, (None, 0.1), CELL, Some(&limits)).is_some()).count();
+    assert_eq!(coasted, 30);
+    // Hidden from 0 on, seen again six ordinary steps later: two steps of three, or one of six.
+    for (now, gap) in [(6.0, 3.0), (6.0, 6.0)] {
+        let mut all = steady();
+        all.rest(0.0, |k| k == 0);
+        all.name_all(late(now, gap), &[at(2, [22.0, 10.0, 30.0])], LEAST, Some(&limits));
+        assert_eq!(all.live[2].as_ref().unwrap().id, 0);
+    }
+    // Waited for ten ordinary steps, however few steps these are.
+    let mut all = steady();
+    all.rest(0.0, |k| k == 0);
+    all.name_all(late(10.5, 5.0), &[at(2, [31.0, 10.0, 30.0])], LEAST, Some(&limits));
+    assert_eq!(all.live[2].as_ref().unwrap().id, 2);
+    // What is mostly covered goes on for the time that went by.
+    let mut all = steady();
+    all.name_all(late(2.5, 2.5), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
+    assert_eq!(all.live[0].as_ref().unwrap().position, [15.0, 10.0, 30.0]);
+}

@@ -92,7 +92,7 @@ fn not_negative(limits: impl Iterator<Item = (&'static str, f64)>) -> Result<()>
 
 #[cfg(test)]
 mod tests {
-    use super::super::Recognition;
+    use super::super::{Recognition, StereoMode};
     use super::*;
 
     #[test]
