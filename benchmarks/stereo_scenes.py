@@ -16,7 +16,7 @@ Disparity is `x_left - x_right` in px; it is negative far away because the camer
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -166,12 +166,12 @@ class Scene:
     noise: float = 2.0
     """Standard deviation, grey levels."""
 
-    def film(self) -> list[Step]:
-        """Every step."""
+    def film(self, times: Sequence[int] | None = None) -> list[Step]:
+        """Every step, or some: those have the same textures, but other noise than they have in the whole film."""
         rng = np.random.default_rng(self.seed)
         width, height = self.size
         textures = [layer.texture(rng, height, width) for layer in self.layers]
-        return [self._step(t, textures, rng) for t in range(self.steps)]
+        return [self._step(t, textures, rng) for t in (range(self.steps) if times is None else times)]
 
     def _step(self, t: int, textures: list[Array], rng: np.random.Generator) -> Step:
         width, height = self.size

@@ -1,4 +1,4 @@
-"""Disparity of edge pixels: arguments, edge cases and the figures of its specification on the small scene."""
+"""Disparity of edge pixels: arguments, edge cases and the figures of its specification."""
 
 import pickle
 import sys
@@ -36,20 +36,41 @@ def same(a, b):
         assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-ASKED = {"classes": (0.969, 0.089, 0.025, 0.050), "sgm": (0.951, 0.083, 0.003, 0.015)}
-"""Density, mean error (px), outliers and false points in occlusions."""
+ASKED = {
+    ("small", "classes", 0.3): (0.969, 0.089, 0.025, 0.050),
+    ("small", "classes", 0.6): (0.879, 0.069, 0.007, 0.019),
+    ("small", "sgm", None): (0.951, 0.083, 0.003, 0.015),
+    ("crossing", "classes", 0.3): (0.958, 0.150, 0.035, 0.055),
+    ("crossing", "classes", 0.6): (0.861, 0.122, 0.011, 0.017),
+    ("crossing", "sgm", None): (0.940, 0.097, 0.003, 0.014),
+    ("curved", "classes", 0.3): (0.965, 0.225, 0.031, 0.034),
+    ("curved", "classes", 0.6): (0.889, 0.206, 0.013, 0.012),
+    ("curved", "sgm", None): (0.956, 0.098, 0.002, 0.012),
+    ("cart", "classes", 0.3): (0.970, 0.099, 0.033, 0.049),
+    ("cart", "classes", 0.6): (0.897, 0.075, 0.015, 0.024),
+    ("cart", "sgm", None): (0.957, 0.087, 0.004, 0.018),
+}
+"""By scene, method and least support: density, mean error (px), outliers and false points in occlusions."""
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_specifications_figures_on_the_small_scene(method):
+@cache
+def some_steps(name):
+    """Some steps of a scene."""
+    return small() if name == "small" else stereo_scenes.SCENES[name]().film((0, 5, 10, 15) if name == "crossing" else (0, 3, 6, 9))
+
+
+@pytest.mark.parametrize(("scene", "method", "support"), ASKED)
+def test_the_specifications_figures(scene, method, support):
     counts = []
-    for step in small():
+    least, most = stereo_scenes.SCENES[scene]().disparity_range
+    options = {} if support is None else {"min_support": support}
+    for step in some_steps(scene):
         edges = np.zeros(step.left.shape, bool)
         edges[stereo.edge_pixels(step.left)] = True
-        found = disparity(step.left, step.right, row_range=(-4, 4), method=method)
+        found = stereo.edge_disparity(step.left, step.right, disparity_range=(least, most), method=method, **options)
         counts.append(stereo_scores.count(found.disparity, edges, step.disparity, step.visible))
     reached = stereo_scores.figures(counts)
-    density, mean, outliers, occluded = ASKED[method]
+    density, mean, outliers, occluded = ASKED[scene, method, support]
     assert reached["density"] >= density - 0.02
     assert reached["outliers"] <= 1.3 * outliers
     assert reached["MAE"] <= 1.3 * mean
