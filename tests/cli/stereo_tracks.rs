@@ -44,13 +44,13 @@ fn every_layout_gives_the_same_tracks() {
     assert!((u - 2.0).abs() < 0.1 && v.abs() < 0.1 && w.abs() < 0.1 && (wall.mean[2] - 3.0).abs() < 0.5, "{wall:?}");
 }
 
-/// Views 3 and 5 of a film are missing.
 #[test]
 fn missing_frames_are_told_by_their_times() {
-    let shown = [0, 1, 2, 4, 6, 7];
+    // The views 3 and 5 of a film.
+    let shown: [usize; 6] = [0, 1, 2, 4, 6, 7];
     let place = recorded_as(6, |index| moving(shown[index]));
-    let text: String =
-        shown.iter().map(|frame| format!("{},further columns\n", 7.0 + 0.04 * f64::from(*frame as u8))).collect();
+    let lines = shown.map(|frame| format!("{},further columns", 7.0 + 0.04 * frame as f64));
+    let text = lines.join("\n");
     fs::write(place.path("times.csv"), text).unwrap();
     let speeds = |options: &str| -> Vec<f64> {
         let out = place.good(&format!("track left right {SMALL} --format json --quiet {options}")).out;
