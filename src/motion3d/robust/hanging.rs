@@ -22,8 +22,7 @@ type Vector5 = SMatrix<f64, 5, 1>;
 ///
 /// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of them fall within three deviations.
 pub(in super::super) fn hangs_on_few(observations: &Observations, found: &MotionEstimate) -> bool {
-    let inliers: Vec<usize> =
-        (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
+    let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
     let rejected = observations.n - inliers.len();
     if rejected == 0 || inliers.len() >= MANY {
         return false;
