@@ -120,7 +120,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         };
         let inliers = scaled.observations.subset(&kept.inliers);
         let found = on(flow, options, &mut scaled, inliers, Some(&kept), rng);
-        if kept.doubtful { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
+        doubted(found, &scaled.observations, kept.doubtful)
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -130,6 +130,14 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let inliers = scaled.observations.clone();
         on(flow, options, &mut scaled, inliers, None, rng)
     }
+}
+
+/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing else is said against; whatever else is said of it says more.
+fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionEstimate {
+    if found.status == Status::Ok && (doubtful || robust::hangs_on_few(all, &found)) {
+        return MotionEstimate { status: Status::FewPoints, ..found };
+    }
+    found
 }
 
 /// The rotation alone, where chance explains what it leaves.

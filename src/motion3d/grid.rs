@@ -70,10 +70,10 @@ pub(super) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -
     kept
 }
 
-/// All points, or as many random ones as a search sees.
-fn searched(observations: &Observations, rng: CounterRng) -> Cow<'_, Observations> {
-    if observations.n > SEARCHED {
-        Cow::Owned(observations.subset(&sample(observations.n, SEARCHED, rng)))
+/// All points, or `most` random ones.
+fn at_most(observations: &Observations, most: usize, rng: CounterRng) -> Cow<'_, Observations> {
+    if observations.n > most {
+        Cow::Owned(observations.subset(&sample(observations.n, most, rng)))
     } else {
         Cow::Borrowed(observations)
     }
@@ -81,7 +81,7 @@ fn searched(observations: &Observations, rng: CounterRng) -> Cow<'_, Observation
 
 /// The most promising motions of the whole half sphere, by `J` on at most 1000 random points.
 pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
-    let searched = &*searched(observations, rng);
+    let searched = &*at_most(observations, SEARCHED, rng);
     let found = evaluate(|u| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     apart(found, APART, STARTS).into_iter().map(|(motion, _)| motion).collect()
 }
@@ -89,11 +89,11 @@ pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion
 /// The 0.95 quantile of chi-squared with five degrees of freedom.
 pub(super) const PLAUSIBLE: f64 = 11.07;
 
-/// The largest angle, degrees, between the direction of one of `motions` (the first: the estimate) and any direction of the half sphere that explains the flow as well as the best of them, depth signs included.
+/// The largest angle, degrees, between the direction of one of `motions` (the first: the estimate) and any direction of the half sphere that explains the flow of `most` points as well as the best of them, depth signs included.
 ///
 /// A covariance is that of one minimum; a valley of minima shows here.
-pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion], rng: CounterRng) -> f64 {
-    let searched = &*searched(observations, rng);
+pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion], most: usize, rng: CounterRng) -> f64 {
+    let searched = &*at_most(observations, most, rng);
     let cost = |u: &Vector3<f64>| {
         let (w, cost) = best_rotation(searched, u)?;
         let behind = |u: &Vector3<f64>| {

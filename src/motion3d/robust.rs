@@ -2,6 +2,7 @@
 
 mod coherence;
 mod gate;
+mod hanging;
 mod search;
 mod whole;
 
@@ -13,6 +14,7 @@ use super::observations::Observations;
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use gate::Gate;
+pub(super) use hanging::hangs_on_few;
 use rayon::prelude::*;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.

@@ -26,6 +26,9 @@ pub(super) const SPACING: f64 = 4.0;
 /// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
 
+/// Most points that are asked again where few leave a doubt.
+const ASKED_AGAIN: usize = 16_000;
+
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
 
@@ -100,10 +103,14 @@ fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct
 
 /// Whether directions explain the flow as well as the estimate that are farther than the covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
 ///
-/// `deviation`: that of maximum likelihood, whose residuals are looked at; of the points that the search sees it is that much larger.
+/// `deviation`: that of maximum likelihood, whose residuals are looked at; of the points that the search sees it is that much larger. Where few of many points leave a doubt, [`ASKED_AGAIN`] of them are asked: with noisy depths the
+/// deviation of the few grows faster than by the root of their number.
 fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
-    let fewer = (inliers.n as f64 / inliers.n.min(SEARCHED) as f64).sqrt();
-    reach_of_plausible(inliers, motions, rng) > FAR * deviation * fewer + SPACING
+    let beyond = |most: usize| {
+        let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
+        reach_of_plausible(inliers, motions, most, rng) > FAR * deviation * fewer + SPACING
+    };
+    beyond(SEARCHED) && (inliers.n <= SEARCHED || beyond(ASKED_AGAIN))
 }
 
 /// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.

@@ -202,3 +202,33 @@ fn a_slow_mover_is_found_or_told() {
     }
     assert!(silent <= 2 && trusted >= 11, "{silent} {trusted}");
 }
+
+/// Among few points, outliers that obey by chance can be those that decide: a known noise does not tell them.
+#[test]
+fn few_points_with_outliers_are_told_in_known_noise_too() {
+    let options = MotionOptions { robust: true, ..options() };
+    let (mut confident, mut wrong) = (0, 0);
+    for seed in 0..100 {
+        let (mut scene, rng) = (Scene::oblique(20, 0.1, seed), CounterRng::new(900 + seed));
+        for k in 0..8 {
+            scene.flow[k] = [0, 1].map(|j| 2.5 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
+        }
+        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.1), &options).unwrap();
+        if found.status == Status::Ok {
+            confident += 1;
+            wrong += u32::from(mahalanobis(&found, &scene.motion) > 20.5);
+        }
+    }
+    assert!(wrong <= 15, "{wrong} of {confident}");
+    // Where outliers are far out, little is given up.
+    let mut right = 0;
+    for seed in 0..40 {
+        let (mut scene, rng) = (Scene::oblique(50, 0.02, seed), CounterRng::new(900 + seed));
+        for k in 0..20 {
+            scene.flow[k] = [0, 1].map(|j| 2.5 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
+        }
+        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.02), &options).unwrap();
+        right += u32::from(found.status == Status::Ok && mahalanobis(&found, &scene.motion) < 20.5);
+    }
+    assert!(right >= 36, "{right} of 40");
+}
