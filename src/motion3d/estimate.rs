@@ -132,12 +132,15 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
 }
 
-/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing else is said against; whatever else is said of it says more.
+/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful choice of points and no surer; what
+/// else is told says more.
 fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionEstimate {
-    if found.status == Status::Ok && (doubtful || robust::hangs_on_few(all, &found)) {
-        return MotionEstimate { status: Status::FewPoints, ..found };
-    }
-    found
+    let few = match found.status {
+        Status::Ok => doubtful || robust::hangs_on_few(all, &found),
+        Status::RotationOnly | Status::LowSnr => doubtful,
+        _ => false,
+    };
+    if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 
 /// The rotation alone, where chance explains what it leaves.

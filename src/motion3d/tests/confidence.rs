@@ -232,3 +232,20 @@ fn few_points_with_outliers_are_told_in_known_noise_too() {
     }
     assert!(right >= 36, "{right} of 40");
 }
+
+/// A rotation that a doubtful choice of few points leaves is no surer than a motion would be.
+#[test]
+fn no_translation_is_not_told_of_few_points_with_outliers() {
+    let options = MotionOptions { robust: true, ..options() };
+    let (mut still, mut told) = (0, 0);
+    for seed in 200..260 {
+        let (mut scene, rng) = (Scene::oblique(20, 0.1, seed), CounterRng::new(900 + seed));
+        for k in 0..8 {
+            scene.flow[k] = [0, 1].map(|j| 2.5 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
+        }
+        let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
+        still += u32::from(matches!(found.status, Status::RotationOnly | Status::LowSnr));
+        told += u32::from(found.status == Status::FewPoints);
+    }
+    assert!(still <= 6 && told >= 30, "{still} {told}");
+}
