@@ -39,9 +39,9 @@ class StereoCluster:
     covariance: Array
     """Covariance of (x, y, disparity), (3, 3), px^2: the component's, and a twelfth of a cell and of a disparity squared for what counting in voxels hides."""
     velocity: Array
-    """Motion (u, v, w) since the last step at `middle`, (3,), px/step and disparity/step: what `affine` begins with, and the motion in depth. Of what grows or turns, `affine` says what each pixel does."""
+    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step: at `middle`, which `affine` begins with, and in depth the robust mean over its pixels. Of what grows or turns, `affine` says what each pixel does."""
     next_velocity: Array
-    """Motion (u, v, w) to the next step at `middle`, (3,), px/step and disparity/step; known in the graph one step later, NaN before."""
+    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step, at `middle` and in depth the robust mean; known in the graph one step later, NaN before."""
     middle: Array
     """Medians of its pixels along x and y, (2,), px."""
     affine: Array
@@ -309,12 +309,12 @@ class StereoTracker:
         Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
         cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
-        `dt`: time since the last step, in the unit of `step_time`; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; where things go is foreseen, and what is lost waited for, over that time. Of the first step it means nothing.
+        `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; where things go is foreseen, and what is lost waited for, over that time. Of the first step it means nothing.
 
         Raises
         ------
         ValueError
-            For views of different size or of another size than before, naming both shapes, and a `dt` that is not above 0.
+            For views of different size or of another size than before, naming both shapes, and a `dt` that is not above 0 or out of its range.
 
         Warns
         -----

@@ -71,9 +71,9 @@ class VariationalGaussianMixture(_Base):
     n_components : int
         K, the most components there may be, up to 65536 (no unit).
     weight_concentration_prior : float
-        `alpha0` of the Dirichlet prior, above 0, no unit.
+        `alpha0` of the Dirichlet prior, above 0, at most 1e100, no unit.
     mean_precision_prior : float
-        `beta0`, precision of the means over that of the points, above 0, no unit.
+        `beta0`, precision of the means over that of the points, above 0, at most 1e100, no unit.
     mean_prior : array (D,), units of X
         `m0`; default: the weighted mean.
     degrees_of_freedom_prior : float

@@ -5,6 +5,8 @@ use crate::parallel::Threads;
 
 /// Most components: what nobody needs must not take all memory.
 const MOST_COMPONENTS: usize = 1 << 16;
+/// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers any more.
+const MOST_PRIOR: f64 = 1e100;
 
 /// Where the inverse scale matrix of the Wishart prior, `W0^-1` (D, D), comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,8 +99,15 @@ impl MixtureOptions {
             let expected = format!("a positive integer up to {MOST_COMPONENTS}");
             return Err(Error::argument("n_components", expected, self.components));
         }
-        positive("weight_concentration_prior", self.weight_concentration_prior)?;
-        positive("mean_precision_prior", self.mean_precision_prior)?;
+        for (name, value) in [
+            ("weight_concentration_prior", self.weight_concentration_prior),
+            ("mean_precision_prior", self.mean_precision_prior),
+        ] {
+            positive(name, value)?;
+            if value > MOST_PRIOR {
+                return Err(Error::argument(name, format!("a positive number up to {MOST_PRIOR:e}"), value));
+            }
+        }
         for (name, value) in [("tol", self.tol.unwrap_or(0.0)), ("prune_weight", self.prune_weight)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::argument(name, "a finite number, at least 0", value));

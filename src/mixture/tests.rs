@@ -317,6 +317,7 @@ fn what_cannot_be_used_is_named() {
         ("n_components", MixtureOptions { components: usize::MAX, ..usual.clone() }),
         ("mean_prior", MixtureOptions { mean_prior: Some(vec![1e300, 0.0]), ..usual.clone() }),
         ("weight_concentration_prior", MixtureOptions { weight_concentration_prior: 0.0, ..usual.clone() }),
+        ("weight_concentration_prior", MixtureOptions { weight_concentration_prior: 1e307, ..usual.clone() }),
         ("mean_precision_prior", MixtureOptions { mean_precision_prior: -1.0, ..usual.clone() }),
         ("mean_prior", MixtureOptions { mean_prior: Some(vec![0.0]), ..usual.clone() }),
         ("degrees_of_freedom_prior", MixtureOptions { degrees_of_freedom_prior: Some(1.0), ..usual.clone() }),

@@ -67,7 +67,7 @@ fn missing_frames_are_told_by_their_times() {
     let last: Vec<&str> = rows.lines().next_back().unwrap().split(',').collect();
     assert_eq!(last[1], "5");
     assert!((last[2].parse::<f64>().unwrap() - 0.28).abs() < 1e-9, "{last:?}");
-    for (text, told) in [("1\n2\n", "times: "), ("1\n1\n", "times: "), ("soon\n", "line 1")] {
+    for (text, told) in [("1\n2\n", "times: "), ("1\n1\n", "times: "), ("soon\n", "line 1"), ("0\n\n1\n", "line 2")] {
         fs::write(place.path("wrong.txt"), text).unwrap();
         let ended = place.line(&format!("track left right {SMALL} --times wrong.txt"));
         assert!(ended.code != 0 && ended.err.contains(told), "{}", ended.err);

@@ -253,7 +253,7 @@ def test_a_time_of_one_is_no_time_and_others_are_refused():
     assert shown_at([0, 1, 2])[0].graph == plain.graph == shown_at([0, 2, 4], speed=1.0, told=False)[0].graph
     left, right = next(film())
     tracker = StereoTracker(n_components=4, **SMALL)
-    for wrong in (0, -1.0, float("nan"), float("inf")):
+    for wrong in (0, -1.0, 5e-324, 1e300, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="dt: "):
             tracker.update(left, right, dt=wrong)
         with pytest.raises(ValueError, match="step_time: "):

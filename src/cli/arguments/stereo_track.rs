@@ -117,7 +117,8 @@ impl StereoTrackerArguments {
     pub fn times(&self, numbering: Numbering) -> Result<Option<PairTimes>> {
         let Some(path) = &self.times else { return Ok(None) };
         let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
-        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+        // A time that is missing must not move the later ones to other pairs, so that only the end may be blank.
+        let lines = text.trim_end().lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
         let read = |(number, line): (usize, &str)| {
             let first = line.split(|c: char| c.is_whitespace() || c == ',').find(|word| !word.is_empty());
             first.and_then(|word| word.parse().ok()).ok_or_else(|| {

@@ -1,5 +1,12 @@
 //! When a step is: frames may be missing between two of them, or come at uneven times.
 
+use std::ops::RangeInclusive;
+
+/// Times between steps, in ordinary steps: beyond, velocities and clocks would be no numbers any more.
+pub(super) const GAPS: RangeInclusive<f64> = 1e-6..=1e6;
+/// Ordinary steps, in the unit that times are told in.
+pub(super) const STEP_TIMES: RangeInclusive<f64> = 1e-12..=1e12;
+
 /// When the step that is being taken is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moment {

@@ -9,7 +9,7 @@ mod record;
 use super::cell_luminance::CellLuminance;
 use super::graph::TrackGraph;
 use super::identity::Identities;
-use super::moment::Moment;
+use super::moment::{GAPS, Moment};
 use super::motion::Seen;
 use super::options::{StereoMode, StereoTrackerOptions};
 use super::step::{Step, Track};
@@ -91,10 +91,10 @@ impl StereoTracker {
     /// predicted and limits that are counted in steps hold over the time that went by. Of the first step it means nothing.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `dt` unless it is a time above 0.
+    /// [`Error::Argument`] named `dt` unless it is a time above 0, from a millionth of an ordinary step to a million of them.
     pub fn after(&mut self, dt: f64) -> Result<&mut Self> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::argument("dt", "a time above 0", dt));
+        if !GAPS.contains(&(dt / self.options.step_time)) {
+            return Err(Error::argument("dt", "a time above 0, from a millionth to a million of step_time", dt));
         }
         self.waited = Some(dt);
         Ok(self)

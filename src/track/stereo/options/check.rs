@@ -1,6 +1,6 @@
 //! Options out of range are refused by name.
 
-use super::super::moment::MOST_REACH;
+use super::super::moment::{MOST_REACH, STEP_TIMES};
 use super::{Grouping, StereoCamera, StereoTrackerOptions, VoxelGrid};
 use crate::error::{Error, Result};
 
@@ -63,8 +63,8 @@ impl StereoTrackerOptions {
             not_negative([reach, motion, depth_motion].into_iter().map(|limit| ("group_limits", limit)))?;
         }
         not_negative([("reseed_below", self.reseed_below)].into_iter())?;
-        if !(self.step_time > 0.0 && self.step_time.is_finite()) {
-            return Err(Error::argument("step_time", "a time above 0", self.step_time));
+        if !STEP_TIMES.contains(&self.step_time) {
+            return Err(Error::argument("step_time", "a time above 0, from 1e-12 to 1e12", self.step_time));
         }
         if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
             for (name, value) in [("focal", focal), ("baseline", baseline)] {
@@ -130,7 +130,7 @@ mod tests {
         assert!(with(|o| o.degrees_of_freedom_prior = 2.0).starts_with("degrees_of_freedom_prior: "));
         assert!(with(|o| o.covariance_prior = f64::NAN).starts_with("covariance_prior: "));
         assert!(with(|o| o.luminance_levels = 1).starts_with("luminance_levels: "));
-        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for wrong in [0.0, -1.0, 1e-300, 1e300, f64::NAN, f64::INFINITY] {
             let options = StereoTrackerOptions { step_time: wrong, ..StereoTrackerOptions::default() };
             assert!(options.check().unwrap_err().to_string().starts_with("step_time: "));
         }
