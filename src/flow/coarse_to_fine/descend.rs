@@ -3,6 +3,7 @@
 use super::candidates::Comparison;
 use super::couple::{CoupleScratch, Coupling, couple};
 use super::data::{COUNT, DataOptions, DataTerm, MOTION, summary};
+use super::further::refine_further;
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::{Space, Workspace};
@@ -155,6 +156,9 @@ impl Plan {
                     step.repeat(JOINED, level, &limit.coupling, (&mut motion, &mut old));
                 }
                 space.keep(loose);
+            }
+            if limit.refined {
+                refine_further(self.simd, space, &mut motion, step.data);
             }
             if self.traced && k > to {
                 above.insert(0, copy(space, &motion));

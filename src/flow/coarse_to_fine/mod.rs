@@ -14,6 +14,7 @@ mod couple;
 mod covariance;
 mod data;
 mod descend;
+mod further;
 mod grid;
 mod levels;
 mod locking;

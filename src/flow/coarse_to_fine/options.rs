@@ -43,7 +43,7 @@ impl Preset {
     pub(super) fn effort(self, frames: usize) -> Effort {
         let coupling = Coupling::default();
         // Three frames are more exact than two: they are worth another linearisation.
-        let (finest_settled, finest_sweeps) = if frames == 2 { (0.03, 6) } else { (0.023, 4) };
+        let (finest_settled, finest_sweeps) = if frames == 2 { (0.03, 8) } else { (0.023, 4) };
         match self {
             Self::Fast => Effort {
                 last: 1,
@@ -53,6 +53,7 @@ impl Preset {
                 coupling: Coupling { sweeps: 4, ..coupling },
                 finest_sweeps: 4,
                 loosened: None,
+                refined_above: false,
             },
             Self::Balanced => Effort {
                 last: 0,
@@ -62,6 +63,7 @@ impl Preset {
                 coupling: Coupling { sweeps: 4, break_at: 0.14, ..coupling },
                 finest_sweeps,
                 loosened: Some(2),
+                refined_above: true,
             },
             Self::Accurate => Effort {
                 last: 0,
@@ -71,6 +73,7 @@ impl Preset {
                 coupling: Coupling { break_at: 0.2, ..coupling },
                 finest_sweeps: coupling.sweeps,
                 loosened: Some(2),
+                refined_above: true,
             },
         }
     }
@@ -93,6 +96,9 @@ pub(super) struct Effort {
     pub finest_sweeps: usize,
     /// From so many levels above that one on, bonds are loosened at the end, for small objects to come free; `None`: nowhere.
     pub loosened: Option<usize>,
+    /// Whether the motion of the level above the finest is refined before it is taken further: what it begins with has less noise then, and slopes that wider windows tell. Half the
+    /// resolution does without: the level above it sees too little for windows to be chosen well.
+    pub refined_above: bool,
 }
 
 /// Pixels of a level on which work costs next to nothing.
@@ -115,16 +121,24 @@ pub(super) struct Limits {
     pub coupling: Coupling,
     /// Whether sites are tried without their neighbours then.
     pub loosened: bool,
+    /// Whether what has been found is refined at last.
+    pub refined: bool,
 }
 
 impl Effort {
     /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is known yet.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> Limits {
         let loosened = self.loosened.is_some_and(|above| k >= self.last + above);
+        let refined = self.refined_above && k == self.last + 1;
         if is_coarsest || size.0 * size.1 <= SMALL {
             let break_at = self.coupling.break_at.min(COARSE_BREAK);
             let coupling = Coupling { sweeps: COARSE_SWEEPS, break_at, ..self.coupling };
-            return Limits { coupling, loosened: loosened && !is_coarsest, ..self.up_to(k, COARSE_ITERATIONS) };
+            return Limits {
+                coupling,
+                loosened: loosened && !is_coarsest,
+                refined,
+                ..self.up_to(k, COARSE_ITERATIONS)
+            };
         }
         let [finest, second, others] = self.iterations;
         let most = match k.saturating_sub(self.last) {
@@ -132,7 +146,7 @@ impl Effort {
             1 => second,
             _ => others,
         };
-        Limits { loosened, ..self.up_to(k, most) }
+        Limits { loosened, refined, ..self.up_to(k, most) }
     }
 
     /// So many iterations at most on level `k`.
@@ -140,7 +154,7 @@ impl Effort {
         let [finest, others] = self.settled;
         let (settled, sweeps) =
             if k <= self.last { (finest, self.finest_sweeps) } else { (others, self.coupling.sweeps) };
-        Limits { most, settled, coupling: Coupling { sweeps, ..self.coupling }, loosened: false }
+        Limits { most, settled, coupling: Coupling { sweeps, ..self.coupling }, loosened: false, refined: false }
     }
 }
 

@@ -39,6 +39,9 @@ use region::Fitted;
 /// Distance of the sites, px.
 pub(super) const PITCH: f64 = 2.0;
 
+/// So many windows of the ladder are enough for what is refined once more on a finer level.
+const FURTHER: usize = 5;
+
 /// The first windows of the ladder are too narrow for changes.
 const CHANGES: usize = 2;
 
@@ -75,6 +78,12 @@ pub(super) struct Options {
 }
 
 impl Options {
+    /// For motion that a finer level begins with: that level's few iterations take noise away, but not what a window has smoothed away over many of its pixels.
+    pub fn further() -> Self {
+        let Self { ladder, kappa, .. } = Self::default();
+        Self { ladder: ladder.get(..FURTHER).unwrap_or(ladder), kappa: 3.0 / 8.0 * kappa, ..Self::default() }
+    }
+
     /// For motion whose last linearisation was about one that had been refined: what is left of the residual is noise then, and slopes need no more room than it explains.
     pub fn again() -> Self {
         Self { kappa_slopes: 2.0, ..Self::default() }
