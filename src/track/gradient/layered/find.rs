@@ -26,7 +26,7 @@ const FEWEST: f64 = 0.1;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const YOUNG: usize = 6;
 /// Frames after which it is done with that, whatever is seen.
-const ADAPTED: usize = 20;
+pub(super) const ADAPTED: usize = 20;
 /// Least difference of the target from what is behind it, over the noise.
 const VISIBLE: f64 = 1.0;
 /// What is said of a target that something hides in part.
@@ -190,7 +190,7 @@ impl Layered {
 
     /// Whether the support is still adapting to what the box holds: a target of which much was never seen had a box with much else in it.
     pub(super) fn is_adapting(&self) -> bool {
-        !self.settled && self.age < ADAPTED
+        self.age < self.adapts_until
     }
 
     /// Whether a strip along a side is little of the target.

@@ -91,8 +91,8 @@ pub(super) struct Layered {
     most_seen: f64,
     /// Frames measured.
     age: usize,
-    /// Whether it was seen well when the support should have adapted to what the box holds.
-    settled: bool,
+    /// Age up to which the support may still adapt to what the box holds; 0 once it has.
+    adapts_until: usize,
     /// The picture when it last moved, unless it was not seen or the camera moved since.
     resting: Option<Rest>,
     /// What the first box held, until that is told.
@@ -159,7 +159,7 @@ impl Layered {
             with_camera: false,
             most_seen: 0.0,
             age: 0,
-            settled: false,
+            adapts_until: find::ADAPTED,
         };
         this.resting = Some(this.rest(&this.previous.frame));
         this

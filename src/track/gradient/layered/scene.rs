@@ -116,6 +116,8 @@ fn contrast(frame: &Frame<f64>, target: TargetBox) -> f64 {
     let hidden = grown(target, (0.0, AROUND));
     let mut off: Vec<f64> = spread(frame.size(), hidden, SCATTER_SAMPLES).map(|(x, y)| frame.get(x, y)).collect();
     let middle = median(&mut off);
-    off.iter_mut().for_each(|value| *value = (*value - middle).abs());
+    for value in &mut off {
+        *value = (*value - middle).abs();
+    }
     MAD * median(&mut off)
 }

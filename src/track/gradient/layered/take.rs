@@ -83,7 +83,9 @@ impl Layered {
         }
         let [right, down] = self.filter.speed();
         let far = right.hypot(down) * YOUNG as f64 > FAR * self.side() * self.pose.scale();
-        self.settled |= self.age >= YOUNG && (occluded || !far || look.visibility >= WELL);
+        if self.age >= YOUNG && (occluded || !far || look.visibility >= WELL) {
+            self.adapts_until = 0;
+        }
         let least = if self.age <= YOUNG || self.is_adapting() { LEAST[0] } else { WELL };
         if !occluded && look.visibility >= least {
             self.learn(frame, aligned.gain, look.visibility);
