@@ -67,6 +67,7 @@ class Scene:
     """Drawn after the target, in front of it."""
     noise: float = 2.0
     """Standard deviation, grey levels."""
+    noise_seed: int = NOISE_SEED
     gain: Array | None = None
     """(T,), what the frames are multiplied by before the noise; None: 1."""
     uniform: dict[int, int] = field(default_factory=dict)
@@ -110,7 +111,7 @@ class Scene:
 
     def frames(self) -> NDArray[np.uint8]:
         """(T, H, W), what the camera sees."""
-        rng = np.random.default_rng(NOISE_SEED)
+        rng = np.random.default_rng(self.noise_seed)
         seen: list[NDArray[np.uint8]] = []
         for t in range(len(self.centres)):
             picture = self.picture(t)

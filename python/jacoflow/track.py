@@ -180,11 +180,11 @@ class GradientTracker:
         )
         if eps is None or (isinstance(eps, str) and eps != "auto"):
             raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
-        slowest = None if isinstance(eps, str) else real_number("eps", eps)
+        slowest = None if isinstance(eps, str) else _real("eps", eps)
         self._tracker = _GradientTracker(_frame(frame), box, point, mode, side, steering, shape, swing, degree, windows, slowest)
 
     def update(self, frame: ArrayLike) -> TrackResult:
-        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN or infinity counts as one in which the target was not seen.
+        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN, infinity or samples beyond 1e9 grey levels counts as one in which the target was not seen.
 
         So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant
         of more than 64 grey levels that is added to a whole frame is taken off.
@@ -218,6 +218,8 @@ _WORDS = {
     "measures": '"mean" or "instant"',
 }
 """Arguments that take a word, and the words."""
+_SWITCHES = (bool, np.bool_)
+"""They count as 0 and 1 in Python, and are no numbers here."""
 
 
 def _word(name: str, value: Any) -> str:
@@ -230,9 +232,18 @@ def _word(name: str, value: Any) -> str:
 def _whole(name: str, value: Any) -> int:
     """An integer of any size; what is too large for it the compiled part tells."""
     try:
+        if isinstance(value, _SWITCHES):
+            raise TypeError
         return operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: expected an integer, got {value!r}") from None
+
+
+def _real(name: str, value: Any) -> float:
+    """A number that is not a switch."""
+    if isinstance(value, _SWITCHES):
+        raise TypeError(f"{name}: expected a number, got {value!r}")
+    return real_number(name, value)
 
 
 def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float] | None:
@@ -246,11 +257,16 @@ def _needed(name: str, value: ArrayLike | None, expected: str, count: int) -> li
         array = None if value is None else np.asarray(value, float)
     except (TypeError, ValueError):
         array = None
-    if array is None:
+    if array is None or _holds_switches(value):
         raise ValueError(f"{name}: expected {expected}, got {value!r}")
     if array.shape != (count,):
         raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
     return [float(number) for number in array]
+
+
+def _holds_switches(value: Any) -> bool:
+    """Whether True or False is among the numbers."""
+    return any(isinstance(each, _SWITCHES) for each in np.asarray(value, object).ravel())
 
 
 def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options: Any) -> Track:
@@ -304,7 +320,7 @@ def refine_flow(
 def _flow_of_pixels(first: ArrayLike, second: ArrayLike, refined: bool, *, window: int, order: int, **limits: float) -> PixelFlow:
     """Flow from a frame (H, W) to the next, px/frame; each option is checked by its name."""
     sizes = _whole("window", window), _whole("order", order)
-    numbers = (real_number(name, value) for name, value in limits.items())
+    numbers = (_real(name, value) for name, value in limits.items())
     return PixelFlow(*_local_flow(_frame(first), _frame(second), refined, *sizes, *numbers))
 
 
@@ -330,7 +346,7 @@ def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
         raise ValueError(f"flow: expected a field (H, W, 2), got shape {field.shape}")
     if valid.shape != field.shape[:2]:
         raise ValueError(f"valid: expected an array {field.shape[:2]} like the flow, got shape {valid.shape}")
-    velocity, centroid, count = _mean_flow(field, valid, real_number("eps", eps))
+    velocity, centroid, count = _mean_flow(field, valid, _real("eps", eps))
     return MeanFlow(np.array(velocity), np.array(centroid), count)
 
 
@@ -392,7 +408,7 @@ class GaussMarkovFilter:
         self, position: ArrayLike, *, alpha: float = 0.8, q: float = 0.5, start: ArrayLike = (1.0, 4.0, 1.0), measures: str = "mean"
     ) -> None:
         place, variances = _needed("position", position, "(x, y)", 2), _needed("start", start, "three variances", 3)
-        self._filter = _GaussMarkovFilter(place, real_number("alpha", alpha), real_number("q", q), variances, _word("measures", measures))
+        self._filter = _GaussMarkovFilter(place, _real("alpha", alpha), _real("q", q), variances, _word("measures", measures))
 
     def __getstate__(self) -> dict[str, Any]:
         return self._filter.save()

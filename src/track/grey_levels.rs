@@ -8,13 +8,15 @@ const UNIT_WHITE: f64 = 1.5;
 const LIT: f64 = 0.1;
 /// Grey levels that no overshoot of a white of 1 reaches.
 const FAR_ABOVE: f64 = 16.0;
+/// Size of samples that are no brightness, grey levels or whatever they are in: such a frame is damaged, and sums over it lose all that the others say.
+pub const GREATEST: f64 = 1e9;
 /// Shares of the samples that may be hot or damaged: any at all, and those far above white.
 const DAMAGED: [f64; 2] = [1e-3, 1e-2];
 
 /// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast, gradient) are in these.
 ///
 /// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white. It is taken for 1, and they are multiplied by 255, unless more than a thousandth of a
-/// frame's finite samples are above 1.5 and these are at least half of those that are not dark (above .1): then they are grey levels already. Where less than a hundredth is not dark, most of what exceeds 1.5 must
+/// frame's samples up to 1e9 are above 1.5 and these are at least half of those that are not dark (above .1): then they are grey levels already. Where less than a hundredth is not dark, most of what exceeds 1.5 must
 /// also be above 16; and where what is above 16 is a hundredth of the frame and most of what exceeds 1.5, dim surroundings do not matter. So patches of hot pixels decide nothing.
 ///
 /// A film may begin with black, which says nothing: the first frame of grey levels after it sets that right ([`revised`](Self::revised)). The other way there is none: brightness must not jump.
@@ -77,7 +79,7 @@ fn holds_levels(frame: &AnyFrame) -> bool {
 /// Whether samples exceed a white of 1 by more than damaged ones do.
 fn are_levels(samples: impl Iterator<Item = f64>) -> bool {
     let (mut all, mut lit, mut bright, mut high) = (0usize, 0usize, 0usize, 0usize);
-    for value in samples.filter(|value| value.is_finite()) {
+    for value in samples.filter(|value| value.abs() <= GREATEST) {
         all += 1;
         lit += usize::from(value > LIT);
         bright += usize::from(value > UNIT_WHITE);

@@ -148,6 +148,19 @@ fn pictures_show_the_box_and_may_be_enlarged() {
 }
 
 #[test]
+fn a_film_may_lie_in_the_new_folder_of_the_texts() {
+    let place = recorded(3);
+    place.good(&format!("track s.y4m {BOX} -o new/ --overlay new/film.y4m"));
+    assert_eq!(place.names("new"), ["film.y4m", "tracks.csv"]);
+    // What is in the way is still named, and other folders are not made.
+    let again = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay new/film.y4m"));
+    assert!(again.code == 2 && again.err.contains("overlay"), "{}", again.err);
+    let other = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay other/film.y4m"));
+    assert!(other.code != 0 && other.err.contains("other"), "{}", other.err);
+    assert!(!place.path("other").exists());
+}
+
+#[test]
 fn mistakes_are_named_and_leave_nothing() {
     let place = recorded(4);
     fs::write(place.path("old.csv"), "mine").unwrap();
@@ -164,6 +177,10 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m --eps slow", &["--eps", "auto"]),
         ("track s.y4m --control sideways", &["--control", "integer"]),
         ("track s.y4m --camera shaky", &["--camera"]),
+        ("track s.y4m --fov 31", &["fov", "local or paper", "layered"]),
+        ("track s.y4m --mode layered --eps auto", &["eps", "local or paper"]),
+        ("track s.y4m --mode local --model affine", &["model", "which is for layered", "local"]),
+        ("track s.y4m --mode paper --box 19,23,13,13 --camera none", &["camera", "layered", "paper"]),
         ("track s.y4m --model cubic", &["--model", "affine"]),
         ("track s.y4m -o out --format xml", &["format", "csv or mot"]),
         ("track s.y4m -o t.mp4", &["output", ".csv"]),

@@ -90,7 +90,7 @@ def test_stated_deviations_hold_the_centre():
 def test_a_target_that_stops_is_held_by_the_rule_for_it():
     scene = HARD["stops at 20 for good"]
     still = follow(scene, method="local")
-    assert np.linalg.norm(still.position - scene.centres, axis=1)[25:].max() <= 1.9
+    assert np.linalg.norm(still.position - scene.centres, axis=1)[25:].max() <= 1.7
     assert np.all(still.status[25:] != "tracking") and np.all(np.abs(still.velocity[-1]) < 0.05)
     layered = follow(scene)
     assert np.linalg.norm(layered.position - scene.centres, axis=1)[1:].max() <= 0.5 and np.all(layered.status == "tracking")

@@ -25,8 +25,9 @@ impl TrackCommand {
         let options = self.tracker.gradient()?;
         let threads = Threads::new(self.threads.threads)?;
         let wanted = self.output.wanted(self.tell.json, self.output.overlay.is_some())?;
-        if let Some(folder) = self.output.overlay.as_ref().filter(|_| !self.output.force) {
-            Overlays::check(folder)?;
+        let checked = |place: &&PathBuf| !self.output.force && !self.output.is_in_new_folder(place);
+        if let Some(place) = self.output.overlay.as_ref().filter(checked) {
+            Overlays::check(place)?;
         }
         let opened = open_input(&self.input)?;
         if let Some(frames) = opened.frames.filter(|frames| *frames < 2) {

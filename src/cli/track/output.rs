@@ -46,6 +46,12 @@ impl TrackOutputArguments {
         }
     }
 
+    /// Whether a file is to lie in the folder that texts go to, and that folder is not there yet: it is made before anything is written, and nothing is in the way there.
+    pub fn is_in_new_folder(&self, path: &Path) -> bool {
+        let folder = self.output.as_deref().filter(|folder| is_folder(folder) && !folder.exists());
+        folder.is_some_and(|folder| path.parent() == Some(folder))
+    }
+
     /// The texts to write, checked before any work is done. `otherwise`: the summary or pictures are wanted, so that no text need be; `json`: standard output is for the summary.
     pub fn wanted<F: TextFormat>(&self, json: bool, otherwise: bool) -> Result<Vec<Wanted<F>>> {
         let formats: Vec<F> = self.format.iter().map(|name| F::parse(name)).collect::<Result<_>>()?;

@@ -71,12 +71,15 @@ impl TrackCommand {
             if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
                 return Err(Error::argument("graph", "a .png file", path.display()));
             }
-            check_target(path, self.output.force)?;
+            if !self.output.is_in_new_folder(path) {
+                check_target(path, self.output.force)?;
+            }
         }
         if self.output.force {
             return Ok(());
         }
-        pictures.iter().try_for_each(|(path, kind)| StereoOverlays::check(path, *kind))
+        let mut checked = pictures.iter().filter(|(path, _)| !self.output.is_in_new_folder(path));
+        checked.try_for_each(|(path, kind)| StereoOverlays::check(path, *kind))
     }
 
     /// Begins what is written; folders are made.

@@ -26,6 +26,7 @@ pub use options::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
 pub use refine::{RefineOptions, refine_flow};
 
 use super::Tracker;
+use super::grey_levels::GREATEST;
 use crate::error::{Error, Result};
 use crate::image::all_finite;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
@@ -86,6 +87,7 @@ impl GradientTracker {
     /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px, wholly outside, not finite), `center` (outside) or the option.
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
         options.check()?;
+        options.check_camera(start)?;
         check_frame(frame)?;
         let (state, engine) = match start {
             Start::Box(bounds) => {
@@ -137,7 +139,8 @@ fn nothing_yet(at: [f64; 2]) -> TrackState {
 
 /// A point in the frame.
 fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Result<[f64; 2]> {
-    let inside = |at: f64, length: usize| at >= 0.0 && at <= length as f64 - 1.0;
+    // Pixels reach half a pixel beyond their centres.
+    let inside = |at: f64, length: usize| at >= -0.5 && at < length as f64 - 0.5;
     if inside(at[0], width) && inside(at[1], height) {
         return Ok(at);
     }
@@ -155,7 +158,18 @@ fn check_frame(frame: &Frame<f64>) -> Result<()> {
     if !all_finite(frame) {
         return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
     }
+    if let Some(sample) = frame.data().iter().find(|sample| sample.abs() > GREATEST) {
+        let expected = format!("samples of at most {GREATEST:e} grey levels in the first frame");
+        return Err(Error::argument("frame", expected, format!("{sample:e}")));
+    }
     Ok(())
+}
+
+/// Whether a frame holds brightness, and nothing else.
+fn is_usable(frame: &Frame<f64>) -> bool {
+    // NaN is greater than nothing, and infinity greater than all.
+    let greatest = frame.data().iter().fold(0.0, |greatest: f64, sample| greatest.max(sample.abs()));
+    greatest <= GREATEST && all_finite(frame)
 }
 
 /// A box that holds something of the frame.
@@ -199,7 +213,7 @@ impl Tracker for GradientTracker {
                 told(frame.size()),
             ));
         }
-        let usable = all_finite(frame);
+        let usable = is_usable(frame);
         self.state.frame += 1;
         match &mut self.engine {
             Engine::Waiting(..) if usable => self.wait(frame),

@@ -108,7 +108,7 @@ impl Default for GradientOptions {
 }
 
 impl GradientOptions {
-    /// Checks every option.
+    /// Checks every option, and that none is given which the mode does not heed.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
@@ -125,6 +125,42 @@ impl GradientOptions {
         if let Some(eps) = self.eps.filter(|e| !(*e >= 0.0 && e.is_finite())) {
             return Err(Error::argument("eps", "a speed in px/frame, at least 0", eps));
         }
-        Ok(())
+        self.check_mode()
+    }
+
+    /// Options that the mode does not heed must be left at their defaults.
+    fn check_mode(&self) -> Result<()> {
+        let default = Self::default();
+        let of_window = [
+            ("fov", self.fov.is_some()),
+            ("control", self.control != default.control),
+            ("window", self.window.is_some()),
+            ("order", self.order.is_some()),
+            ("eps", self.eps != default.eps),
+        ];
+        let of_layers = [("model", self.shape != default.shape)];
+        let (others, mode) = if self.mode == Mode::Layered {
+            (&of_window[..], "local or paper")
+        } else {
+            (&of_layers[..], Mode::Layered.name())
+        };
+        match others.iter().find(|(_, given)| *given) {
+            Some((option, _)) => Err(self.no_such_option(option, mode)),
+            None => Ok(()),
+        }
+    }
+
+    /// Only the layered tracker heeds a moving camera; the others do while they look for what moves first.
+    pub(super) fn check_camera(&self, start: Start) -> Result<()> {
+        let heeded = self.mode == Mode::Layered || !matches!(start, Start::Box(_));
+        if heeded || self.camera == Self::default().camera {
+            return Ok(());
+        }
+        Err(self.no_such_option("camera", "layered, or without a box"))
+    }
+
+    /// The error about an option that has no effect.
+    fn no_such_option(&self, option: &'static str, mode: &str) -> Error {
+        Error::argument(option, format!("no such option, which is for {mode}, here"), self.mode.name())
     }
 }

@@ -32,7 +32,7 @@ const EVERY: usize = 4;
 /// Lower quartile of the absolute value of a standard normal number.
 const QUARTILE: f64 = 0.3186;
 /// Pixels that the scatter is told from, at most.
-const SCATTER_SAMPLES: usize = 1024;
+pub(super) const SCATTER_SAMPLES: usize = 1024;
 /// Residual that all larger ones count as, grey levels.
 pub(super) const CAP: f64 = 25.0;
 /// Smallest information of a step, grey^2/px^2 per pixel.

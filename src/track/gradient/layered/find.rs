@@ -25,6 +25,8 @@ pub(super) const DOUBT: f64 = 12.0;
 const FEWEST: f64 = 0.1;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const YOUNG: usize = 6;
+/// Frames after which it is done with that, whatever is seen.
+pub(super) const ADAPTED: usize = 20;
 /// Least difference of the target from what is behind it, over the noise.
 const VISIBLE: f64 = 1.0;
 /// What is said of a target that something hides in part.
@@ -66,7 +68,7 @@ pub(super) struct Finding {
 }
 
 impl Layered {
-    fn nis(&self, pose: &Pose) -> f64 {
+    pub(super) fn nis(&self, pose: &Pose) -> f64 {
         let (at, expected) = (self.position(pose), self.filter.position());
         (0..2).map(|k| (at[k] - expected[k]).powi(2) / (self.filter.p[k][(0, 0)] + 0.02)).sum()
     }
@@ -124,8 +126,21 @@ impl Layered {
         if let Some(covered) = best.filter(|found| found.occluded) {
             best = self.resized(frame, &covered).or(best);
         }
+        let best = best.filter(|found| !self.is_a_rest(found));
         let least = LEAST[usize::from(self.missed > 0)];
         best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
+    }
+
+    /// Whether what was found is only what is left of a target that was covered in the frame before: it is seen badly and became smaller, and it is off the way, for the edge of what covers it stands for its own.
+    /// Such a target is not seen; its way would end at that edge.
+    fn is_a_rest(&self, found: &Finding) -> bool {
+        let badly = found.look.visibility < WELL && found.look.leak < LEAK && self.became_smaller(found);
+        self.hidden && !found.occluded && found.nis > DOUBT && badly
+    }
+
+    /// Whether the target is smaller than in the frame before by what cover makes of it.
+    fn became_smaller(&self, found: &Finding) -> bool {
+        found.aligned.pose.scale() < (1.0 - GROWN) * self.pose.scale()
     }
 
     /// The target comes out from what hid part of it in the first frame, or goes behind it: its size is that of the first box.
@@ -144,10 +159,13 @@ impl Layered {
         let found = self.try_at(frame, &self.expected(false), how)?;
         let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
         // What is seen as well as ever in a place that nobody expected has made a turn; unless it became smaller at that, as what lies between the bars of a fence.
-        let shrunk = |plain: &Finding| plain.aligned.pose.scale() < (1.0 - GROWN) * self.pose.scale();
-        let turned = |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !shrunk(plain);
+        let turned =
+            |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !self.became_smaller(plain);
+        // Nor has one that is where it is expected but for a strip along its side, and would be smaller or less seen elsewhere.
+        let begins =
+            plain.is_some_and(|plain| plain.nis > DOUBT && !turned(&plain) && self.is_held_back(&found, &plain));
         // The last strip of a large target is not to be taken for background.
-        let drop = if self.hidden && self.is_large() { SLIGHT } else { DROP };
+        let drop = if begins || self.hidden && self.is_large() { SLIGHT } else { DROP };
         let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.look, drop) || plain.nis > DOUBT));
         let held_back = plain.is_some_and(|plain| self.may_be_held_back(&plain) && self.is_held_back(&found, &plain));
         let taken = found.look.leak < LEAK && dropped(&found.look, drop) && (also || held_back);
@@ -167,7 +185,12 @@ impl Layered {
     /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is not told, but of a large target that was seen whole: of a small one a wrong box leaves as
     /// much unseen as cover.
     fn is_known(&self) -> bool {
-        self.age >= YOUNG || self.most_seen > WHOLE && self.is_large()
+        self.age >= YOUNG && !self.is_adapting() || self.most_seen > WHOLE && self.is_large()
+    }
+
+    /// Whether the support is still adapting to what the box holds: a target of which much was never seen had a box with much else in it.
+    pub(super) fn is_adapting(&self) -> bool {
+        self.age < self.adapts_until
     }
 
     /// Whether a strip along a side is little of the target.

@@ -20,46 +20,35 @@ mod patch;
 mod pose;
 mod reshaped;
 mod resized;
+mod rest;
 mod scene;
 mod search;
 mod segment;
 mod slanted;
+mod take;
 mod tell;
 mod uncover;
 
-use super::gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
+use super::gauss_markov::{Dynamics, GaussMarkovFilter, Velocity};
 use super::options::{CameraMotion, GradientOptions, Shape};
 use crate::track::gradient::local_flow::shifted;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use align::Freedom;
 use camera::Seen;
-use find::{COVERED, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use front::Front;
 use layers::{Background, Target};
-use look::view;
 use outset::Outset;
 use pose::{Increment, Pose};
+use rest::Rest;
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 const SURE: f64 = 4.0;
-/// Innovation squared of a target found by looking all around from which on its velocity says nothing.
-const JUMPED: f64 = 100.0;
-/// Frames after a look-alike touched for which it is reckoned with.
-const WARY: usize = 8;
-/// What is said of a frame with NaN or infinity.
+/// What is said of a frame with NaN, infinity or numbers that are no brightness.
 const UNUSABLE: &str = "the frame cannot be used";
+/// What is said of a frame in which the scene is gone before anything was measured.
+const BLANK: &str = "the frame shows nothing of the scene";
 /// What is said of a frame that has little to do with the one before.
 const WILD: &str = "the frame is nothing like those before";
-/// Least information about the rotation, of all there could be, from which on it is told; else the angle is held. Round targets are known by their outline: this bounds what errors of that may turn.
-const TOLD: f64 = 0.75;
-/// Least deviation of a measured position, px.
-const LEAST_DEVIATION: f64 = 0.05;
-/// Frames after an interruption in which what is not seen of the target may be hidden still.
-const RETURNING: usize = 3;
-/// Rate of the filtered change of size and angle.
-const RATE: f64 = 0.3;
-/// The same of the mean visibility.
-const VISIBILITY_RATE: f64 = 0.1;
 
 /// One target in the layered system.
 #[derive(Debug)]
@@ -102,6 +91,10 @@ pub(super) struct Layered {
     most_seen: f64,
     /// Frames measured.
     age: usize,
+    /// Age up to which the support may still adapt to what the box holds; 0 once it has.
+    adapts_until: usize,
+    /// The picture when it last moved, unless it was not seen or the camera moved since.
+    resting: Option<Rest>,
     /// What the first box held, until that is told.
     outset: Option<Outset>,
     /// What hid part of it then, as long as it does.
@@ -131,7 +124,8 @@ fn begun(at: [f64; 2]) -> GaussMarkovFilter {
 impl Layered {
     pub fn new(frame: Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
         let target = Target::new(&frame, bounds, learn::PRIOR);
-        Self {
+        let mut this = Self {
+            resting: None,
             front: None,
             doubt: [0.0; 2],
             unsettled: [0.0; 2],
@@ -165,7 +159,10 @@ impl Layered {
             with_camera: false,
             most_seen: 0.0,
             age: 0,
-        }
+            adapts_until: find::ADAPTED,
+        };
+        this.resting = Some(this.rest(&this.previous.frame));
+        this
     }
 
     /// The next frame; `None`: it cannot be used.
@@ -173,6 +170,9 @@ impl Layered {
         let was_lost = matches!(state.status, TrackStatus::Lost | TrackStatus::Out);
         self.gap += 1;
         let Some(frame) = frame else { return self.pass_over(state, UNUSABLE) };
+        if self.is_blank(frame) {
+            return self.pass_over(state, BLANK);
+        }
         let bounds = self.reached(&self.pose);
         let light = light::light(frame, &self.background, bounds);
         let seen = Seen::new(self.in_usual_light(frame, light));
@@ -186,11 +186,21 @@ impl Layered {
         self.follow_camera(motion, &seen.frame);
         self.filter.predict();
         self.look_back(&seen.frame, motion);
+        if motion != [0.0; 2] {
+            self.resting = None;
+        }
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
+        let finding = finding.map(|found| self.unless_at_rest(found, &seen.frame));
         match &finding {
-            Some(found) => self.take(found, &seen.frame),
+            Some((found, _)) => self.take(found, &seen.frame),
             None => self.miss(),
         }
+        match &finding {
+            Some((found, false)) => self.resting = (!found.occluded).then(|| self.rest(&seen.frame)),
+            Some(_) => {}
+            None => self.resting = None,
+        }
+        let finding = finding.map(|(found, _)| found);
         self.look_at_the_whole_way();
         self.tell(state, finding.as_ref(), motion);
         state.gain = self.gain * light.gain;
@@ -225,99 +235,5 @@ impl Layered {
     /// Centroid of the support at a pose.
     fn position(&self, pose: &Pose) -> [f64; 2] {
         pose.apply(self.target.centroid())
-    }
-
-    /// A measurement.
-    fn take(&mut self, found: &Finding, frame: &Frame<f64>) {
-        let Finding { aligned, look, occluded, .. } = *found;
-        let interrupted = self.missed > 0 || self.hidden || occluded;
-        let mut pose = aligned.pose;
-        self.rotation_told =
-            self.freedom != Freedom::Similarity || aligned.rotation_told >= TOLD || occluded && self.rotation_told;
-        let at = self.position(&pose);
-        if !self.rotation_told && !occluded {
-            pose = self.placed(pose.turned_to(self.pose.angle()), at);
-        }
-        if !occluded {
-            self.faintness = (self.noise / look.contrast.max(1.0)).min(1.0);
-        }
-        self.returning = if self.missed > 0 { RETURNING } else { self.returning.saturating_sub(1) };
-        // Where a part of it is still hidden, all of it may be that much farther on.
-        let behind = if self.returning > 0 { self.side() * (1.0 - look.visibility) } else { 0.0 };
-        let visible = look.visibility.max(0.1);
-        let variance: [f64; 2] = std::array::from_fn(|k| {
-            let own = aligned.covariance[k][k].max(LEAST_DEVIATION.powi(2)) / (visible * visible);
-            own + behind * behind + if occluded { (1.5 * (1.0 - look.visibility)).powi(2) } else { 0.0 }
-        });
-        let step = self.before.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
-        if (found.reason == SEARCHED || found.reason == resized::RESIZED) && found.nis > JUMPED {
-            // Nobody moves like that: it is begun anew where it was found.
-            self.filter = begun(at);
-        }
-        if occluded && !self.hidden {
-            self.filter.x.iter_mut().for_each(|x| x[2] *= 0.3);
-        }
-        self.filter.update(&Measurement {
-            position: Some((at, variance)),
-            velocity: step.map(|step| (step, variance.map(|v| 2.0 * v))),
-        });
-        self.turn_to(&pose);
-        if interrupted {
-            self.rate = [0.0; 6];
-        } else {
-            (2..6).for_each(|k| self.rate[k] += RATE * aligned.moved[k]);
-            if !self.rotation_told {
-                let growth = 0.5 * (self.rate[2] + self.rate[5]);
-                self.rate = [0.0, 0.0, growth, 0.0, 0.0, growth];
-            }
-        }
-        self.before = (!occluded).then_some(at);
-        self.front = self.front.take().filter(|front| occluded && !front.is_past(&self.target, &self.pose));
-        (self.missed, self.hidden) = (0, occluded);
-        self.covered = if occluded { self.covered + 1 } else { 0 };
-        self.wary = if found.reason == TOUCHED { WARY } else { self.wary.saturating_sub(1) };
-        self.age += 1;
-        self.most_seen = if occluded { self.most_seen } else { self.most_seen.max(look.visibility) };
-        if found.reason == COVERED && look.visibility > self.usual - DROP {
-            // What stays hidden, though it is little, is not covered but gone.
-            self.usual += VISIBILITY_RATE * (look.visibility - self.usual);
-        }
-        let least = if self.age <= YOUNG { LEAST[0] } else { WELL };
-        if !occluded && look.visibility >= least {
-            self.learn(frame, aligned.gain, look.visibility);
-        } else if self.target.fresh.is_some() {
-            let view = view(frame, &self.target, &self.background, &self.pose);
-            learn::learn_fresh(&mut self.target, &view, aligned.gain, self.noise);
-        }
-        if self.front.is_some() {
-            let hidden = self.hides();
-            learn::learn_background(&mut self.background, frame, &hidden, self.noise);
-        }
-    }
-
-    fn turn_to(&mut self, pose: &Pose) {
-        let turn = pose.angle() - self.pose.angle();
-        self.turned += turn.sin().atan2(turn.cos());
-        self.pose = *pose;
-    }
-
-    fn learn(&mut self, frame: &Frame<f64>, gain: f64, visibility: f64) {
-        let view = view(frame, &self.target, &self.background, &self.pose);
-        let before = self.position(&self.pose);
-        learn::learn_target(&mut self.target, &view, gain, self.noise);
-        self.settle(before);
-        self.gain *= gain;
-        self.usual += VISIBILITY_RATE * (visibility - self.usual);
-        let hidden = self.hides();
-        learn::learn_background(&mut self.background, frame, &hidden, self.noise);
-    }
-
-    /// No measurement.
-    fn miss(&mut self) {
-        self.missed += 1;
-        self.covered = 0;
-        self.before = None;
-        self.rate = [0.0; 6];
-        self.pose = self.placed(self.pose, self.filter.position());
     }
 }

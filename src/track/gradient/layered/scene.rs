@@ -1,9 +1,11 @@
 //! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
 
-use super::camera::{self, Seen};
+use super::camera::{self, AROUND, SCATTER_SAMPLES, Seen, spread};
 use super::find::{DOUBT, Finding};
+use super::layers::grown;
 use super::light::Light;
 use super::{Layered, SURE, learn};
+use crate::track::gradient::local_flow::{MAD, median};
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
@@ -12,7 +14,25 @@ const OUTLYING: (f64, f64) = (6.0, 8.0);
 /// Frames in a row that are passed over for that.
 const WILD_FOR: usize = 10;
 
+/// Contrast of the scene over that of the frame before, from which on down it is gone.
+const GONE: f64 = 0.25;
+
 impl Layered {
+    /// Whether nothing of the scene is left in a frame before anything was measured: black, or another even picture. What noise there is, is learnt from the first pair, and would be all that
+    /// such a frame differs by, so that anything would look like the target. Even frames say nothing however many there are.
+    pub(super) fn is_blank(&self, frame: &Frame<f64>) -> bool {
+        if self.age > 0 {
+            return false;
+        }
+        let even = |frame: &Frame<f64>| frame.data().windows(2).all(|pair| pair[0] == pair[1]);
+        if even(frame) {
+            return !even(&self.previous.frame);
+        }
+        let hidden = self.reached(&self.pose);
+        let [before, now] = [&self.previous.frame, frame].map(|frame| contrast(frame, hidden));
+        now < GONE * before && before > learn::LEAST_NOISE && self.gap <= WILD_FOR
+    }
+
     /// How far the scene moved since the last frame that said something.
     pub(super) fn camera_motion(&self, seen: &Seen, bounds: TargetBox) -> [f64; 2] {
         let expected = self.swung.map(|m| m * self.gap as f64);
@@ -89,4 +109,15 @@ impl Layered {
         self.before = self.before.map(shifted);
         self.pose.p = shifted(self.pose.p);
     }
+}
+
+/// Contrast of the still scene, grey levels: the deviation of its brightness from the median, robustly.
+fn contrast(frame: &Frame<f64>, target: TargetBox) -> f64 {
+    let hidden = grown(target, (0.0, AROUND));
+    let mut off: Vec<f64> = spread(frame.size(), hidden, SCATTER_SAMPLES).map(|(x, y)| frame.get(x, y)).collect();
+    let middle = median(&mut off);
+    for value in &mut off {
+        *value = (*value - middle).abs();
+    }
+    MAD * median(&mut off)
 }

@@ -1,6 +1,6 @@
 //! Beginning anew where something still hid part of the target in the first frame: that part is the target's all the same, but is not known yet, and what hides it is known.
 
-use super::find::YOUNG;
+use super::find::{ADAPTED, YOUNG};
 use super::front::Front;
 use super::layers::{Background, Target, UNSEEN, grown, holds};
 use super::learn::{self, CONTINUED, SOLID};
@@ -47,7 +47,7 @@ impl Layered {
         });
         self.background.begin_anew(outset, found, frame, STILL * self.noise);
         self.begin_at([at[0] + found.moved[0], at[1] + found.moved[1]], found.moved, found.frames);
-        (self.hidden, self.age) = (true, YOUNG);
+        (self.hidden, self.age, self.adapts_until) = (true, YOUNG, 0);
         self.front = Front::of(outset, &found.hidden);
     }
 
@@ -69,6 +69,7 @@ impl Layered {
         (self.rate, self.before, self.usual) = ([0.0; 6], None, 1.0);
         (self.missed, self.hidden, self.age, self.most_seen) = (0, false, 0, 0.0);
         (self.turned, self.wary, self.front) = (0.0, 0, None);
+        (self.resting, self.adapts_until) = (None, ADAPTED);
     }
 
     /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.

@@ -1,0 +1,136 @@
+"""How the gradient tracker begins: boxes round what is no square, faint targets at rest, frames that show nothing, and options and numbers that it does not take."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jacoflow import track
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+
+import tracking_scenes
+from test_track import follow
+from tracking_begin import outlined
+from tracking_pictures import background
+from tracking_scenes import Plane, Scene, circle, square
+
+KINDS = ("fractal:1,90,30", "smooth:4,90,20")
+
+
+def at_rest(level, noise, kind, seed, same):
+    """Frames (41, 128, 128) of a square of 13 px that does not move, before a background of about 100; the `same` frame again and again, or with fresh noise."""
+    rng = np.random.default_rng(seed)
+    picture = background(kind, seed, 128)
+    picture[58:71, 58:71] = level
+    noises = rng.normal(0, noise, (1 if same else 41, *picture.shape))
+    frames = np.clip(np.rint(picture + noises), 0, 255).astype(np.uint8)
+    return np.repeat(frames, 41, axis=0) if same else frames
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", ["smooth:4,100,10", "fractal:1,100,10", "flat:100"])
+def test_a_faint_target_at_rest_stays(kind, seed):
+    """Level 110 before about 100: nothing moves, and the target does not either."""
+    for same, most in ((True, 0.1), (False, 0.5)):
+        found = track.track(at_rest(110.0, 2.0, kind, seed, same), (57.5, 57.5, 13, 13))
+        assert np.linalg.norm(found.position - 64, axis=1).max() <= most, same
+        assert np.all(found.status == "tracking")
+
+
+@pytest.mark.parametrize("speed", [0.1, 0.3, 1.0])
+def test_a_faint_target_that_moves_is_not_taken_for_one_at_rest(speed):
+    """What a slow one changes adds up."""
+    for seed in range(4):
+        path = np.stack([90 + speed * tracking_scenes.TIMES, np.full(51, 128.0)], axis=1)
+        scene = Scene("faint", (Plane("flat:100", seed),), square(path, level=115.0))
+        assert np.linalg.norm(follow(scene).position - path, axis=1).max() <= 1.0, seed
+
+
+@pytest.mark.parametrize("level", [0, 128, 255])
+@pytest.mark.parametrize("brightness", [20.0, 200.0])
+@pytest.mark.parametrize("noise", [0.0, 2.0])
+def test_a_frame_that_shows_nothing_is_not_tracked_in_right_after_the_first(brightness, level, noise):
+    scene = Scene("black", (Plane("smooth:4,90,20", 3),), square(circle(20.0), level=brightness))
+    frames = scene.frames()
+    for t in (1, 2):
+        frames[t] = np.clip(np.rint(level + np.random.default_rng(t).normal(0, noise, frames[t].shape)), 0, 255)
+    found = track.track(frames, scene.start_box)
+    assert list(found.status[1:3]) == ["coasting", "coasting"] and "shows nothing" in found.reason[1]
+    assert np.all(found.status[4:] == "tracking") and np.linalg.norm(found.position - scene.centres, axis=1)[4:].max() < 1.0
+
+
+@pytest.mark.parametrize("value", [1e10, 1e16, -1e18, 1e30, 1e200, 1.7e308])
+@pytest.mark.parametrize("white", [1.0, 255.0])
+def test_numbers_that_are_no_brightness_do_no_harm_later(value, white):
+    """In a whole frame, added to it, and in some pixels on the target: a frame that cannot be used, whatever floats are taken for."""
+    scene = tracking_scenes.simulation(1, "smooth:4,90,20", 20.0)
+    frames = scene.frames() * (white / 255.0)
+    x, y, w, h = scene.boxes[22].astype(int)
+    frames[20] = value
+    frames[21] += value
+    frames[22, y : y + h, x : x + 5] = value
+    for method in ("layered", "local"):
+        found = track.track(frames, scene.start_box, method=method)
+        assert set(found.status[20:23]) == {"coasting"} and set(found.reason[20:23]) == {"the frame cannot be used"}
+        assert np.isfinite(found.position).all() and np.isfinite(found.covariance).all()
+        assert np.all(found.status[26:] == "tracking") and np.linalg.norm(found.position - scene.centres, axis=1)[26:].max() < 3.0
+    first = frames[0].copy()
+    first[3, 4] = value
+    with pytest.raises(ValueError, match="^frame: expected (finite samples|samples of at most)"):
+        track.GradientTracker(first, scene.start_box)
+
+
+FRAME = np.full((64, 256), 90, np.uint8)
+
+
+@pytest.mark.parametrize("switch", [True, np.True_])
+def test_switches_are_no_numbers(switch):
+    for name in ("fov", "order", "window", "eps"):
+        with pytest.raises(TypeError, match=f"^{name}: expected .*got .*True"):
+            track.GradientTracker(FRAME, (20, 20, 13, 13), method="local", **{name: switch})
+    for arguments in ({"bbox": (20, 20, 13, switch)}, {"center": (20, switch)}):
+        with pytest.raises(ValueError, match=f"^{next(iter(arguments))}: expected"):
+            track.GradientTracker(FRAME, **arguments)
+    with pytest.raises(TypeError, match="^order"):
+        track.derivative_kernels(switch)
+    with pytest.raises(TypeError, match="^alpha"):
+        track.GaussMarkovFilter((0, 0), alpha=switch)
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "value"),
+    [("layered", "fov", 31), ("layered", "control", "subpixel"), ("layered", "order", 4), ("layered", "window", 7), ("layered", "eps", 0.3), ("layered", "eps", "auto")]
+    + [(method, name, value) for method in ("local", "paper") for name, value in (("model", "affine"), ("camera", "none"))],
+)
+def test_options_of_another_method_are_refused(method, name, value):
+    with pytest.raises(ValueError, match=f"^{name}: expected no such option, which is for .* here, got {method}"):
+        track.GradientTracker(FRAME, (20, 20, 13, 13), method=method, **{name: value})
+
+
+def test_what_moves_first_is_looked_for_with_a_still_camera_in_every_method():
+    for method in ("layered", "local", "paper"):
+        assert track.GradientTracker(FRAME, method=method, camera="none").result.status == "lost"
+
+
+def test_points_may_be_anywhere_on_the_outer_pixels():
+    """Pixels reach half a pixel beyond their centres."""
+    for point in ((255.49, 10), (-0.5, 63.49), (0, -0.5)):
+        assert track.GradientTracker(FRAME, center=point).result.status == "lost"
+    for point in ((255.5, 10), (-0.51, 3), (3, 63.5), (np.nan, 3)):
+        with pytest.raises(ValueError, match="^center"):
+            track.GradientTracker(FRAME, center=point)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("outline", "side", "larger"), [("cross", 21.0, 1.2), ("cross", 21.0, 1.3), ("diamond", 21.0, 1.2)])
+def test_a_box_too_large_round_a_figure_that_does_not_fill_it_becomes_that_of_the_figure(outline, side, larger, kind):
+    """Half of such a box or more is background: as long as that is missed, it is the box that is wrong, and nothing covers the target."""
+    shares, near = [], []
+    for seed in range(6):
+        scene = outlined(outline, side, larger, kind, seed)
+        found = follow(scene)
+        shares.append(np.mean(found.status[1:] == "tracking"))
+        near.append(np.mean(np.linalg.norm(found.position - scene.centres, axis=1) <= 4.0))
+    assert np.mean(shares) >= 0.5 and np.mean(near) >= 0.85
