@@ -40,6 +40,22 @@ pub struct FieldPoints {
     pub spacing: f64,
 }
 
+impl FieldPoints {
+    /// The points outside of a rectangle of pixels.
+    #[must_use]
+    pub fn outside(&self, region: Rect) -> Self {
+        let mut out = Self { spacing: self.spacing, ..Self::default() };
+        for (k, &[x, y]) in self.points.iter().enumerate() {
+            if !within(Some(region), x as usize, y as usize) {
+                out.points.push([x, y]);
+                out.flow.push(self.flow[k]);
+                out.covariances.extend_from_slice(&self.covariances[4 * k..4 * (k + 1)]);
+            }
+        }
+        out
+    }
+}
+
 /// Takes every so manieth valid estimate of a field.
 ///
 /// Windowed estimates share pixels, and their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
@@ -194,6 +210,9 @@ mod tests {
         // As many as are wanted in the region, whatever the rest of the field has.
         let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
         assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
+        let rest = inside(FieldOptions::default()).outside(region.unwrap());
+        assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
+        assert!(rest.points.iter().all(|&[x, y]| !within(region, x as usize, y as usize)));
         // Asked for, a spacing stays.
         let asked = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
         assert_eq!((asked.spacing, asked.points.len()), (10.0, 12));

@@ -2,6 +2,7 @@
 
 use super::camera::Intrinsics;
 use super::motion::{Motion, Projection};
+use super::result::MotionEstimate;
 use super::smoothing::Smoother;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
@@ -70,6 +71,16 @@ pub struct RotationPrior {
     pub rotation: [f64; 3],
     /// Its covariance, row by row.
     pub covariance: [[f64; 3]; 3],
+}
+
+impl RotationPrior {
+    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard deviation about each axis, rad/frame). `None` where the scene's is not known.
+    pub fn of_scene(scene: &MotionEstimate, turning: f64) -> Option<Self> {
+        let own = |i, j| if i == j { turning * turning } else { 0.0 };
+        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| scene.covariance[2 + i][2 + j] + own(i, j)));
+        let known = Self { rotation: scene.motion.rotation, covariance };
+        known.rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(known)
+    }
 }
 
 /// Options of [`estimate_motion`](super::estimate_motion).
