@@ -359,3 +359,32 @@ def test_a_field_gives_the_motion_and_the_points():
         motion3d.estimate_field_motion(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), camera)
     with pytest.raises(ValueError, match="^spacing"):
         motion3d.estimate_field_motion(field, camera, spacing=-1)
+
+
+def test_ground_seen_obliquely_is_published_below_its_bound():
+    """Two views of the ground, 0.5 px: the published rms of 24 trials lies below the bound; ours comes as near to what true depths in the weights reach as anyone's could."""
+    case = next(case for case in scores.PIXELS if case[:4] == ("ground", "oblique", 0.5, 2))
+    errors, ideal, bounds = [], [], []
+    for seed in range(240):
+        make = scenes.two_views("ground", "oblique", 0.5, 2, seed)
+        run = lambda make=make, **options: motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=0.5, method="efficient", **options)
+        errors.append(scores.angle(run().translation, make.u))
+        ideal.append(scores.angle(run(initial=(make.u, make.w), weight_inv_depth=make.depths).translation, make.u))
+        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, sigma=0.5).direction_std[0])
+    published = float(case[5][1].split(" / ")[1])
+    assert published < scores.rms(bounds) < scores.rms(errors) < 1.2 * scores.rms(bounds)
+    assert scores.rms(errors) < 1.06 * scores.rms(ideal)
+
+
+@pytest.mark.parametrize("case", range(5))
+def test_six_numbers_on_layouts_with_the_published_bounds(case):
+    """Shrunk slants and flow alone within a quarter of the published figures; six numbers worse without shrinking where patches are small."""
+    h, n, radius, sigma, asked = scores.SIX[case]
+    like, _ = scores.like_the_published(h, n, radius, sigma, asked)
+    row = scores.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
+    for name in ("CRLB flow", "CRLB six"):
+        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.03), row
+    for name in ("flow ML", "flow prior", "six ML", "six shrunk"):
+        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25), row
+    if n == 200:
+        assert row["six ML"] > 1.15 * row["six shrunk"], row
