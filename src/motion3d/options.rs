@@ -100,6 +100,8 @@ pub struct MotionOptions {
     pub initial: Option<Motion>,
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
+    /// How many points share one error, at least 1: the noise given is so many times their own in variance, so that together they tell no more than they know. What is an outlier, and what chance explains, is judged by their own. Default: 1.
+    pub shared: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.
