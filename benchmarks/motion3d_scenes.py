@@ -137,8 +137,11 @@ def two_views(scene: str, name: str, sigma: float, median: float, seed: int, *, 
     return Scene(pixels, flow, nu, u, w, sigma, K, inliers)
 
 
-def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float) -> tuple[Scene, np.ndarray, np.ndarray]:
-    """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in px, Jacobians (N, 2, 2), covariances (N, 6, 6)."""
+def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float, noise: int | None = None) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in px, Jacobians (N, 2, 2), covariances (N, 6, 6).
+
+    `noise`: a seed of its own for the noise, to draw it again on the same layout.
+    """
     rng = np.random.default_rng(seed)
     u, w = motion(name)
     points = rng.uniform(-h, h, (n, 2))
@@ -153,6 +156,7 @@ def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float)
     along_x = slants[:, :1] * t - nu[:, None] * u[2] * [1, 0] + np.stack([-y * w[0] + 2 * x * w[1], y * w[1] + one * w[2]], -1)
     along_y = slants[:, 1:] * t - nu[:, None] * u[2] * [0, 1] + np.stack([-x * w[0] - one * w[2], -2 * y * w[0] + x * w[1]], -1)
     slope = np.sqrt(3) * sigma / radius
+    rng = rng if noise is None else np.random.default_rng((seed, noise))
     jacobian = np.stack([along_x, along_y], -1) + slope * rng.normal(size=(n, 2, 2))
     flow = 500 * flow + sigma * rng.normal(size=(n, 2))
     covariance = np.broadcast_to(np.diag([sigma**2] * 2 + [slope**2] * 4), (n, 6, 6))

@@ -152,6 +152,7 @@ def estimate_motion(
     weight_inv_depth: ArrayLike | None = None,
     rotation_prior: tuple[ArrayLike, ArrayLike] | None = None,
     initial: tuple[ArrayLike, ArrayLike] | None = None,
+    shared: float = 1.0,
     seed: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
@@ -190,6 +191,8 @@ def estimate_motion(
         The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides.
     initial : (translation (3,), rotation (3,) in rad/frame)
         Look for the minimum near this motion instead of everywhere.
+    shared : float, no unit
+        How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
     seed : int
         Seed of the random choices.
     threads : int or None
@@ -203,7 +206,7 @@ def estimate_motion(
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
         "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": None if shared == 1 else float(shared), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
@@ -396,10 +399,10 @@ def estimate_field_motion(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, and for options that do not fit.
     """
-    points, flow, covariances, _ = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
+    points, flow, covariances, _, shared = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)
-    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, **options}), points
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, **options}), points
 
 
 def _turned(scene: MotionEstimate, turning: float) -> tuple[Array, Array]:

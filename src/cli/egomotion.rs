@@ -25,11 +25,12 @@ use std::path::{Path, PathBuf};
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
     contact (frames) with their deviations. Points are taken as far apart as the errors of the flow go together, in a small --region closer.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
-    With --region on an object that moves by itself the motion is that object's, and the time to contact its own.\n\n\
+    With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
+    its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
     Examples:\n  \
     jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/\n  \
     jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust > motion.csv\n  \
-    jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 -o car.csv"
+    jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 --turning 0.001 -o car.csv"
 )]
 pub struct EgomotionCommand {
     #[command(flatten)]
@@ -53,6 +54,9 @@ pub struct EgomotionCommand {
     /// Most points of a field
     #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(5..), help_heading = "Motion")]
     pub max_points: Option<usize>,
+    /// Take what is in --region for a thing that moves by itself, which turns by so much (standard deviation about each axis) beside the rotation of the rest of the picture: 0.001 for a car
+    #[arg(long, value_name = "RAD/FRAME", value_parser = parse_positive, requires = "region", help_heading = "Motion")]
+    pub turning: Option<f64>,
     /// Seed of the random choices
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Motion")]
     pub seed: u64,
@@ -79,7 +83,7 @@ impl EgomotionCommand {
         if self.method.no_covariance {
             return Err(Error::argument("no_covariance", "a covariance, which weighs the points", "none"));
         }
-        let prepared = prepare(&opened, &self.input, &self.method, &self.sites, &self.compute)?;
+        let prepared = prepare(&opened, &self.input, &self.method, &self.seen(), &self.compute)?;
         let method = prepared.estimator.method();
         if matches!(method, Method::HornSchunck(_)) {
             return Err(Error::argument("method", "one with a covariance", method.name()));
@@ -90,6 +94,15 @@ impl EgomotionCommand {
         } else {
             self.run::<f32>(opened, prepared.estimator, sink, watch)
         }
+    }
+
+    /// Where flow is wanted: all over the picture where its rest tells the rotation.
+    fn seen(&self) -> SiteArguments {
+        let mut seen = self.sites.clone();
+        if self.turning.is_some() {
+            seen.region = None;
+        }
+        seen
     }
 
     /// What is estimated and where it goes, checked before any work.
@@ -118,6 +131,7 @@ impl EgomotionCommand {
                 threads,
                 ..MotionOptions::default()
             },
+            turning: self.turning,
             target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
             pictures: self.picture.clone(),
         })

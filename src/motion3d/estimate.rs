@@ -41,6 +41,7 @@ const ROUNDING: f64 = 1e-11;
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     check(flow, options)?;
+    check_shared(noise, options)?;
     Ok(options.threads.check()?.install(|| estimate(flow, noise, options)))
 }
 
@@ -62,6 +63,18 @@ fn check(flow: &Flow<'_>, options: &MotionOptions) -> Result<()> {
         }
         Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
             Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_shared(noise: &Noise<'_>, options: &MotionOptions) -> Result<()> {
+    match options.shared {
+        Some(shared) if !(shared.is_finite() && shared >= 1.0) => {
+            Err(Error::argument("shared", "a number of at least 1", shared))
+        }
+        Some(_) if matches!(noise, Noise::Unknown) => {
+            Err(Error::argument("shared", "a noise that is known", "sigma and cov left out"))
         }
         _ => Ok(()),
     }
@@ -104,6 +117,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let sigma = if scaled.unknown { f64::NAN } else { sigma };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
     }
+    scaled.observations.shared = options.shared.unwrap_or(1.0);
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
     if scaled.unknown
@@ -115,7 +129,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         return rotation_report(flow, all, all, &rotation, 0.0);
     }
     if options.robust {
-        let Some(kept) = robust::consensus(&mut scaled, rng.stream(1)) else {
+        let Some(kept) = consensus(&mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inliers = scaled.observations.subset(&kept.inliers);
@@ -132,6 +146,19 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
 }
 
+/// The points that obey one motion, judged by their own errors.
+fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let own = scaled.observations.own();
+    scaled.observations.rescale(1.0 / own);
+    let found = robust::consensus(scaled, rng);
+    scaled.observations.rescale(own);
+    let mut found = found?;
+    for rival in &mut found.rivals {
+        rival.excess *= own * own;
+    }
+    Some(found)
+}
+
 /// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful choice of points and no surer; what
 /// else is told says more.
 fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionEstimate {
@@ -143,10 +170,10 @@ fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionE
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 
-/// The rotation alone, where chance explains what it leaves.
+/// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.
 fn turning(observations: &Observations) -> Option<RotationOnly> {
     let rotation = rotation_only(observations)?;
-    by_chance(rotation.chi2, (2 * observations.n - 3) as f64).then_some(rotation)
+    by_chance(rotation.chi2, (2 * observations.n - 3) as f64 / observations.shared).then_some(rotation)
 }
 
 /// The same where the noise is to be estimated: `cost` is what the best motion leaves.

@@ -36,8 +36,26 @@ pub struct FieldPoints {
     pub flow: Vec<[f64; 2]>,
     /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share, `4 pi l^2 / spacing^2`.
     pub covariances: Vec<f64>,
+    /// How many points share one error: what the covariances are multiplied with. For [`MotionOptions::shared`](super::MotionOptions).
+    pub shared: f64,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
+}
+
+impl FieldPoints {
+    /// The points outside of a rectangle of pixels.
+    #[must_use]
+    pub fn outside(&self, region: Rect) -> Self {
+        let mut out = Self { spacing: self.spacing, shared: self.shared, ..Self::default() };
+        for (k, &[x, y]) in self.points.iter().enumerate() {
+            if !within(Some(region), x as usize, y as usize) {
+                out.points.push([x, y]);
+                out.flow.push(self.flow[k]);
+                out.covariances.extend_from_slice(&self.covariances[4 * k..4 * (k + 1)]);
+            }
+        }
+        out
+    }
 }
 
 /// Takes every so manieth valid estimate of a field.
@@ -79,7 +97,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Grid { stride, .. } => (step * stride) as f64,
         Sites::Points(_) => spacing,
     };
-    let mut out = FieldPoints { spacing, ..FieldPoints::default() };
+    let mut out = FieldPoints { shared, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
@@ -177,6 +195,7 @@ mod tests {
         let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
         let covariance = field_points(&field, &dense).unwrap().covariances[0];
         assert!((covariance / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{covariance}");
+        assert_eq!((points.shared, field_points(&field, &dense).unwrap().shared), (1.0, covariance / 0.25));
         let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
         assert_eq!(field_points(&field, &denser).unwrap().spacing, 3.0);
         field.status[5 * 60 + 5] = Status::Inconsistent;
@@ -194,6 +213,9 @@ mod tests {
         // As many as are wanted in the region, whatever the rest of the field has.
         let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
         assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
+        let rest = inside(FieldOptions::default()).outside(Rect { x: 10, y: 5, width: 40, height: 30 });
+        assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
+        assert!(rest.points.iter().all(|&[x, y]| !within(region, x as usize, y as usize)));
         // Asked for, a spacing stays.
         let asked = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
         assert_eq!((asked.spacing, asked.points.len()), (10.0, 12));

@@ -41,6 +41,8 @@ pub(super) struct Observations {
     pub level: Level,
     /// What is known of the rotation beforehand.
     pub prior: Option<Known>,
+    /// How many points share one error: their own has the variance `1 / shared`.
+    pub shared: f64,
 }
 
 /// A rotation known beforehand, with the inverse of its covariance.
@@ -98,7 +100,7 @@ impl Observations {
             size += row.g.norm_squared();
         }
         let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
-        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect(), prior: None }
+        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect(), prior: None, shared: 1.0 }
     }
 
     /// The points `chosen`, by index among these.
@@ -122,6 +124,7 @@ impl Observations {
             floor: self.floor,
             level: self.level,
             prior: self.prior,
+            shared: self.shared,
         }
     }
 
@@ -129,6 +132,11 @@ impl Observations {
     pub fn rescale(&mut self, factor: f64) {
         self.planes.iter_mut().for_each(|value| *value *= factor);
         self.floor *= factor * factor;
+    }
+
+    /// The deviation of a point's own error, in units of noise.
+    pub fn own(&self) -> f64 {
+        self.shared.sqrt().recip()
     }
 
     /// One plane, `stride` values.

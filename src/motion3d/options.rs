@@ -2,6 +2,7 @@
 
 use super::camera::Intrinsics;
 use super::motion::{Motion, Projection};
+use super::result::MotionEstimate;
 use super::smoothing::Smoother;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
@@ -72,6 +73,16 @@ pub struct RotationPrior {
     pub covariance: [[f64; 3]; 3],
 }
 
+impl RotationPrior {
+    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard deviation about each axis, rad/frame). `None` where the scene's is not known.
+    pub fn of_scene(scene: &MotionEstimate, turning: f64) -> Option<Self> {
+        let own = |i, j| if i == j { turning * turning } else { 0.0 };
+        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| scene.covariance[2 + i][2 + j] + own(i, j)));
+        let known = Self { rotation: scene.motion.rotation, covariance };
+        known.rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(known)
+    }
+}
+
 /// Options of [`estimate_motion`](super::estimate_motion).
 #[derive(Debug, Clone, Default)]
 pub struct MotionOptions {
@@ -89,6 +100,8 @@ pub struct MotionOptions {
     pub initial: Option<Motion>,
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
+    /// How many points share one error, at least 1: the noise given is so many times their own in variance, so that together they tell no more than they know. What is an outlier, and what chance explains, is judged by their own. Default: 1.
+    pub shared: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.

@@ -99,7 +99,7 @@ impl AffinePatches<'_> {
 /// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so. Other minima and opposite directions that no patch behind the camera excludes are told as for points.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth` and `rotation_prior`, which this form does not have.
+/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`, `rotation_prior` and `shared`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let refuse = |name: &'static str| {
@@ -109,6 +109,7 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { robust: true, .. } => return refuse("robust"),
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
         MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
+        MotionOptions { shared: Some(_), .. } => return refuse("shared"),
         _ => {}
     }
     let system = patches.system(options.placement);

@@ -2,6 +2,7 @@
 
 mod confidence;
 mod degenerate;
+mod dense;
 mod estimators;
 mod patches;
 mod published;

@@ -87,6 +87,58 @@ fn a_region_has_points_enough() {
     assert!(few.iter().all(|&n| (8..=20).contains(&n)), "{few:?}");
 }
 
+/// How fast the thing in the next test grows, and by how much the camera turns about its axis, rad/frame.
+const NEARER: f64 = 1.03;
+const TURN: f64 = 0.01;
+
+/// Frames of a textured plane that is approached by a camera that turns, and of a thing before it, 72 x 60 px around (121, 82), that comes nearer faster; 192 x 144 px.
+fn thing_ahead(place: &Place, folder: &str, count: i32) {
+    std::fs::create_dir(place.path(folder)).unwrap();
+    let shade = |seed: f64, x: f64, y: f64| -> f64 {
+        let wave = |k: f64| {
+            (0.11 + 0.3 * (k * seed).sin().abs()) * ((k * 2.3 + seed).cos() * x + (k * 2.3 + seed).sin() * y) + k
+        };
+        (1..25).map(|k| 12.0 * wave(f64::from(k)).sin()).sum()
+    };
+    for frame in 0..count {
+        let (sin, cos) = (-TURN * f64::from(frame)).sin_cos();
+        let (behind, before) = (1.01f64.powi(frame), NEARER.powi(frame));
+        let picture = GrayImage::from_fn(192, 144, |x, y| {
+            let (x, y) = (f64::from(x) - 96.0, f64::from(y) - 72.0);
+            let (x, y) = (cos * x - sin * y, sin * x + cos * y);
+            let (a, b) = ((x - 25.0) / before, (y - 10.0) / before);
+            let thing = a.abs() < 36.0 && b.abs() < 30.0;
+            let value = if thing { shade(1.3, a, b) } else { shade(1.7, x / behind, y / behind) };
+            Luma([(128.0 + value).clamp(0.0, 255.0).round() as u8])
+        });
+        picture.save(place.path(&format!("{folder}/{frame:02}.png"))).unwrap();
+    }
+}
+
+/// In a narrow field a rotation trades against a sideways motion and the approach: the rest of the picture tells the rotation.
+#[test]
+fn a_thing_ahead_has_its_own_time_to_contact() {
+    let place = Place::new();
+    thing_ahead(&place, "frames", 4);
+    let line = "egomotion frames --intrinsics 250,250,96,72 --method windowed --pair --region 92,58,58,48 --quiet";
+    let number = |row: &std::collections::HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+    let (alone, known) = (rows(&place.good(line).out), rows(&place.good(&format!("{line} --turning 0.0005")).out));
+    assert_eq!((alone.len(), known.len()), (3, 3));
+    let truth = 1.0 / NEARER.ln();
+    for (alone, known) in alone.iter().zip(&known) {
+        assert_eq!(alone["scene_status"], "");
+        assert!(!["", "too_few_points"].contains(&known["scene_status"].as_str()), "{known:?}");
+        let (contact, deviation) = (number(known, "time_to_contact"), number(known, "time_to_contact_std"));
+        assert!((contact - truth).abs() < 4.0 * deviation && deviation < 0.1 * truth, "{contact} {deviation}");
+        assert!((number(known, "w_z") - TURN).abs() < 0.002, "{known:?}");
+        for axis in ["w_x_std", "w_y_std"] {
+            assert!(number(known, axis) < 0.7 * number(alone, axis), "{axis}: {alone:?} {known:?}");
+        }
+    }
+    let ended = place.line("egomotion frames --intrinsics 250,250,96,72 --turning 0.001");
+    assert!(ended.code == 2 && ended.err.contains("--region"), "{}", ended.err);
+}
+
 #[test]
 fn mistakes_are_told_before_any_work() {
     let place = Place::new();

@@ -75,3 +75,45 @@ fn a_pair_of_particle_images() {
     let share = to_pictures(&place, &images, "--smooth 1", 0);
     assert!(images.len() == 2 && share > 0.95, "{share} {images:?}");
 }
+
+/// Ranges of the car ahead by laser, m, from frame 20 on.
+fn ranges(folder: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(format!("{folder}/lidar_range.csv")).unwrap();
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+    let rows = reader.deserialize::<std::collections::HashMap<String, String>>().map(|row| row.unwrap());
+    rows.filter(|row| (20..28).contains(&row["frame"].parse::<i32>().unwrap()))
+        .map(|row| row["Z_m"].parse().unwrap())
+        .collect()
+}
+
+/// Its closing speed is that of one line through the ranges of the frames; the rotation of the rest of the picture is what makes its time to contact known.
+#[test]
+fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
+    let Some(folder) = data("ttc_kitti_lidar") else { return };
+    let place = Place::new();
+    let line = format!(
+        "egomotion {folder}/image_02 --luminance --intrinsics 721.5377,721.5377,609.5593,172.854 --preset balanced --pair --region 555,225,160,65 --spacing 8 --quiet"
+    );
+    let rows = |line: &str| -> Vec<std::collections::HashMap<String, String>> {
+        let out = place.good(line).out;
+        csv::Reader::from_reader(out.as_bytes()).deserialize().map(|row| row.unwrap()).collect()
+    };
+    let (alone, known) = (rows(&line), rows(&format!("{line} --turning 0.0005")));
+    let ranges = ranges(&folder);
+    let middle = 0.5 * (ranges.len() - 1) as f64;
+    let (mut slope, mut squares) = (0.0, 0.0);
+    for (k, range) in ranges.iter().enumerate() {
+        slope += (k as f64 - middle) * range;
+        squares += (k as f64 - middle).powi(2);
+    }
+    let closing = -slope / squares;
+    assert_eq!((alone.len(), known.len(), ranges.len()), (7, 7, 8));
+    for (k, (alone, known)) in alone.iter().zip(&known).enumerate() {
+        let number = |row: &std::collections::HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+        let laser = 0.5 * (ranges[k] + ranges[k + 1]) / closing;
+        let (contact, deviation) = (number(known, "time_to_contact"), number(known, "time_to_contact_std"));
+        assert!((contact - laser).abs() < 2.5 * deviation && deviation < 8.0, "{contact} {deviation}, laser: {laser}");
+        assert!(number(alone, "time_to_contact_std") > 1.5 * deviation, "{alone:?}");
+        assert!(!known["scene_status"].is_empty() && alone["scene_status"].is_empty());
+    }
+}

@@ -9,8 +9,9 @@ const ROUNDS: usize = 3;
 const EXPECTATIONS: usize = 60;
 const STEPS: usize = 60;
 
-/// The length of a step that is the last, and the farthest that the direction may come, degrees.
+/// The length of a step that is the last, or its square in units of the motion's deviation; and the farthest that the direction may come, degrees.
 const STEP: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-8;
 const FARTHEST: f64 = 30.0;
 
 /// The solution with the surfaces in its weights.
@@ -69,17 +70,24 @@ pub(super) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
 }
 
 /// Scoring steps: the expected slope of the equation is that of its weights' own information.
+///
+/// The equation's slope for the noise at hand is another, most where the epipole lies among patches: steps that grow went too far, and from there on they are half as long.
 fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<Motion> {
-    let mut motion = *start;
+    let (mut motion, mut share, mut before) = (*start, 1.0, f64::INFINITY);
     for _ in 0..STEPS {
         let tangent = tangents(&motion.u());
         let here = system.equations(&motion, &tangent, Some(surfaces));
         let step = here.h.cholesky()?.solve(&here.gradient);
-        motion = motion.stepped(&tangent, &step);
+        let length = here.gradient.dot(&step);
+        if length > before {
+            share *= 0.5;
+        }
+        before = length;
+        motion = motion.stepped(&tangent, &(share * step));
         if !step.iter().all(|value| value.is_finite()) {
             return None;
         }
-        if step.norm() < STEP {
+        if step.norm() < STEP || length < NEGLIGIBLE {
             return Some(motion);
         }
     }

@@ -115,5 +115,6 @@ fn differ(observations: &Observations, found: &Consensus, inner: &Motion, fewer:
     let (all, some) = (spread(&found.inliers)?, spread(fewer)?);
     let off = tangent * inner.u();
     let own = (some - all) + all * BESIDES;
-    Some(off.dot(&(own.try_inverse()? * off)) > RARE)
+    // Here points are in units of their own errors, of which there are fewer than points.
+    Some(off.dot(&(own.try_inverse()? * off)) > RARE * observations.shared)
 }

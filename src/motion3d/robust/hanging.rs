@@ -30,7 +30,7 @@ pub(in super::super) fn hangs_on_few(observations: &Observations, found: &Motion
     let seen = depths(observations, &found.motion);
     let mut sizes: Vec<f64> = (0..observations.n)
         .filter(|&k| !found.inliers[observations.source[k] as usize])
-        .map(|k| seen.e[k].abs())
+        .map(|k| seen.e[k].abs() / observations.own())
         .collect();
     let chance = INLIER / (2.0 * median(&mut sizes).max(INLIER));
     let suspects = most_likely(chance * rejected as f64);

@@ -7,14 +7,14 @@ use crate::image::picture::{ContactMark, draw_contacts, grey_picture};
 use crate::io::{NumberedFiles, cell, write_picture};
 use crate::math::Real;
 use crate::motion3d::{
-    FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, Status, estimate_motion,
-    field_points, focus_of_expansion,
+    FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, RotationPrior, Status,
+    estimate_motion, field_points, focus_of_expansion,
 };
-use crate::types::AnyFrame;
+use crate::types::{AnyFrame, FlowField};
 use std::path::PathBuf;
 
 /// Columns of the table.
-const HEADER: [&str; 24] = [
+const HEADER: [&str; 25] = [
     "frame",
     "time_s",
     "status",
@@ -39,6 +39,7 @@ const HEADER: [&str; 24] = [
     "approach_rate_std",
     "time_to_contact",
     "time_to_contact_std",
+    "scene_status",
 ];
 
 /// What is estimated from fields and where it goes.
@@ -50,6 +51,8 @@ pub struct EgomotionPlan {
     pub field: FieldOptions,
     /// How the motion is estimated.
     pub motion: MotionOptions,
+    /// What the thing in the field options' region may turn by itself, rad/frame: its rotation is then known beforehand as that of the rest of the scene. `None`: nothing is known of it.
+    pub turning: Option<f64>,
     /// Where rows go.
     pub target: TableTarget,
     /// A folder for pictures, `egomotion_000000.png`, ...
@@ -75,7 +78,28 @@ impl Egomotion {
         Ok(Self { table: Table::create(&plan.target, &HEADER)?, plan, written: 0, latest: None })
     }
 
-    fn row(&mut self, frame: usize, time: Option<f64>, points: &FieldPoints, found: &MotionEstimate) -> Result<()> {
+    /// The motion of these points, with what is known of the rotation beforehand.
+    fn motion(&self, points: &FieldPoints, rotation_prior: Option<RotationPrior>) -> Result<MotionEstimate> {
+        let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
+        let options = MotionOptions { rotation_prior, shared: Some(points.shared), ..self.plan.motion.clone() };
+        estimate_motion(&flow, &Noise::Covariances(&points.covariances), &options)
+    }
+
+    /// The motion of the scene around the region, where a thing that moves by itself lies in this.
+    fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<(MotionEstimate, f64)>> {
+        let (Some(turning), Some(region)) = (self.plan.turning, self.plan.field.region) else { return Ok(None) };
+        let rest = field_points(field, &FieldOptions::default())?.outside(region);
+        Ok(Some((self.motion(&rest, None)?, turning)))
+    }
+
+    fn row(
+        &mut self,
+        frame: usize,
+        time: Option<f64>,
+        points: &FieldPoints,
+        found: &MotionEstimate,
+        scene: Option<Status>,
+    ) -> Result<()> {
         let motion = &found.motion;
         let focus = focus_of_expansion(motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
         let (at, spread) = focus.unwrap_or(([f64::NAN; 2], [[f64::NAN; 2]; 2]));
@@ -95,6 +119,7 @@ impl Egomotion {
         cells.extend(found.rotation_std.map(cell));
         cells.extend(at.map(cell));
         cells.extend([spread[0][0].sqrt(), spread[1][1].sqrt(), rate, rate_std, contact, contact_std].map(cell));
+        cells.push(scene.map_or("", Status::name).to_string());
         self.table.row(cells)?;
         self.table.flush()
     }
@@ -124,9 +149,11 @@ fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
 impl<T: Real> Sink<T> for Egomotion {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let points = field_points(step.field, &self.plan.field)?;
-        let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
-        let found = estimate_motion(&flow, &Noise::Covariances(&points.covariances), &self.plan.motion)?;
-        self.row(step.field.layout.frame_index, step.time, &points, &found)?;
+        let scene = self.scene(step.field)?;
+        let known = scene.as_ref().and_then(|(scene, turning)| RotationPrior::of_scene(scene, *turning));
+        let found = self.motion(&points, known)?;
+        let status = scene.map(|(scene, _)| scene.status);
+        self.row(step.field.layout.frame_index, step.time, &points, &found, status)?;
         if found.status == Status::TooFewPoints { Ok(()) } else { self.draw(step, &points, &found) }
     }
 

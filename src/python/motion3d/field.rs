@@ -18,7 +18,7 @@ pub fn motion3d_field_points<'py>(
     spacing: Option<f64>,
     most: Option<usize>,
     region: Option<Region>,
-) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64)> {
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64, f64)> {
     if field.count().1 {
         return Err(PyValueError::new_err("field: expected a single field, got a stack; take field[t]"));
     }
@@ -34,5 +34,6 @@ pub fn motion3d_field_points<'py>(
         arrays::owned(py, &[n, 2], flat(found.flow))?.into_any(),
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
         found.spacing,
+        found.shared,
     ))
 }

@@ -19,6 +19,7 @@ pub struct Options<'py> {
     weight_inv_depth: Option<Bound<'py, PyAny>>,
     rotation_prior: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+    shared: Option<f64>,
     seed: Integer,
     threads: Option<usize>,
 }
@@ -39,6 +40,7 @@ impl Options<'_> {
             weight_depths: weights.transpose()?.map(|(_, values)| values),
             initial: self.initial()?,
             rotation_prior: self.rotation_prior()?,
+            shared: self.shared,
             seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
             threads: Threads::new(self.threads)?,
         })
