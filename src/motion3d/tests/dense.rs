@@ -13,7 +13,7 @@ fn smooth(x: f64, y: f64) -> f64 {
     1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
 }
 
-/// Points in tens with one error each ten, and `scale` times the depths.
+/// Points of which [`SHARED`] in a row have one error, and `scale` times the depths.
 fn dense(motion: Motion, n: usize, scale: f64, seed: u64) -> Scene {
     let mut scene = Scene::new(motion, n, 0.6, 0.0, seed, |x, y, _| scale * smooth(x, y));
     let noise = CounterRng::new(700 + seed);
