@@ -56,6 +56,7 @@ __all__ = [
     "_mixture_fit",
     "_mixture_partial_fit",
     "_motion3d_bound",
+    "_motion3d_contact_map",
     "_motion3d_estimate",
     "_motion3d_field_points",
     "_motion3d_focus",
@@ -977,6 +978,9 @@ def _mixture_densities(
 def _motion3d_bound(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, layout: dict[str, Any]
 ) -> dict[str, NDArray[np.float64]]: ...
+def _motion3d_contact_map(
+    field: FlowField, intrinsics: ArrayLike, told: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], placement: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def _motion3d_estimate(points: ArrayLike, flow: ArrayLike, layout: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]: ...
 def _motion3d_field_points(
     field: FlowField, spacing: float | None, most: int | None, region: Sequence[int] | None

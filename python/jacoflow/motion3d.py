@@ -25,7 +25,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _motion3d_bound, _motion3d_estimate, _motion3d_field_points, _motion3d_focus, _motion3d_predict, _motion3d_two_views
+from ._jacoflow import (
+    _motion3d_bound,
+    _motion3d_contact_map,
+    _motion3d_estimate,
+    _motion3d_field_points,
+    _motion3d_focus,
+    _motion3d_predict,
+    _motion3d_two_views,
+)
 
 if TYPE_CHECKING:
     from . import FlowField
@@ -41,6 +49,7 @@ __all__ = [
     "motion_bound",
     "predict_flow",
     "time_to_contact",
+    "time_to_contact_map",
     "time_to_contact_std",
 ]
 
@@ -96,9 +105,9 @@ class MotionEstimate:
     surface_slopes: Array | None
     """Slopes (N, 2) of the inverse depth along x and y in the weights, per unit of the plane at distance 1; None unless a Jacobian was given."""
     time_to_contact: Array
-    """`-1 / (nu u_z)` (N,), frames, of `inv_depth_smooth`: positive when approaching, infinite when `u_z = 0`."""
+    """`-1 / (nu u_z)` (N,), frames, of `inv_depth_smooth` (of `inv_depth` where that is NaN or comes from `weight_inv_depth`, whose unit is any): positive when approaching, infinite when `u_z = 0`."""
     time_to_contact_std: Array
-    """Standard deviations (N,) of `time_to_contact`, frames, from those of the depths and of the motion."""
+    """Standard deviations (N,) of `time_to_contact`, frames, from those of the smoothed depths and of the motion."""
     approach_rate: float
     """`nu u_z` of all inliers together, 1/frame, weighted by what each point's own flow says: that of one object or of the scene's mean; `-1 / approach_rate` is its time to contact in frames. NaN for six numbers a patch."""
     approach_rate_std: float
@@ -314,12 +323,12 @@ def motion_bound(
 
 
 def time_to_contact(result: MotionEstimate) -> Array:
-    """Frames until each point (N,) reaches the camera's plane, `-1 / (nu u_z)`: positive when approaching, infinite when `u_z = 0`."""
+    """Frames until each point (N,) reaches the camera's plane, `-1 / (nu u_z)`: positive when approaching, infinite when `u_z = 0`. On the sphere, where inverse depths are inverse ranges, times are to be multiplied by the bearings' z."""
     return result.time_to_contact
 
 
 def time_to_contact_std(result: MotionEstimate) -> Array:
-    """Standard deviations (N,) of `time_to_contact`, frames: of the point's own depth and, to first order, of the motion."""
+    """Standard deviations (N,) of `time_to_contact`, frames, to first order: of the smoothed depth (its posterior deviation given its neighbours; the point's own where nothing was smoothed) and of the motion."""
     return result.time_to_contact_std
 
 
@@ -403,6 +412,33 @@ def estimate_field_motion(
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, **options}), points
+
+
+def time_to_contact_map(
+    field: FlowField, result: MotionEstimate, K: ArrayLike, *, placement: Literal["midpoint", "start"] = "midpoint"
+) -> tuple[Array, Array, Array]:
+    """Frames to contact at every pixel of a flow field, (H, W), their standard deviations, frames, and residuals, in units of noise.
+
+    Each pixel has the time of whatever it shows, `-1 / (nu u_z)` with the inverse depth of its own flow: positive when approaching, infinite where the motion has no translation, NaN where the field is not valid. Times count from half way between the frames with
+    "midpoint". The deviations are those of the pixel's own flow and of the motion; errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 tells of something that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
+
+    Parameters
+    ----------
+    field : FlowField
+        One field (not a stack) with a covariance, in px/frame.
+    result : MotionEstimate
+        The motion of its scene, from `estimate_field_motion`.
+    K : array (3, 3)
+        Camera matrix, px.
+    placement : "midpoint" or "start"
+        As in `estimate_motion`.
+
+    Raises
+    ------
+    ValueError
+        For a stack, a field without a covariance or with a `pixel_pitch`, and for a matrix that is none of a camera.
+    """
+    return _motion3d_contact_map(field, K, (result.translation, result.rotation, result.tangent, result.covariance), placement)
 
 
 def _turned(scene: MotionEstimate, turning: float) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
     its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
     Examples:\n  \
-    jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/\n  \
+    jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/ --maps contact/\n  \
     jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust > motion.csv\n  \
     jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 --turning 0.001 -o car.csv"
 )]
@@ -66,6 +66,9 @@ pub struct EgomotionCommand {
     /// Draw what comes near in red, and the focus of expansion, over every frame: a folder for egomotion_000000.png, ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub picture: Option<PathBuf>,
+    /// Times to contact at every pixel (frames) with their standard deviations and residuals (in units of noise: far from 0 on what moves by itself): a folder for contact_000000.npz, ...
+    #[arg(long, value_name = "FOLDER", help_heading = "Output")]
+    pub maps: Option<PathBuf>,
     /// Replace files that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -113,12 +116,8 @@ impl EgomotionCommand {
             "efficient" => motion3d::Method::Efficient,
             other => return Err(Error::argument("estimator", "auto, ml or efficient", other)),
         };
-        if let Some(folder) = &self.picture {
-            let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-            if occupied && !self.force {
-                let wanted = "an empty or new folder (--force writes into it)";
-                return Err(Error::argument("picture", wanted, folder.display()));
-            }
+        for (name, folder) in [("picture", &self.picture), ("maps", &self.maps)] {
+            self.vacant(name, folder.as_deref())?;
         }
         let threads = compute(&self.compute)?.0;
         Ok(EgomotionPlan {
@@ -134,7 +133,18 @@ impl EgomotionCommand {
             turning: self.turning,
             target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
             pictures: self.picture.clone(),
+            maps: self.maps.clone(),
         })
+    }
+
+    /// Whether a folder may be written into.
+    fn vacant(&self, name: &'static str, folder: Option<&Path>) -> Result<()> {
+        let Some(folder) = folder.filter(|_| !self.force) else { return Ok(()) };
+        if folder.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
+            let wanted = "an empty or new folder (--force writes into it)";
+            return Err(Error::argument(name, wanted, folder.display()));
+        }
+        Ok(())
     }
 
     fn run<T: SimdReal>(&self, opened: Opened, estimator: Estimator, sink: Egomotion, watch: &Watch) -> Result<Report> {

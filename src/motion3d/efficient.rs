@@ -29,6 +29,8 @@ pub(super) struct Efficient {
     pub covariance: Matrix5,
     /// The depths in the weights, `nu~`; as long as the planes.
     pub smooth: Vec<f64>,
+    /// Their posterior variances; `None` of depths from elsewhere.
+    pub variance: Option<Vec<f64>>,
 }
 
 /// Where weights have their depths from.
@@ -44,7 +46,7 @@ impl WeightDepths<'_> {
     fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
         match self {
             Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
-            Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()] },
+            Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
         }
     }
 
@@ -116,7 +118,8 @@ fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Op
         }
         None => sandwich(observations, &motion, &tangent, &smooth)?,
     };
-    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu })
+    let variance = known.is_none().then_some(smooth.variance);
+    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance })
 }
 
 /// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are too noisy to tell it.

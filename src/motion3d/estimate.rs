@@ -1,6 +1,7 @@
 //! The whole way from flow to motion.
 
 use super::covariance::{Plugged, direction_deviation, plugged};
+use super::departure::beyond_theory;
 use super::efficient::{Efficient, WeightDepths, unsolved};
 use super::intake::whiten;
 use super::likelihood::{Candidate, choose, different, minima};
@@ -132,8 +133,9 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let Some(kept) = consensus(&mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
-        let inliers = scaled.observations.subset(&kept.inliers);
-        let found = on(flow, options, &mut scaled, inliers, Some(&kept), rng);
+        let inner = scaled.observations.subset(&kept.inner);
+        let found = on(flow, options, &mut scaled, inner, Some(&kept), rng);
+        let found = with_all_inliers(found, &scaled.observations, &kept);
         doubted(found, &scaled.observations, kept.doubtful)
     } else {
         if !scaled.unknown
@@ -144,6 +146,18 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let inliers = scaled.observations.clone();
         on(flow, options, &mut scaled, inliers, None, rng)
     }
+}
+
+/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their own.
+fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    for &k in &kept.inliers {
+        let source = all.source[k as usize] as usize;
+        if !found.inliers[source] {
+            found.inliers[source] = true;
+            found.inverse_depth_smooth[source] = found.inverse_depth[source];
+        }
+    }
+    found
 }
 
 /// The points that obey one motion, judged by their own errors.
@@ -243,12 +257,17 @@ fn on(
     let plugged = plugged(&chosen.minimum.equations);
     let low = plugged.is_none();
     let several = close(&candidates, inliers.n).len() > 1;
-    let trial = if wanted || low || several { smoothed(&inliers, options, &candidates, made, smoother) } else { None };
+    let astray = plugged.as_ref().is_some_and(|plugged| beyond_theory(&inliers, &chosen.minimum, plugged));
+    let trial = if wanted || low || several || astray {
+        smoothed(&inliers, options, &candidates, made, smoother)
+    } else {
+        None
+    };
     let (improved, mut undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
     if let Some(best) = improved.as_ref().filter(|_| !wanted) {
         undecided = preferred(best, &chosen, plugged.as_ref()).or(undecided);
     }
-    let improved = improved.filter(|_| wanted || low);
+    let improved = improved.filter(|_| wanted || low || astray);
     let unknown = low && improved.is_none();
     let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
     if unknown {

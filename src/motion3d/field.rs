@@ -68,13 +68,7 @@ impl FieldPoints {
 /// # Errors
 /// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
-    if field.covariance.is_none() {
-        return Err(Error::argument("field", "one with a covariance", "one without"));
-    }
-    if field.layout.pixel_pitch != (1.0, 1.0) {
-        let got = format!("the pixel pitch {:?}", field.layout.pixel_pitch);
-        return Err(Error::argument("field", "flow in px", got));
-    }
+    measured(field)?;
     let usual = LEAST_SPACING.max(INDEPENDENT * field.layout.correlation_length);
     let spacing = options.spacing.unwrap_or(usual);
     if !(spacing.is_finite() && spacing > 0.0) {
@@ -117,6 +111,18 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         }
     }
     Ok(out)
+}
+
+/// Whether a field says in px, and how surely, what moves.
+pub(super) fn measured<T>(field: &FlowField<T>) -> Result<()> {
+    if field.covariance.is_none() {
+        return Err(Error::argument("field", "one with a covariance", "one without"));
+    }
+    if field.layout.pixel_pitch != (1.0, 1.0) {
+        let got = format!("the pixel pitch {:?}", field.layout.pixel_pitch);
+        return Err(Error::argument("field", "flow in px", got));
+    }
+    Ok(())
 }
 
 /// Points on the area over which errors are one, at least 1; a list of points is taken to know what it does.

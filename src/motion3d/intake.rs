@@ -14,17 +14,12 @@ pub(super) fn whiten(flow: &Flow<'_>, noise: &Noise<'_>, placement: Placement) -
     for k in 0..n {
         let row = match flow {
             Flow::Plane { points, flow, camera } => {
-                let half = if placement == Placement::Midpoint { 0.5 } else { 0.0 };
-                let at = [points[k][0] + half * flow[k][0], points[k][1] + half * flow[k][1]];
-                let scale = camera.map_or_else(Matrix2::identity, Intrinsics::scale);
-                let at = camera.map_or(at, |camera| camera.to_plane(at));
-                let covariance = match noise {
-                    Noise::Covariances(c) => symmetric(Matrix2::from_row_slice(&c[4 * k..4 * k + 4])),
-                    _ => Matrix2::identity() * (sigma * sigma),
-                };
+                let same = [sigma * sigma, 0.0, 0.0, sigma * sigma];
+                let covariance: &[f64] = if let Noise::Covariances(c) = noise { &c[4 * k..4 * k + 4] } else { &same };
+                let row = plane_row(points[k], flow[k], covariance, *camera, placement);
+                let at = row.as_ref().map_or([f64::NAN; 2], |(_, at)| *at);
                 position.push([at[0], at[1], 0.0]);
-                let flow = scale * Vector2::from(flow[k]);
-                Row::whitened(&Rows::plane(at), flow, &(scale * covariance * scale.transpose()))
+                row.map(|(row, _)| row)
             }
             Flow::Sphere { bearings, flow } => {
                 let eta = Vector3::from(bearings[k]);
@@ -50,6 +45,22 @@ pub(super) fn whiten(flow: &Flow<'_>, noise: &Noise<'_>, placement: Placement) -
     }
     let spherical = matches!(flow, Flow::Sphere { .. });
     Observations::new(&rows, position, spherical, source)
+}
+
+/// A point of the picture, whitened, and its place on the plane at distance 1; `covariance`: 4 values, in squared units of the flow.
+pub(super) fn plane_row(
+    point: [f64; 2],
+    flow: [f64; 2],
+    covariance: &[f64],
+    camera: Option<&Intrinsics>,
+    placement: Placement,
+) -> Option<(Row, [f64; 2])> {
+    let half = if placement == Placement::Midpoint { 0.5 } else { 0.0 };
+    let at = [point[0] + half * flow[0], point[1] + half * flow[1]];
+    let scale = camera.map_or_else(Matrix2::identity, Intrinsics::scale);
+    let at = camera.map_or(at, |camera| camera.to_plane(at));
+    let covariance = scale * symmetric(Matrix2::from_row_slice(covariance)) * scale.transpose();
+    Row::whitened(&Rows::plane(at), scale * Vector2::from(flow), &covariance).map(|row| (row, at))
 }
 
 fn symmetric(matrix: Matrix2<f64>) -> Matrix2<f64> {

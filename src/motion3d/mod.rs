@@ -30,7 +30,9 @@
 
 mod bound;
 mod camera;
+mod contact;
 mod covariance;
+mod departure;
 mod efficient;
 mod estimate;
 mod field;
@@ -58,6 +60,7 @@ mod verdict;
 
 pub use bound::{MotionBound, motion_bound};
 pub use camera::Intrinsics;
+pub use contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
 pub use field::{FieldOptions, FieldPoints, field_points};
 pub use motion::{Motion, Projection};

@@ -1,15 +1,17 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
+use super::contact::Rates;
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
+use super::departure::departure;
 use super::efficient::Efficient;
 use super::kernels::{Depths, depths, equations};
 use super::likelihood::Candidate;
 use super::motion::Motion;
-use super::observations::{Observations, Row};
+use super::observations::Observations;
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::RotationOnly;
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 
 /// A motion found on the inliers.
 pub(super) struct Solution {
@@ -20,13 +22,14 @@ pub(super) struct Solution {
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     likelihood: Likelihood,
-    /// Depths in the weights, where they were smoothed.
+    /// Depths in the weights, where they were smoothed, and their variances where these are known.
     smooth: Option<Vec<f64>>,
+    variance: Option<Vec<f64>>,
     fell_back: bool,
 }
 
 impl Solution {
-    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for a covariance.
+    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for maximum likelihood's covariance.
     pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
         let minimum = &chosen.minimum;
         let likelihood = Likelihood {
@@ -43,6 +46,7 @@ impl Solution {
             alternatives: Vec::new(),
             likelihood,
             smooth: None,
+            variance: None,
             fell_back: wanted && improved.is_none(),
         };
         match improved {
@@ -51,13 +55,11 @@ impl Solution {
                 tangent: improved.tangent,
                 covariance: Some(improved.covariance),
                 smooth: Some(improved.smooth),
+                variance: improved.variance,
                 ..plain
             },
-            // The axes belong to the covariance; the motions are as good as the same.
-            Some(improved) if plugged.is_none() => {
-                Self { tangent: improved.tangent, covariance: Some(improved.covariance), ..plain }
-            }
-            _ => plain,
+            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
+            None => plain,
         }
     }
 }
@@ -106,48 +108,40 @@ pub(super) fn report(
     for &source in &inliers.source {
         out.inliers[source as usize] = true;
     }
-    contact(&mut out, all, &seen, solution);
+    contact(&mut out, all, inliers, &seen, solution);
     out
 }
 
-/// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`.
-fn rate_slopes(row: &Row, nu: f64, inverse: f64, u: &Vector3<f64>, tangent: &Matrix2x3<f64>) -> SMatrix<f64, 5, 1> {
-    let t = row.g * u;
-    let turn: Vector2<f64> = tangent * row.g.transpose() * t * (-nu * inverse);
-    let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-    SMatrix::<f64, 5, 1>::from_column_slice(&[
-        u.z * turn.x + nu * tangent[(0, 2)],
-        u.z * turn.y + nu * tangent[(1, 2)],
-        u.z * spin.x,
-        u.z * spin.y,
-        u.z * spin.z,
-    ])
+/// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any, else the point's own.
+fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) -> Vec<(f64, f64)> {
+    let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
+    let mut depths: Vec<(f64, f64)> = own.map(|(nu, deviation)| (*nu, deviation * deviation)).collect();
+    if let (Some(nu), Some(variance)) = (&solution.smooth, &solution.variance) {
+        for (k, &source) in inliers.source.iter().enumerate() {
+            depths[source as usize] = (nu[k], variance[k]);
+        }
+    }
+    depths
 }
 
 /// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
-fn contact(out: &mut MotionEstimate, all: &Observations, seen: &Depths, solution: &Solution) {
-    let (u, tangent) = (solution.motion.u(), &solution.tangent);
-    let covariance = solution.covariance.unwrap_or_else(|| Matrix5::from_element(f64::NAN));
-    let (mut weights, mut rates, mut common) = (0.0, 0.0, SMatrix::<f64, 5, 1>::zeros());
+fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
+    let rates = Rates::new(&solution.motion, &solution.tangent, solution.covariance.as_ref());
+    let likeliest = likeliest(out, inliers, solution);
+    let u_z = solution.motion.u().z;
+    let (mut weights, mut sum, mut common) = (0.0, 0.0, SMatrix::<f64, 5, 1>::zeros());
     for (k, &source) in all.source.iter().enumerate() {
         let source = source as usize;
-        let smooth = out.inverse_depth_smooth[source];
-        let nu = if smooth.is_finite() { smooth } else { seen.nu[k] };
-        let rate = nu * u.z;
-        out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
-        let inverse = if seen.s2[k] > 0.0 { 1.0 / seen.s2[k] } else { f64::INFINITY };
-        let slopes = rate_slopes(&all.row(k), nu, inverse, &u, tangent);
-        let variance = u.z * u.z * inverse + (slopes.transpose() * covariance * slopes)[0];
-        out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
+        let (nu, variance) = likeliest[source];
+        let row = all.row(k);
+        (out.time_to_contact[source], out.time_to_contact_std[source]) = rates.contact(&row, nu, variance);
         if out.inliers[source] && seen.s2[k] > 0.0 {
             weights += seen.s2[k];
-            rates += seen.s2[k] * seen.nu[k] * u.z;
-            common += seen.s2[k] * slopes;
+            sum += seen.s2[k] * seen.nu[k] * u_z;
+            common += seen.s2[k] * rates.slopes(&row, nu);
         }
     }
-    let common = common / weights;
-    let variance = u.z * u.z / weights + (common.transpose() * covariance * common)[0];
-    out.approach = (rates / weights, variance.sqrt());
+    out.approach = (sum / weights, (u_z * u_z / weights + rates.variance(&(common / weights))).sqrt());
 }
 
 /// What is told about a camera that only turns, or stands still.

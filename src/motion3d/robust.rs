@@ -74,10 +74,18 @@ pub(super) struct Consensus {
     pub motion: Motion,
     /// Indices among the observations, ascending.
     pub inliers: Vec<u32>,
+    /// Those of them that the motion is to be estimated from: a thing that moves by itself has points that obey by chance, and these pull the same way.
+    pub inner: Vec<u32>,
     /// Other motions that about as many points obey, and how much more each costs, in squared units of noise; the best first.
     pub rivals: Vec<Rival>,
     /// Whether the points are too few to tell outliers from large noise.
     pub doubtful: bool,
+}
+
+impl Consensus {
+    fn new(motion: Motion, inliers: Vec<u32>) -> Self {
+        Self { motion, inliers, inner: Vec::new(), rivals: Vec::new(), doubtful: false }
+    }
 }
 
 /// Another motion of many points.
@@ -171,18 +179,22 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         }
         let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
         let obeying = obeying(observations, &motion);
-        found = Consensus { motion, inliers: obeying, rivals: Vec::new(), doubtful: false };
+        found = Consensus::new(motion, obeying);
     }
     let inliers = gate.passed(&found);
     if inliers.len() >= LEAST {
         found.inliers = inliers;
     }
     found.rivals = rivals;
-    if found.inliers.len() >= LEAST {
-        let before = coherence::rival(observations, &found);
-        found.rivals.extend(before);
+    if found.inliers.len() < LEAST {
+        return None;
     }
-    (found.inliers.len() >= LEAST).then_some(found)
+    found.inner.clone_from(&found.inliers);
+    if let Some(inner) = coherence::inner(observations, &found) {
+        found.inner = inner.inliers;
+        found.rivals.extend(inner.rival);
+    }
+    Some(found)
 }
 
 /// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey only because others do.
@@ -252,5 +264,5 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
             break;
         }
     }
-    (inliers.len() >= LEAST).then_some(Consensus { motion, inliers, rivals: Vec::new(), doubtful: false })
+    (inliers.len() >= LEAST).then_some(Consensus::new(motion, inliers))
 }

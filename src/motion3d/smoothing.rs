@@ -45,11 +45,12 @@ struct Fitted {
     loss: f64,
 }
 
-/// Depths for the weights, and how much of each point's own is in them; as long as the planes.
+/// Depths for the weights, how much of each point's own is in them, and their posterior variances; as long as the planes.
 #[derive(Debug, Clone)]
 pub(super) struct Smoothed {
     pub nu: Vec<f64>,
     pub share: Vec<f64>,
+    pub variance: Vec<f64>,
 }
 
 /// Smooths depths of one set of points; the neighbourhoods are found once.
@@ -168,12 +169,15 @@ impl DepthSmoother {
                 regress(&sites, &everyone, lists, k, self.spherical, self.level)
             }
         };
-        let mut out = Smoothed { nu: vec![0.0; depths.nu.len()], share: vec![0.0; depths.nu.len()] };
+        let none = vec![0.0; depths.nu.len()];
+        let mut out = Smoothed { nu: none.clone(), share: none.clone(), variance: none };
         for (place, (site, &i)) in sites.iter().zip(self.tree.order()).enumerate() {
             // (t2 + c) / (t2 + c + 1 / s2), which is 0 at the epipole.
-            let (q, wide) = (all.q[place], (excess + all.c[place]) * site.s2);
+            let (q, spread) = (all.q[place], excess + all.c[place]);
+            let wide = spread * site.s2;
             let share = wide / (wide + 1.0);
             out.share[i as usize] = share;
+            out.variance[i as usize] = spread / (wide + 1.0);
             out.nu[i as usize] = q + share * (site.nu - q);
         }
         out

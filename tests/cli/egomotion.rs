@@ -60,6 +60,39 @@ fn an_approach_gives_direction_focus_and_time_to_contact() {
     place.good(&format!("{line} --force"));
 }
 
+/// Every pixel of a plane that faces the camera is reached at the same time.
+#[test]
+fn times_to_contact_are_written_for_every_pixel() {
+    let place = Place::new();
+    approach(&place, "frames", 3);
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --maps maps -o motion.csv --quiet";
+    place.good(line);
+    let files = names(&place.path("maps"));
+    assert_eq!(files, ["contact_000000.npz", "contact_000001.npz"]);
+    let mut archive = jacoflow::io::npz::NpzReader::open(place.path("maps").join(&files[0])).unwrap();
+    let mut plane = |name: &str| archive.array::<f64>(name).unwrap();
+    let (contact, deviation, residual) = (plane("time_to_contact"), plane("time_to_contact_std"), plane("residual"));
+    for array in [&contact, &deviation, &residual] {
+        assert_eq!(array.shape, [96, 128]);
+    }
+    let truth = 1.0 / GROWTH.ln();
+    let (mut near, mut held, mut all) = (0, 0, 0);
+    for (k, (value, spread)) in
+        contact.values.iter().zip(&deviation.values).enumerate().filter(|(_, (v, _))| v.is_finite())
+    {
+        // At the focus of expansion a single pixel tells nothing.
+        let (x, y) = ((k % 128) as f64 - 64.0, (k / 128) as f64 - 48.0);
+        if x.hypot(y) > 20.0 {
+            all += 1;
+            near += u32::from((value / truth - 1.0).abs() < 0.2);
+            held += u32::from((1.0 / value - 1.0 / truth).abs() < 3.0 * spread / (value * value));
+        }
+    }
+    assert!(all > 4000 && near * 10 > all * 9 && held * 10 > all * 9, "{near} {held} of {all}");
+    let again = place.line(line.replace("-o motion.csv", "-o other.csv").as_str());
+    assert!(again.code == 2 && again.err.contains("maps") && again.err.contains("--force"), "{}", again.err);
+}
+
 #[test]
 fn rows_go_to_standard_output_and_do_not_depend_on_threads() {
     let place = Place::new();

@@ -66,18 +66,33 @@ impl Around {
     }
 }
 
-/// The motion of the inliers with hardly a rejected neighbour, where it is another than that of all: then points on the border of a thing belong to that.
-pub(super) fn rival(observations: &Observations, found: &Consensus) -> Option<Rival> {
+/// The inliers among which hardly a point is of a thing that moves by itself.
+pub(super) struct Inner {
+    /// Those with hardly a rejected neighbour; all of them, where few would be left.
+    pub inliers: Vec<u32>,
+    /// The motion of all inliers (where few would be left: of those few), if it is another one: then points on the border of a thing belong to that.
+    pub rival: Option<Rival>,
+}
+
+/// The share of the inliers that must be left.
+const LEFT: f64 = 0.5;
+
+/// Looks at the neighbours of the inliers; `None` where that leaves all of them.
+pub(super) fn inner(observations: &Observations, found: &Consensus) -> Option<Inner> {
     if observations.n < ENOUGH {
         return None;
     }
     let around = Around::new(observations);
-    let (inner, fewer) = without(observations, found, &around);
-    (fewer.len() < found.inliers.len() && differ(observations, found, &inner, &fewer)?).then_some(Rival {
-        motion: inner,
-        excess: 0.0,
-        others: true,
-    })
+    let (motion, fewer) = without(observations, found, &around);
+    if fewer.len() == found.inliers.len() {
+        return None;
+    }
+    let differ = differ(observations, found, &motion, &fewer).unwrap_or(false);
+    let enough = fewer.len() as f64 >= LEFT * found.inliers.len() as f64;
+    let other = if enough { found.motion } else { motion };
+    let rival = differ.then_some(Rival { motion: other, excess: 0.0, others: true });
+    let inliers = if enough { fewer } else { found.inliers.clone() };
+    Some(Inner { inliers, rival })
 }
 
 /// The motion and the inliers without those that have a larger share of rejected neighbours than is usual.

@@ -169,6 +169,41 @@ fn maximum_likelihood_tells_of_other_minima_too() {
     assert!(undecided >= 15 && sure <= 2, "{sure} of {undecided}");
 }
 
+/// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the epipole may lie among noisy points it is told how far it is from the better solution.
+#[test]
+fn maximum_likelihood_tells_how_far_it_may_be() {
+    let ground = |_: f64, y: f64, _: f64| 0.3 + 1.2 * y.max(0.0);
+    let options = MotionOptions { method: Method::MaximumLikelihood, ..options() };
+    type Depth<'a> = &'a dyn Fn(f64, f64, f64) -> f64;
+    let cases: [(Motion, usize, f64, Depth<'_>); 4] = [
+        (Motion::new([0.35, 0.25, 1.0], W), 1000, 0.15, &ground),
+        (Motion::new([0.05, -0.03, 1.0], W), 500, 0.1, &ground),
+        (Motion::new([0.05, -0.03, 1.0], W), 300, 0.05, &|x, y, _| smooth(x, y)),
+        (Motion::new([0.6, 0.2, 0.75], W), 500, 0.1, &|_, _, r| 0.5 + r),
+    ];
+    for (case, (motion, n, sigma, depth)) in cases.into_iter().enumerate() {
+        let (mut inside, mut by_theory, mut sure) = (0u32, 0u32, 0u32);
+        for seed in 0..100 {
+            let scene = Scene::new(motion, n, 0.6, sigma, seed, depth);
+            let found = estimate_motion(&scene.flow(), &Noise::Sigma(sigma), &options).unwrap();
+            if matches!(found.status, Status::Ok | Status::LowSnr) {
+                let theory = MotionEstimate {
+                    covariance: found.likelihood.covariance,
+                    tangent: found.likelihood.tangent,
+                    ..found.clone()
+                };
+                sure += 1;
+                inside += u32::from(mahalanobis(&found, &motion) < 11.07);
+                by_theory += u32::from(mahalanobis(&theory, &motion) < 11.07);
+            }
+        }
+        let (share, alone) = (f64::from(inside) / f64::from(sure), f64::from(by_theory) / f64::from(sure));
+        assert!(sure >= 50 && share >= 0.88, "{case}: {share} of {sure}");
+        // The last case is what theory is made for.
+        assert!(if case < 3 { alone < 0.8 } else { alone >= 0.88 }, "{case}: {alone}");
+    }
+}
+
 /// The residuals that tell of other directions are maximum likelihood's, on a sample of the points.
 #[test]
 fn many_points_are_no_reason_for_doubt() {
@@ -221,6 +256,34 @@ fn a_slow_mover_is_found_or_told() {
         trusted += u32::from(run(&scene(false)).status == Status::Ok);
     }
     assert!(silent <= 2 && trusted >= 11, "{silent} {trusted}");
+}
+
+/// A fifth of the points moves by itself: some of them obey the camera's motion by chance, and pull it their way. They lie among rejected ones.
+#[test]
+fn points_among_rejected_ones_do_not_pull_the_motion() {
+    let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
+    let options = MotionOptions { robust: true, ..options() };
+    let (mut inside, mut sure, mut wrong) = (0, 0, 0);
+    for (seed, scale) in (0..160).map(|seed| (seed, if seed % 2 == 0 { 0.0148 } else { 0.02 })) {
+        let depth = |x: f64, y: f64, _: f64| scale * smooth(x, y);
+        let mut scene = Scene::new(camera, 1000, 0.6, 0.0006, seed, depth);
+        let other = Motion::new(aside, [0.0, 0.01, 0.02]);
+        let moving = Scene::new(other, 1000, 0.6, 0.0006, seed, |x, y, r| 1.5 * depth(x, y, r));
+        let moves = |&k: &usize| (scene.points[k][0] + 0.24).abs().max((scene.points[k][1] - 0.04).abs()) < 0.27;
+        let movers: Vec<usize> = (0..1000).filter(moves).collect();
+        for &k in &movers {
+            scene.flow[k] = moving.flow[k];
+        }
+        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.0006), &options).unwrap();
+        if found.status == Status::Ok {
+            sure += 1;
+            inside += u32::from(mahalanobis(&found, &camera) < 11.07);
+            wrong += (0..1000).filter(|k| found.inliers[*k] == movers.contains(k)).count();
+            assert!((0..1000).all(|k| !found.inliers[k] || found.inverse_depth_smooth[k].is_finite()));
+        }
+    }
+    let wrong = wrong as f64 / (1000.0 * f64::from(sure));
+    assert!(sure >= 100 && inside * 100 >= sure * 88 && wrong < 0.02, "{inside} of {sure}, {wrong}");
 }
 
 /// Among few points, outliers that obey by chance can be those that decide: a known noise does not tell them.

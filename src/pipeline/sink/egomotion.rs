@@ -4,11 +4,12 @@ use super::table::{Table, TableTarget};
 use super::{Ending, Sink, Step};
 use crate::error::Result;
 use crate::image::picture::{ContactMark, draw_contacts, grey_picture};
+use crate::io::npz::NpzWriter;
 use crate::io::{NumberedFiles, cell, write_picture};
 use crate::math::Real;
 use crate::motion3d::{
     FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, RotationPrior, Status,
-    estimate_motion, field_points, focus_of_expansion,
+    contact_map, estimate_motion, field_points, focus_of_expansion,
 };
 use crate::types::{AnyFrame, FlowField};
 use std::path::PathBuf;
@@ -57,6 +58,8 @@ pub struct EgomotionPlan {
     pub target: TableTarget,
     /// A folder for pictures, `egomotion_000000.png`, ...
     pub pictures: Option<PathBuf>,
+    /// A folder for times to contact all over the field, `contact_000000.npz`, ...
+    pub maps: Option<PathBuf>,
 }
 
 /// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame) and time
@@ -139,6 +142,24 @@ impl Egomotion {
         self.latest = Some(path);
         Ok(())
     }
+
+    /// Times to contact of all sites with their deviations and residuals.
+    fn map<T: Real>(&mut self, field: &FlowField<T>, found: &MotionEstimate) -> Result<()> {
+        let Some(folder) = &self.plan.maps else { return Ok(()) };
+        let MotionEstimate { motion, tangent, covariance, .. } = found;
+        let map = contact_map(field, &self.plan.camera, motion, tangent, covariance, self.plan.motion.placement)?;
+        let path = NumberedFiles::create(folder, "contact", "npz")?.path(field.layout.frame_index);
+        let mut archive = NpzWriter::create(&path)?;
+        let planes =
+            [("time_to_contact", map.contact), ("time_to_contact_std", map.deviation), ("residual", map.residual)];
+        for (name, values) in planes {
+            archive.array(name, &[map.height, map.width], &values)?;
+        }
+        archive.finish()?;
+        self.written += 1;
+        self.latest = Some(path);
+        Ok(())
+    }
 }
 
 /// `-1 / rate` with its deviation; infinite without an approach.
@@ -154,7 +175,11 @@ impl<T: Real> Sink<T> for Egomotion {
         let found = self.motion(&points, known)?;
         let status = scene.map(|(scene, _)| scene.status);
         self.row(step.field.layout.frame_index, step.time, &points, &found, status)?;
-        if found.status == Status::TooFewPoints { Ok(()) } else { self.draw(step, &points, &found) }
+        if found.status == Status::TooFewPoints {
+            return Ok(());
+        }
+        self.map(step.field, &found)?;
+        self.draw(step, &points, &found)
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {

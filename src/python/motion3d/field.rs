@@ -1,6 +1,9 @@
-//! Points of a flow field for 3-D motion.
+//! Points of a flow field for 3-D motion, and times to contact all over it.
 
-use crate::motion3d::{FieldOptions, field_points};
+use super::flow::{motion, spread};
+use super::given::{square, word};
+use super::options::PLACEMENTS;
+use crate::motion3d::{FieldOptions, Intrinsics, contact_map, field_points};
 use crate::python::arrays;
 use crate::python::field::{FlowField, Store, each};
 use crate::python::options::{self, Region};
@@ -19,9 +22,7 @@ pub fn motion3d_field_points<'py>(
     most: Option<usize>,
     region: Option<Region>,
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64, f64)> {
-    if field.count().1 {
-        return Err(PyValueError::new_err("field: expected a single field, got a stack; take field[t]"));
-    }
+    single(field)?;
     let chosen = FieldOptions { spacing, most, region: options::region(region)? };
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
@@ -35,5 +36,39 @@ pub fn motion3d_field_points<'py>(
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
         found.spacing,
         found.shared,
+    ))
+}
+
+fn single(field: &FlowField) -> PyResult<()> {
+    let message = "field: expected a single field, got a stack; take field[t]";
+    if field.count().1 { Err(PyValueError::new_err(message)) } else { Ok(()) }
+}
+
+/// A motion as its result tells it: translation, rotation, tangent, covariance.
+type Told<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>);
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_contact_map")]
+pub fn motion3d_contact_map<'py>(
+    py: Python<'py>,
+    field: &FlowField,
+    intrinsics: &Array<'py>,
+    told: Told<'py>,
+    placement: &str,
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>)> {
+    single(field)?;
+    let camera = Intrinsics::new(square("K", "", intrinsics)?)?;
+    let motion = motion(&told.0, &told.1)?;
+    let (tangent, covariance) = spread(&told.2, &told.3)?;
+    let placement = word("placement", placement, &PLACEMENTS)?;
+    let found = each!(field.store(), packed => {
+        let field = field.core(packed, 0);
+        py.detach(|| contact_map(&field, &camera, &motion, &tangent, &covariance, placement))
+    })?;
+    let shape = [found.height, found.width];
+    Ok((
+        arrays::owned(py, &shape, found.contact)?.into_any(),
+        arrays::owned(py, &shape, found.deviation)?.into_any(),
+        arrays::owned(py, &shape, found.residual)?.into_any(),
     ))
 }

@@ -10,7 +10,17 @@ use pyo3::prelude::*;
 /// An array, in or out.
 type Any<'py> = Bound<'py, PyAny>;
 
-fn motion(translation: &Any<'_>, rotation: &Any<'_>) -> PyResult<Motion> {
+/// The axes of a direction and the covariance that is told in them.
+pub fn spread(tangent: &Any<'_>, covariance: &Any<'_>) -> PyResult<([[f64; 3]; 2], [[f64; 5]; 5])> {
+    let (_, axes) = arrays::doubles("tangent", tangent)?;
+    let (_, values) = arrays::doubles("covariance", covariance)?;
+    match (<[[f64; 3]; 2]>::try_from(axes.as_chunks().0), <[[f64; 5]; 5]>::try_from(values.as_chunks().0)) {
+        (Ok(axes), Ok(values)) => Ok((axes, values)),
+        _ => Err(Error::argument("covariance", "shapes (2, 3) and (5, 5)", "others").into()),
+    }
+}
+
+pub fn motion(translation: &Any<'_>, rotation: &Any<'_>) -> PyResult<Motion> {
     Ok(Motion { translation: triple("translation", translation)?, rotation: triple("rotation", rotation)? })
 }
 
@@ -25,13 +35,7 @@ pub fn motion3d_focus<'py>(
 ) -> PyResult<Option<(Any<'py>, Any<'py>)>> {
     let camera = camera(intrinsics)?;
     let motion = Motion { translation: triple("translation", translation)?, rotation: [0.0; 3] };
-    let (_, axes) = arrays::doubles("tangent", tangent)?;
-    let (_, values) = arrays::doubles("covariance", covariance)?;
-    let (Ok(axes), Ok(values)) =
-        (<[[f64; 3]; 2]>::try_from(axes.as_chunks().0), <[[f64; 5]; 5]>::try_from(values.as_chunks().0))
-    else {
-        return Err(Error::argument("covariance", "shapes (2, 3) and (5, 5)", "others").into());
-    };
+    let (axes, values) = spread(tangent, covariance)?;
     let Some((focus, spread)) = focus_of_expansion(&motion, &axes, &values, camera.as_ref()) else { return Ok(None) };
     let focus = arrays::owned(py, &[2], focus.to_vec())?;
     Ok(Some((focus.into_any(), matrix(py, &spread)?.into_any())))

@@ -6,7 +6,7 @@ mod given;
 mod options;
 mod told;
 
-pub use field::motion3d_field_points;
+pub use field::{motion3d_contact_map, motion3d_field_points};
 pub use flow::{motion3d_focus, motion3d_predict, motion3d_two_views};
 
 use crate::motion3d::{Motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};

@@ -8,6 +8,9 @@ use crate::python::arrays;
 use crate::python::options::Integer;
 use pyo3::prelude::*;
 
+/// Where a displacement is taken to be the instantaneous flow, by name.
+pub const PLACEMENTS: [(&str, Placement); 2] = [("midpoint", Placement::Midpoint), ("start", Placement::Start)];
+
 /// How the motion is looked for.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -28,14 +31,13 @@ impl Options<'_> {
     /// As the core takes them.
     pub fn core(&self) -> PyResult<MotionOptions> {
         let methods = [("auto", Method::Auto), ("ml", Method::MaximumLikelihood), ("efficient", Method::Efficient)];
-        let placements = [("midpoint", Placement::Midpoint), ("start", Placement::Start)];
         let smoothers = [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
         let weights = self.weight_inv_depth.as_ref().map(|given| arrays::doubles("weight_inv_depth", given));
         let wrong_seed = |_| Error::argument("seed", "an integer of at least 0", self.seed.0);
         Ok(MotionOptions {
             method: word("method", &self.method, &methods)?,
             robust: self.robust,
-            placement: word("placement", &self.placement, &placements)?,
+            placement: word("placement", &self.placement, &PLACEMENTS)?,
             smoother: word("smoother", &self.smoother, &smoothers)?,
             weight_depths: weights.transpose()?.map(|(_, values)| values),
             initial: self.initial()?,

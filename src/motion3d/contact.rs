@@ -1,0 +1,244 @@
+//! Time to contact: how fast points come nearer, with what is known of that.
+
+use super::camera::Intrinsics;
+use super::covariance::Matrix5;
+use super::field::measured;
+use super::intake::plane_row;
+use super::motion::Motion;
+use super::observations::Row;
+use super::options::Placement;
+use crate::error::Result;
+use crate::math::Real;
+use crate::types::{FlowField, Status};
+use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+use rayon::prelude::*;
+
+/// Rates of approach `nu u_z` under a motion.
+pub(super) struct Rates {
+    u: Vector3<f64>,
+    w: Vector3<f64>,
+    tangent: Matrix2x3<f64>,
+    covariance: Matrix5,
+}
+
+impl Rates {
+    /// Without a covariance, deviations are NaN.
+    pub fn new(motion: &Motion, tangent: &Matrix2x3<f64>, covariance: Option<&Matrix5>) -> Self {
+        let covariance = covariance.copied().unwrap_or_else(|| Matrix5::from_element(f64::NAN));
+        Self { u: motion.u(), w: motion.w(), tangent: *tangent, covariance }
+    }
+
+    /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
+    pub fn slopes(&self, row: &Row, nu: f64) -> SMatrix<f64, 5, 1> {
+        let (u, t) = (&self.u, row.g * self.u);
+        let s2 = t.norm_squared();
+        let inverse = if s2 > 0.0 { s2.recip() } else { 0.0 };
+        let turn: Vector2<f64> = self.tangent * row.g.transpose() * t * (-nu * inverse);
+        let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
+        SMatrix::<f64, 5, 1>::from_column_slice(&[
+            u.z * turn.x + nu * self.tangent[(0, 2)],
+            u.z * turn.y + nu * self.tangent[(1, 2)],
+            u.z * spin.x,
+            u.z * spin.y,
+            u.z * spin.z,
+        ])
+    }
+
+    /// What the motion's covariance makes of slopes.
+    pub fn variance(&self, slopes: &SMatrix<f64, 5, 1>) -> f64 {
+        (slopes.transpose() * self.covariance * slopes)[0]
+    }
+
+    /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from the motion's covariance; infinite where nothing comes nearer.
+    pub fn contact(&self, row: &Row, nu: f64, variance: f64) -> (f64, f64) {
+        let rate = nu * self.u.z;
+        if rate == 0.0 {
+            return (f64::INFINITY, f64::INFINITY);
+        }
+        let variance = self.u.z * self.u.z * variance + self.variance(&self.slopes(row, nu));
+        (-1.0 / rate, variance.sqrt() / (rate * rate))
+    }
+
+    /// The same from a point's own flow, and its residual across the epipolar line in units of noise.
+    fn own(&self, row: &Row) -> [f64; 3] {
+        let (t, d) = (row.g * self.u, row.f - row.r * self.w);
+        let s2 = t.norm_squared();
+        let (contact, deviation) = self.contact(row, t.dot(&d) / s2, 1.0 / s2);
+        [contact, deviation, (t.y * d.x - t.x * d.y) / s2.sqrt()]
+    }
+}
+
+/// Times to contact of all sites of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactMap {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `-1 / (nu u_z)`, frames, row by row: positive where something comes nearer, infinite where nothing does, NaN where the field is not valid.
+    pub contact: Vec<f64>,
+    /// Their standard deviations, frames, by first order from those of the site's own flow and of the motion.
+    pub deviation: Vec<f64>,
+    /// Residuals across the epipolar lines in units of noise: far from 0 on what moves by itself, whose time to contact is not that of the scene.
+    pub residual: Vec<f64>,
+}
+
+/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way between the frames with [`Placement::Midpoint`]. Motion, tangent axes and covariance are those of a
+/// [`MotionEstimate`](super::MotionEstimate).
+///
+/// Where the motion has no translation all times are infinite.
+///
+/// # Errors
+/// [`Error::Argument`](crate::Error::Argument) for a field without covariance or with a pixel pitch.
+pub fn contact_map<T: Real>(
+    field: &FlowField<T>,
+    camera: &Intrinsics,
+    motion: &Motion,
+    tangent: &[[f64; 3]; 2],
+    covariance: &[[f64; 5]; 5],
+    placement: Placement,
+) -> Result<ContactMap> {
+    measured(field)?;
+    let covariance = Matrix5::from_fn(|i, j| covariance[i][j]);
+    let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance));
+    let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
+    let at = |site: usize| -> [f64; 3] {
+        let Some(row) = site_row(field, camera, placement, site) else { return [f64::NAN; 3] };
+        if turning {
+            return [f64::INFINITY, f64::INFINITY, (row.f - row.r * motion.w()).norm()];
+        }
+        rates.own(&row)
+    };
+    let values: Vec<[f64; 3]> = (0..field.width * field.height).into_par_iter().map(at).collect();
+    let plane = |k: usize| values.iter().map(|value| value[k]).collect();
+    Ok(ContactMap {
+        width: field.width,
+        height: field.height,
+        contact: plane(0),
+        deviation: plane(1),
+        residual: plane(2),
+    })
+}
+
+/// A site's whitened flow; `None` where it is not valid.
+fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, placement: Placement, site: usize) -> Option<Row> {
+    if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
+        return None;
+    }
+    let [[uu, uv, ..], [_, vv, ..], ..] = field.covariance_at(site)?;
+    let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+    let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
+    plane_row([x as f64, y as f64], [u, v], &[uu, uv, uv, vv], Some(camera), placement).map(|(row, _)| row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::scenes::Scene;
+    use super::super::{MotionOptions, Noise, estimate_motion};
+    use super::*;
+    use crate::types::{FieldLayout, MOTION_NAMES, Sites};
+
+    /// The same depth everywhere, seen by a camera of 100 px, with deviations of 0.05 px.
+    fn wall(motion: &Motion, nu: f64, camera: &Intrinsics) -> FlowField<f64> {
+        let layout = FieldLayout {
+            frame_size: (64, 48),
+            sites: Sites::default(),
+            model: "affine".into(),
+            parameters: MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 0,
+            correlation_length: 2.0,
+        };
+        let mut field = FlowField::<f64>::empty(layout, true).unwrap();
+        field.status.fill(Status::Ok);
+        field.covariance.as_mut().unwrap().fill(0.0);
+        let n = field.width * field.height;
+        for site in 0..n {
+            let at = [(site % field.width) as f64, (site / field.width) as f64];
+            let [u, v] = motion.picture_flow(at, nu, Some(camera));
+            (field.motion[site], field.motion[n + site]) = (u, v);
+            let covariance = field.covariance.as_mut().unwrap();
+            // Planes 0 and 6 are the variances of u and v.
+            (covariance[site], covariance[6 * n + site]) = (0.0025, 0.0025);
+        }
+        field
+    }
+
+    const TANGENT: [[f64; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn a_wall_is_reached_everywhere_at_once() {
+        let camera = Intrinsics::pinhole((100.0, 100.0), (32.0, 24.0)).unwrap();
+        let motion = Motion::new([0.0, 0.0, -1.0], [0.001, -0.002, 0.003]);
+        let mut field = wall(&motion, 0.02, &camera);
+        field.status[5] = Status::Inconsistent;
+        // Something that goes its own way.
+        field.motion[100] += 5.0;
+        let mut covariance = [[0.0; 5]; 5];
+        let map = |covariance: &[[f64; 5]; 5]| {
+            contact_map(&field, &camera, &motion, &TANGENT, covariance, Placement::Start).unwrap()
+        };
+        let exact = map(&covariance);
+        assert_eq!((exact.width, exact.height, exact.contact.len()), (64, 48, 64 * 48));
+        assert!(exact.contact[5].is_nan() && exact.residual[100].abs() > 3.0);
+        let corner = 0;
+        assert!((exact.contact[corner] - 50.0).abs() < 1e-6 && exact.residual[corner].abs() < 1e-9);
+        // nu = 1/50 with the deviation 0.0005 / s at s = 0.4.
+        assert!((exact.deviation[corner] - 50.0 * 50.0 * 5e-4 / 0.4).abs() < 1e-3, "{}", exact.deviation[corner]);
+        covariance[3][3] = 1e-6;
+        let unsure = map(&covariance);
+        assert!(unsure.deviation[corner] > 1.1 * exact.deviation[corner]);
+        let still = Motion { translation: [f64::NAN; 3], ..motion };
+        let never = contact_map(&field, &camera, &still, &TANGENT, &covariance, Placement::Start).unwrap();
+        assert!(never.contact[corner].is_infinite() && never.contact[5].is_nan());
+    }
+
+    /// The slopes of the rate are those of the depth that a point's own flow has.
+    #[test]
+    fn slopes_are_those_of_the_rate() {
+        let scene = Scene::oblique(20, 0.1, 5);
+        let observations = scene.observations();
+        let tangent = super::super::motion::tangents(&scene.motion.u());
+        let rates = Rates::new(&scene.motion, &tangent, None);
+        let row = observations.row(3);
+        let rate = |step: &SMatrix<f64, 5, 1>| {
+            let motion = scene.motion.stepped(&tangent, step);
+            let t = row.g * motion.u();
+            t.dot(&(row.f - row.r * motion.w())) / t.norm_squared() * motion.u().z
+        };
+        let t = row.g * scene.motion.u();
+        let nu = t.dot(&(row.f - row.r * scene.motion.w())) / t.norm_squared();
+        let slopes = rates.slopes(&row, nu);
+        // Along the epipolar line alone: the part across moves the depth in second order only at the truth.
+        for axis in 2..5 {
+            let mut step = SMatrix::<f64, 5, 1>::zeros();
+            step[axis] = 1e-6;
+            let numeric = (rate(&step) - rate(&-step)) / 2e-6;
+            assert!((numeric - slopes[axis]).abs() < 1e-5 * slopes.norm(), "{axis}: {numeric} {}", slopes[axis]);
+        }
+    }
+
+    /// Where depths are smoothed their deviations are smaller than those of single points, and hold.
+    #[test]
+    fn deviations_are_those_of_the_smoothed_depths() {
+        let motion = Motion::new([0.35, 0.25, 1.0], [0.02, -0.03, 0.01]);
+        let smooth = |x: f64, y: f64| 1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y;
+        let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
+        let (mut held, mut all, mut narrower) = (0, 0, 0);
+        for seed in 0..20 {
+            let scene = Scene::new(motion, 500, 0.6, 0.05, seed, |x, y, _| smooth(x, y));
+            let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.05), &options).unwrap();
+            for k in 0..500 {
+                // Rates are normal where times are not.
+                let (contact, deviation) = (found.time_to_contact[k], found.time_to_contact_std[k]);
+                let (rate, spread) = (-1.0 / contact, deviation / (contact * contact));
+                held += u32::from((rate - scene.inverse_depth[k] * motion.u().z).abs() < 1.96 * spread);
+                narrower += u32::from(spread < 0.7 * found.inverse_depth_std[k] * motion.u().z.abs());
+                all += 1;
+            }
+        }
+        let share = f64::from(held) / f64::from(all);
+        assert!((0.88..0.99).contains(&share) && 2 * narrower > all, "{share} {narrower} of {all}");
+    }
+}
