@@ -1,6 +1,6 @@
 """Every published table of 3-D motion beside our figures and OpenCV's on the same flow, and recordings from files to numbers.
 
-    python benchmarks/motion3d.py [--only fixed theory weights one practical pixels six speed recordings] [--trials 1.0] [--data FOLDER]
+    python benchmarks/motion3d.py [--only fixed theory weights one practical pixels six claims speed recordings] [--trials 1.0] [--data FOLDER]
 
 `--trials` multiplies the number of trials of each table. Figures that are asked of us are typed from the specification; all others are computed here.
 """
@@ -10,17 +10,25 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import motion3d_claims as further
 import motion3d_fixed as fixed
 import motion3d_recordings as recordings
 import motion3d_rivals as rivals
 import motion3d_scenes as scenes
 import motion3d_scores as scores
+import motion3d_six as six
 import timing
 from jacoflow import motion3d
 
 Row = dict[str, object]
 SPEED_ASKED = {1000: (5, 5, 15), 100_000: (80, 300, 200)}
 """Points; milliseconds on two threads asked for ML, what the weights add, robust ML."""
+
+
+TABLES = scores.TABLES | {"six": ("Six numbers a patch against flow", six.six_numbers, 240)}
+"""Tables of random scenes by name: title, what makes it, trials."""
+NAMES = ["fixed", *TABLES, "claims", "speed", "recordings"]
+"""Sections of the tables."""
 
 
 def speed(rounds: int) -> list[Row]:
@@ -56,9 +64,12 @@ def sections(only: list[str] | None = None, factor: float = 1.0, data: Path | No
     wanted = lambda name: only is None or name in only
     if wanted("fixed"):
         out["3-D motion: values without chance"] = fixed.fixed_values()
-    for name, (title, table, trials) in scores.TABLES.items():
+    for name, (title, table, trials) in TABLES.items():
         if wanted(name):
             out[f"3-D motion: {title}"] = table(max(4, round(factor * trials)))
+    if wanted("claims"):
+        out["3-D motion: displacements over a whole frame, without noise"] = further.displacements(max(4, round(factor * further.LAYOUTS)))
+        out["3-D motion: single figures"] = further.claims(max(4, round(factor * further.TRIALS)))
     if wanted("speed"):
         out["3-D motion: speed"] = speed(rounds)
     if data is not None and wanted("recordings"):
@@ -75,12 +86,12 @@ def main() -> None:
     from compare import table_lines
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=["fixed", *scores.TABLES, "speed", "recordings"])
+    parser.add_argument("--only", nargs="+", choices=NAMES)
     parser.add_argument("--trials", type=float, default=1.0)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--rounds", type=int, default=12)
     arguments = parser.parse_args()
-    for name in arguments.only or ["fixed", *scores.TABLES, "speed", "recordings"]:
+    for name in arguments.only or NAMES:
         for title, rows in sections([name], arguments.trials, arguments.data, arguments.rounds).items():
             print(f"\n## {title}\n")
             print("\n".join(table_lines(rows)), flush=True)

@@ -48,38 +48,39 @@ def _rotation(points: Array, flow: Array, u: Array) -> Array:
     return np.linalg.lstsq(np.einsum("ni,nij->nj", p, r), (p * flow).sum(1), rcond=None)[0]
 
 
-def linear(points: Array, flow: Array) -> Array:
-    """Direction by the differential epipolar constraint, linear in nine numbers: the eight-point method of flow.
-
-    `eta . (u x xi') + eta^t S eta = 0` with xi' = (flow, 0), S symmetric: least squares on the unit sphere of (u, S).
-    """
+def _constraint(points: Array, flow: Array) -> tuple[Array, Array]:
+    """Rows of the differential epipolar constraint `u . (xi' x eta) + eta^t S eta = 0` with xi' = (flow, 0): those of u (N, 3) and those of the symmetric S (N, 6)."""
     eta = np.column_stack([points, np.ones(len(points))])
     speed = np.column_stack([flow, np.zeros(len(points))])
     x, y, z = eta.T
-    rows = np.column_stack([np.cross(speed, eta), x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
-    u = np.linalg.svd(rows, full_matrices=False)[2][-1, :3]
-    u = u / max(np.linalg.norm(u), 1e-300)
+    return np.cross(speed, eta), np.column_stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
+
+
+def _without(rows: Array, others: Array) -> Array:
+    """What is left of the columns of `rows` across those of `others`."""
+    basis = np.linalg.qr(others)[0]
+    return rows - basis @ (basis.T @ rows)
+
+
+def linear(points: Array, flow: Array) -> Array:
+    """Direction by linear subspaces (A. Jepson, D. Heeger 1991): combinations of the constraints in which no quadratic part is left are linear in u alone."""
+    rows, quadratic = _constraint(points, flow)
+    u = np.linalg.svd(_without(rows, quadratic), full_matrices=False)[2][-1]
     return _best(_before(points, flow, _rotation(points, flow, u)), u)
 
 
-def unbiased(points: Array, flow: Array, sigma: float, rounds: int = 10) -> Array:
-    """The same with weights `1 / |G u|^2` and the noise's share taken out of the matrix: a ratio of sums, iterated."""
-    eta = np.column_stack([points, np.ones(len(points))])
-    speed = np.column_stack([flow, np.zeros(len(points))])
-    x, y, z = eta.T
-    rows = np.column_stack([np.cross(speed, eta), x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z])
+def unbiased(points: Array, flow: Array, rounds: int = 10) -> Array:
+    """The same with weights `1 / |G u|^2` and a ratio of sums, in which the noise takes no side: the least generalised eigenvalue, iterated. With noisy flow the iteration does not settle: its errors depend on the number of rounds."""
+    rows, quadratic = _constraint(points, flow)
     g, _ = scenes.rows(points)
-    # cross(noise, eta) = (n_y, -n_x, n_x y - n_y x): its products have the expectation sigma^2 G^t G.
+    # cross(noise, eta) = (n_y, -n_x, n_x y - n_y x): its products have the expectation sigma^2 G^t G; the quadratic part has no noise.
     shares = np.einsum("nij,nik->njk", g, g)
     u = linear(points, flow)
     for _ in range(rounds):
         weights = 1 / np.maximum(((g @ u) ** 2).sum(1), 1e-6)
-        moments = (weights[:, None] * rows).T @ rows
-        noise = np.zeros((9, 9))
-        noise[:3, :3] = np.einsum("n,njk->jk", weights, shares) * sigma**2
-        # The quadratic part has no noise: eliminate it, then the generalised eigenproblem of u alone.
-        inner = moments[:3, :3] - moments[:3, 3:] @ np.linalg.pinv(moments[3:, 3:]) @ moments[3:, :3]
-        values, vectors = np.linalg.eig(np.linalg.solve(noise[:3, :3], inner))
-        following = np.real(vectors[:, np.argmin(np.abs(np.real(values) - 1) if sigma > 0 else np.abs(values))])
+        root = np.sqrt(weights)[:, None]
+        inner = _without(root * rows, root * quadratic)
+        values, vectors = np.linalg.eig(np.linalg.solve(np.einsum("n,njk->jk", weights, shares), inner.T @ inner))
+        following = np.real(vectors[:, np.argmin(np.real(values))])
         u = following / np.linalg.norm(following)
     return _best(_before(points, flow, _rotation(points, flow, u)), u)

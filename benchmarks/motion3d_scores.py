@@ -151,12 +151,24 @@ PRACTICAL = (
 PRACTICAL_COLUMNS = ("ML", "prior", "efficient", "true depths", "CRLB", "linear", "unbiased", "rot ML", "rot eff.")
 
 
+def holds(truth: scenes.Scene, found: motion3d.MotionEstimate, covariance: Array) -> bool:
+    """Whether a 95 % ellipsoid around an estimate holds the truth."""
+    return squared(error(truth, found.translation, found.rotation, found.tangent), covariance) < 11.070
+
+
+def gauss_newton(found: motion3d.MotionEstimate) -> Array | None:
+    """The usual covariance `H^-1` of maximum likelihood, from (17), `M^-1 H M^-1`, and the bound `M^-1` at its minimum; None where these are not known."""
+    if found.ml.covariance is None or not (np.isfinite(found.crlb).all() and np.isfinite(found.ml.covariance).all()):
+        return None
+    return found.crlb @ np.linalg.solve(found.ml.covariance, found.crlb)
+
+
 def practical(trials: int) -> list[Row]:
     """The search everywhere: rms errors of the direction in degrees, of the rotation in mrad, and how often the 95 % ellipsoid holds the truth."""
     rows: list[Row] = []
     for depth, name, n, sigma, h, asked in PRACTICAL:
         columns: dict[str, list[float]] = {column: [] for column in PRACTICAL_COLUMNS}
-        inside, plain, count = [], [], max(20, trials // 3) if n == 5000 else trials
+        inside, plain, newton, count = [], [], [], max(20, trials // 3) if n == 5000 else trials
         for seed in range(count):
             make = scenes.differential(depth, name, n, sigma, seed, h)
             run = lambda make=make, sigma=sigma, **options: motion3d.estimate_motion(make.points, make.flow, sigma=sigma, placement="start", **options)
@@ -167,16 +179,20 @@ def practical(trials: int) -> list[Row]:
             columns["true depths"].append(angle(ideal.translation, make.u))
             columns["CRLB"].append(float(motion3d.motion_bound(make.points, make.u, make.w, make.depths, sigma=sigma).direction_std[0]))
             columns["linear"].append(angle(rivals.linear(make.points, make.flow), make.u))
-            columns["unbiased"].append(angle(rivals.unbiased(make.points, make.flow, sigma), make.u))
+            columns["unbiased"].append(angle(rivals.unbiased(make.points, make.flow), make.u))
             columns["rot ML"].append(1e3 * float(np.linalg.norm(found.ml.rotation - make.w)))
             columns["rot eff."].append(1e3 * float(np.linalg.norm(found.rotation - make.w)))
-            inside.append(squared(error(make, found.translation, found.rotation, found.tangent), found.covariance) < 11.070)
-            plain.append(squared(error(make, found.ml.translation, found.ml.rotation, found.ml.tangent), found.ml.covariance) < 11.070)
+            inside.append(holds(make, found, found.covariance))
+            likelihood = run(method="ml")
+            plain.append(holds(make, likelihood, likelihood.covariance))
+            if (usual := gauss_newton(likelihood)) is not None:
+                newton.append(holds(make, likelihood, usual))
         row: Row = {"case": f"{depth} {name} n={n} sigma {sigma}" + (f" h={h}" if h != 0.6 else ""), "trials": count}
         for (column, values), figure in zip(columns.items(), asked, strict=True):
             row[column], row[f"{column} asked"] = round(rms(values), 2), figure
         row["ML / efficient"] = round(rms(columns["ML"]) / rms(columns["efficient"]), 2)
-        row["coverage"], row["coverage, ML"] = round(float(np.mean(inside)), 2), round(float(np.mean(plain)), 2)
+        for name, values in (("coverage", inside), ("coverage, ML", plain), ("coverage, Gauss-Newton", newton)):
+            row[name] = round(float(np.mean(values)), 2)
         rows.append(row)
     return rows
 
@@ -212,19 +228,19 @@ def pixels(trials: int) -> list[Row]:
         turns: dict[str, list[float]] = {column: [] for column in ("efficient", *rivals.METHODS)}
         labels, ideal, bounds = [], [], []
         inside: dict[str, list[bool]] = {"sigma": [], "unknown sigma": []}
+        robust = bool(disturbed)
         for seed in range(trials):
             make = scenes.two_views(depth, name, sigma, median, seed, **disturbed)  # type: ignore[arg-type]
-            found = motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=bool(disturbed), method="efficient")
+            found = motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=robust, method="efficient")
             columns["ML"].append(angle(found.ml.translation, make.u))
             columns["efficient"].append(angle(found.translation, make.u))
             turns["efficient"].append(1e3 * float(np.linalg.norm(found.rotation - make.w)))
             labels.append(float(np.mean(found.inliers == make.inliers)))
-            if disturbed:
-                unknown = motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="efficient")
-                for kind, told in zip(inside, (found, unknown), strict=True):
-                    if told.status == "ok":
-                        inside[kind].append(squared(error(make, told.translation, told.rotation, told.tangent), told.covariance) < 11.070)
-            else:
+            unknown = motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=robust, method="efficient")
+            for kind, told in zip(inside, (found, unknown), strict=True):
+                if told.status == "ok":
+                    inside[kind].append(holds(make, told, told.covariance))
+            if not disturbed:
                 near = {"initial": (make.u, make.w), "weight_inv_depth": make.depths}
                 ideal.append(angle(motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, method="efficient", **near).translation, make.u))  # type: ignore[arg-type]
                 bounds.append(float(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, sigma=sigma).direction_std[0]))
@@ -240,90 +256,24 @@ def pixels(trials: int) -> list[Row]:
         for (column, values), figure in zip(columns.items(), asked, strict=True):
             row[column], row[f"{column} asked"] = both(values) if values else "", figure
         row["true depths"], row["bound"] = (both(ideal), round(rms(bounds), 2)) if ideal else ("", "")
-        blocks = [rms(columns["efficient"][k : k + BLOCK]) for k in range(0, trials - BLOCK + 1, BLOCK)]
-        row[f"rms of {BLOCK} trials"] = f"{min(blocks):.2f} to {max(blocks):.2f}" if blocks else ""
+        for column in ("ML", "efficient"):
+            blocks = [rms(columns[column][k : k + BLOCK]) for k in range(0, trials - BLOCK + 1, BLOCK)]
+            row[f"rms of {BLOCK} trials, {column}"] = f"{min(blocks):.2f} to {max(blocks):.2f}" if blocks else ""
         row["rot mrad eff."] = round(float(np.median(turns["efficient"])), 2)
         row["rot mrad MAGSAC"] = round(float(np.nanmedian(turns["USAC_MAGSAC"])), 2) if turns["USAC_MAGSAC"] else ""
         row["right labels %"] = round(100 * float(np.mean(labels)), 1) if disturbed else ""
         for kind, values in inside.items():
             row[f"coverage, {kind}"] = round(float(np.mean(values)), 2) if values else ""
-            row[f"ok, {kind}"] = len(values) if disturbed else ""
+            row[f"ok, {kind}"] = len(values)
         rows.append(row)
     return rows
-
-
-SIX = (
-    (0.6, 200, 15, 0.5, (5.75, 5.02, 7.67, 5.14, 4.18, 4.16)),
-    (0.6, 200, 7, 0.3, (2.94, 2.88, 3.56, 2.83, 2.60, 2.60)),
-    (0.6, 10, 60, 0.15, (8.25, 8.30, 8.77, 8.16, 8.85, 7.78)),
-    (0.2, 30, 60, 0.15, (16.9, 16.8, 11.7, 11.2, 16.1, 11.4)),
-    (0.2, 100, 30, 0.15, (5.36, 5.36, 5.65, 5.14, 5.45, 5.16)),
-)
-"""Half width, patches, half size and noise in px; published: flow ML, flow with a normal prior, six numbers ML, six shrunk, bounds."""
-
-
-LAYOUTS, NEAREST = 400, 8
-"""Layouts of patches that are drawn, and those of them whose bounds are nearest to the published ones."""
-
-
-def six_bounds(make: scenes.Scene, covariance: Array) -> tuple[float, float]:
-    """Bounds of the direction's deviation, degrees: of flow alone and of six numbers."""
-    flow = motion3d.motion_bound(make.points, make.u, make.w, make.depths[:, 0], scenes.K, sigma=make.sigma)
-    six = motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, cov=covariance, jacobian=True)
-    return float(flow.direction_std[0]), float(six.direction_std[0])
-
-
-def like_the_published(h: float, n: int, radius: int, sigma: float, asked: Sequence[float]) -> tuple[list[int], str]:
-    """Seeds of the layouts whose bounds are nearest to the published ones, and the range of the bounds of flow alone among 90 % of all."""
-    bounds = np.array([six_bounds(*scenes.patches("oblique", n, radius, sigma, seed, h)[::2]) for seed in range(LAYOUTS)])
-    off = np.abs(np.log(bounds / asked[4:])).max(1)
-    low, high = np.quantile(bounds[:, 0], (0.05, 0.95))
-    return [int(seed) for seed in np.argsort(off)[:NEAREST]], f"{low:.2f} to {high:.2f}"
-
-
-def six_numbers(trials: int) -> list[Row]:
-    """Six numbers a patch against flow alone; the minimum nearest to the truth, rms degrees.
-
-    Few patches have bounds that differ by a factor of two from one layout to the next: each case is told of layouts drawn anew for every trial, and of those whose bounds are the published ones.
-    """
-    rows: list[Row] = []
-    for h, n, radius, sigma, asked in SIX:
-        case = f"oblique h={h} n={n} r={radius} sigma {sigma} px"
-        like, spread = like_the_published(h, n, radius, sigma, asked)
-        made = {
-            "drawn anew": [scenes.patches("oblique", n, radius, sigma, seed, h) for seed in range(trials)],
-            "with the published bounds": [scenes.patches("oblique", n, radius, sigma, like[t % NEAREST], h, t) for t in range(trials)],
-        }
-        for layouts, drawn in made.items():
-            rows.append({"case": case, "layouts": layouts, "trials": trials, **six_row(drawn, asked), "bounds of 90 % of layouts, flow": spread})
-    return rows
-
-
-def six_row(drawn: list[tuple[scenes.Scene, Array, Array]], asked: Sequence[float]) -> Row:
-    """What patches with noise give beside the published figures."""
-    columns: dict[str, list[float]] = {c: [] for c in ("flow ML", "flow prior", "six ML", "six shrunk", "CRLB flow", "CRLB six")}
-    for make, jacobian, covariance in drawn:
-        near = {"placement": "start", "initial": (make.u, make.w), "method": "efficient"}
-        flow = motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=make.sigma, smoother="prior", **near)  # type: ignore[arg-type]
-        six = motion3d.estimate_motion(make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, **near)  # type: ignore[arg-type]
-        found = [angle(u, make.u) for u in (flow.ml.translation, flow.translation, six.ml.translation, six.translation)]
-        for values, value in zip(columns.values(), (*found, *six_bounds(make, covariance)), strict=True):
-            values.append(value)
-    row: Row = {}
-    for (column, values), figure in zip(columns.items(), asked, strict=True):
-        row[column], row[f"{column} asked"] = round(rms(values), 2), figure
-    # Layouts drawn differ, and their bounds with them: over the bound of their own layouts the errors can be compared.
-    for column, bound, (own, its) in (("flow ML", "CRLB flow", (0, 4)), ("six shrunk", "CRLB six", (3, 5))):
-        row[f"{column} / bound"], row[f"{column} / bound asked"] = round(rms(columns[column]) / rms(columns[bound]), 2), round(asked[own] / asked[its], 2)
-    return row
 
 
 TABLES: dict[str, tuple[str, Callable[[int], list[Row]], int]] = {
     "theory": ("ML follows (17), not the bound", theory, 200),
     "weights": ("True depths in the weights reach (25)", true_weights, 120),
     "one": ("One unknown: variances over their formulas", one_unknown, 3000),
-    "practical": ("Scenes, searched everywhere", practical, 120),
+    "practical": ("Scenes, searched everywhere", practical, 200),
     "pixels": ("Two views in pixels beside OpenCV", pixels, 240),
-    "six": ("Six numbers a patch against flow", six_numbers, 240),
 }
 """Tables by name: title, what makes it, trials."""

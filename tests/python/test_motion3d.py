@@ -1,5 +1,6 @@
 """Rigid 3-D motion: published values, agreement with a plain reference, conventions, statuses, errors."""
 
+import dataclasses
 import pickle
 import sys
 from pathlib import Path
@@ -12,10 +13,12 @@ import jacoflow
 from jacoflow import motion3d
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import motion3d_claims as claims
 import motion3d_fixed as fixed
 import motion3d_rivals as rivals
 import motion3d_scenes as scenes
 import motion3d_scores as scores
+import motion3d_six as six
 
 U, W = scenes.motion("oblique")
 
@@ -98,7 +101,7 @@ def test_smoothed_weights_are_worth_their_while(case):
 
 @pytest.mark.parametrize("case", [7, 8])
 def test_maximum_likelihood_over_noisy_ground(case):
-    """By name: direction and rotation within a fifth of the published figures, far above the bound that the depths' noise keeps it from; and what it tells of itself while the epipole is not among the points."""
+    """By name: direction and rotation within a fifth of the published figures, far above the bound that the depths' noise keeps it from; it tells so of itself, with the epipole beside the points and among them."""
     depth, name, n, sigma, h, asked = scores.PRACTICAL[case]
     errors, turns, bounds, inside = [], [], [], []
     for seed in range(150):
@@ -112,8 +115,7 @@ def test_maximum_likelihood_over_noisy_ground(case):
     assert scores.rms(errors) == pytest.approx(asked[0], rel=0.2)
     assert scores.rms(turns) == pytest.approx(asked[7], rel=0.2)
     assert scores.rms(errors) > 1.5 * scores.rms(bounds)
-    if name == "oblique":
-        assert 0.88 <= np.mean(inside) <= 0.97
+    assert 0.88 <= np.mean(inside) <= 0.98
 
 
 def test_two_views_in_pixels_beat_opencv(monkeypatch):
@@ -226,6 +228,14 @@ def test_time_to_contact_and_focus():
     assert mean == pytest.approx(-1 / np.average(make.depths * make.u[2]), rel=0.2)
 
 
+def test_depths_of_any_unit_leave_the_time_to_contact_alone():
+    make = scene(400, 0.01, 2, "smooth", "forward")
+    usual, scaled = (start(make, weight_inv_depth=factor * make.depths) for factor in (1, 50))
+    assert_allclose(scaled.translation, usual.translation, atol=1e-9)
+    assert_allclose(scaled.time_to_contact, usual.time_to_contact, rtol=1e-6)
+    assert_allclose(scaled.time_to_contact_std, usual.time_to_contact_std, rtol=1e-4)
+
+
 def test_the_focus_is_nowhere_in_sideways_motion():
     found = start(scene(sigma=1e-7, name="lateral"), method="ml")
     sideways = motion3d.MotionEstimate(**{**vars(found), "translation": np.array([1.0, 0.0, 0.0])})
@@ -252,6 +262,31 @@ def test_degenerate_scenes_have_their_status():
     normal = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
     for truth in (U, normal):
         assert min(scores.angle(u, truth) for u in both) < 4
+
+
+def test_the_sphere_is_a_screen_like_the_plane():
+    """Outliers, rows that are not finite, rotations alone and the two motions of a plane."""
+    rng = np.random.default_rng(0)
+    make = scenes.sphere("oblique", 500, 0.1, 3)
+    along = lambda values, eta: values - (values * eta).sum(1, keepdims=True) * eta
+    outliers = rng.uniform(size=500) < 0.3
+    flow = np.where(outliers[:, None], along(rng.uniform(-4, 4, (500, 3)), make.points), make.flow)
+    flow[7] = np.nan
+    found = motion3d.estimate_motion(make.points, flow, sigma=0.1, projection="sphere", robust=True)
+    assert found.status == "ok" and scores.angle(found.translation, U) < 4 * found.direction_std < 8
+    assert np.mean(found.inliers == ~outliers) > 0.97 and np.isnan(found.inv_depth[7])
+    eta = make.points[make.points[:, 2] > 0.75]
+    noise = along(0.003 * rng.normal(size=eta.shape), eta)
+    turning = np.cross(eta, np.cross(np.cross(W, eta), eta))
+    still = motion3d.estimate_motion(eta, turning + noise, sigma=0.003, projection="sphere")
+    assert still.status == "rotation_only" and scores.angle(still.rotation, W) < 5
+    normal = np.array([0.3, -0.2, 0.9])
+    plane = turning + np.cross(eta, (eta @ normal)[:, None] * np.cross(U, eta)) + noise
+    flat = motion3d.estimate_motion(eta, plane, sigma=0.003, projection="sphere")
+    both = [flat.translation, *(other.translation for other in flat.alternatives)]
+    assert flat.status == "ambiguous"
+    for truth in (U, normal):
+        assert min(scores.angle(u, truth) for u in both) < 5
 
 
 def test_six_numbers_a_patch():
@@ -361,6 +396,50 @@ def test_a_field_gives_the_motion_and_the_points():
         motion3d.estimate_field_motion(field, camera, spacing=-1)
 
 
+def test_a_field_has_a_map_of_times_to_contact():
+    frames, camera = textured_drive()
+    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    found, _ = motion3d.estimate_field_motion(field, camera, robust=False)
+    contact, deviation, residual = motion3d.time_to_contact_map(field, found, camera)
+    assert contact.shape == deviation.shape == residual.shape == field.shape
+    assert_array_equal(np.isnan(contact), ~(np.asarray(field.valid) & (np.asarray(field.status) != jacoflow.Status.INCONSISTENT)))
+    y, x = np.mgrid[: field.shape[0], : field.shape[1]]
+    away = np.isfinite(contact) & (np.hypot(x - 64, y - 48) > 20)
+    assert np.median(contact[away]) == pytest.approx(1 / np.log(1.02), rel=0.05)
+    assert np.mean(np.abs(1 / contact - np.log(1.02))[away] < 3 * (deviation / contact**2)[away]) > 0.9
+    # A camera that only turns reaches nothing.
+    still = dataclasses.replace(found, translation=np.full(3, np.nan))
+    assert np.isinf(motion3d.time_to_contact_map(field, still, camera)[0][away]).all()
+    with pytest.raises(ValueError, match="^field"):
+        motion3d.time_to_contact_map(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), found, camera)
+    with pytest.raises(ValueError, match="^placement"):
+        motion3d.time_to_contact_map(field, found, camera, placement="end")
+
+
+def test_displacements_over_a_whole_frame_are_placed_half_way():
+    """Within half of the published figures, whose layout is not told; at the start they are larger by 20 times and more."""
+    for row in claims.displacements(12):
+        for what in ("start, mrad", "midpoint, deg", "midpoint, mrad"):
+            assert row[what] == pytest.approx(row[f"{what} asked"], rel=0.55), row
+        assert row["start, deg"] > 10 * row["midpoint, deg"] and row["start, mrad"] > 20 * row["midpoint, mrad"], row
+
+
+def test_what_the_text_says_besides_its_tables():
+    got = {row["what"]: row for part in (claims.aperture, claims.exact_points, claims.rotations_alone, claims.biases) for row in part(60)}
+    for name in ("covariances", "a scalar sigma"):
+        row = got[f"aperture-like noise, {name}: rms, deg"]
+        assert row["got"] == pytest.approx(row["asked"], rel=0.25), row
+    assert got["aperture-like noise, covariances, smoothed weights: rms, deg"]["got"] < 3.2
+    assert got["6 exact points: the true motion picked"]["got"] == "100%"
+    for flow, share in ((0, 1), (2, 0)):
+        assert got[f"translational flow of {flow} sigma: share told as rotation_only"]["got"] == pytest.approx(share, abs=0.07)
+    for flow in (1, 2):
+        row = got[f"translational flow of {flow} sigma: deviations above noise"]
+        assert row["got"] == pytest.approx(row["asked"], rel=0.25), row
+    bias = {name: float(str(got[f"smooth oblique n=1000 sigma 0.1, bias of {name}, deg"]["got"]).split(" ")[0]) for name in ("efficient", "linear")}
+    assert bias["efficient"] < 0.8 and bias["linear"] > 30
+
+
 def test_ground_seen_obliquely_is_published_below_its_bound():
     """Two views of the ground, 0.5 px: the published rms of 24 trials lies below the bound; ours comes as near to what true depths in the weights reach as anyone's could."""
     case = next(case for case in scores.PIXELS if case[:4] == ("ground", "oblique", 0.5, 2))
@@ -379,9 +458,9 @@ def test_ground_seen_obliquely_is_published_below_its_bound():
 @pytest.mark.parametrize("case", range(5))
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
     """Shrunk slants and flow alone within a quarter of the published figures; six numbers worse without shrinking where patches are small."""
-    h, n, radius, sigma, asked = scores.SIX[case]
-    like, _ = scores.like_the_published(h, n, radius, sigma, asked)
-    row = scores.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
+    h, n, radius, sigma, asked = six.SIX[case]
+    like, _ = six.like_the_published(h, n, radius, sigma, asked)
+    row = six.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
     for name in ("CRLB flow", "CRLB six"):
         assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.03), row
     for name in ("flow ML", "flow prior", "six ML", "six shrunk"):
