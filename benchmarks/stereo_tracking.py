@@ -8,7 +8,7 @@ its largest cluster is on the track from before it was hidden by the third step 
 Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure: speed of the affine motion at the object's own pixels beside the median of the truth there, velocity of `next_velocity` beside the truth at `middle`, median of `next_velocity` beside the median of the truth over the object's own pixels; gross are those off by more than 2 px along x or y or by 1 disparity, and those off by more than 2 px of length. The latter is the harder count: in whole cells of 8 px a motion of 22 px/step cannot be told better than to 2 px.
 
 Seeds are of the textures, the noise and the mixture's starts, all of them others; the first is the specification's. The paper's mode begins anew at every step, and in which optimum a step ends is a matter of luck: where a person is half hidden,
-one start in six or so puts what is left into the wall. There each texture is followed from several starts. Everything is the mean over the films; paths are the least of them and their mean. Times are medians over steps and films: on the clock, and of all threads together, which other work on the machine changes less.
+one start in six or so puts what is left into the wall. There each texture is followed from several starts. Everything is the mean over the films; paths, index and id are the least of them and their mean. Times are medians over steps and films: on the clock, and of all threads together, which other work on the machine changes less.
 """
 
 from __future__ import annotations
@@ -98,11 +98,11 @@ def of_object(label: int, textures: Sequence[Sequence[Scores]], steps: int, grou
     """How one object was found and followed."""
     scores = [score for films in textures for score in films]
     hidden = scores[0].first_hidden(label)
-    paths = [score.path(label) for score in scores]
     row: Row = {f"recall {label}": float(np.mean([score.recall(label) for score in scores]))}
-    row[f"path {label}"] = f"{min(paths)}/{hidden} ({np.mean(paths):.1f})"
-    row[f"index {label}"] = f"{min(score.index_kept(label) for score in scores)}/{hidden}"
-    row[f"id {label}"] = f"{min(score.id_kept(label) for score in scores)}/{steps}"
+    lasting = {"path": (Scores.path, hidden), "index": (Scores.index_kept, hidden), "id": (Scores.id_kept, steps)}
+    for what, (kept, most) in lasting.items():
+        counts = [kept(score, label) for score in scores]
+        row[f"{what} {label}"] = f"{min(counts)}/{most} ({np.mean(counts):.1f})"
     row[f"kept {label}"] = " ".join(f"{np.mean([score.id_share(label) for score in films]):.2f}" for films in textures)
     back = [score.recognised(label) for score in scores]
     if None not in back:
