@@ -198,7 +198,7 @@ class StereoTracker:
     Parameters
     ----------
     mode : "improved" or "paper"
-        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped.
+        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped; both cameras may expose otherwise from step to step.
         "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
     n_components : int
         Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.

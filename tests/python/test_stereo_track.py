@@ -123,6 +123,29 @@ def test_the_specifications_figures_on_the_small_scene(mode, purity, recalls, er
         assert scores.index_kept(2) == 6
 
 
+EXPOSURES = {
+    "darker by a twentieth a step": lambda t: (0.95**t, 0.0),
+    "brighter by a fiftieth a step": lambda t: (0.8 * 1.02**t, 0.0),
+    "a fifth less at every other step": lambda t: (1.0 - 0.2 * (t % 2), 0.0),
+    "a third less at every other step": lambda t: (1.0 - 0.35 * (t % 2), 0.0),
+    "15 grey levels more at every other step": lambda t: (0.9, 15.0 * (t % 2)),
+}
+"""Gain and offset of both cameras at a step."""
+
+
+@pytest.mark.parametrize("exposure", EXPOSURES.values(), ids=EXPOSURES)
+def test_another_exposure_is_no_motion(exposure):
+    def exposed(t, view):
+        gain, offset = exposure(t)
+        return np.rint(np.clip(gain * view + offset, 0, 255)).astype(np.uint8)
+
+    film = [replace(shown, left=exposed(t, shown.left), right=exposed(t, shown.right)) for t, shown in enumerate(small().film())]
+    scores = scored(small(), "improved", film)
+    assert [scores.id_kept(label) for label in (1, 2)] == [6, 6]
+    for errors in scores.motion_errors().values():
+        assert (np.median(errors, axis=0) <= 0.02).all()
+
+
 def test_who_was_hidden_is_recognised():
     scores = scored(crossing(), "improved", crossing_film(1))
     assert crossing_on_paper(1)[0] > 0.9

@@ -1,5 +1,6 @@
 //! Luminance reduced to the cells of the grid, and templates compared in it: equation (29) of the stereo paper.
 
+use super::exposure::Exposure;
 use super::voxels::Lattice;
 use crate::types::Frame;
 
@@ -11,6 +12,10 @@ const NONE: i32 = -1;
 pub(super) struct CellLuminance {
     columns: i32,
     rows: i32,
+    /// Grey levels, NaN in a cell without a finite pixel.
+    means: Vec<f64>,
+    /// Levels for each grey level, and how many there are.
+    scale: (f64, usize),
     levels: Vec<i32>,
 }
 
@@ -38,13 +43,25 @@ impl CellLuminance {
                 }
             }
         }
-        let scale = levels as f64 / 256.0;
-        let level = |(sum, count): (f64, u32)| match count {
-            0 => NONE,
-            _ => (sum / f64::from(count) * scale).floor().clamp(0.0, levels as f64 - 1.0) as i32,
+        // Without a finite pixel 0 / 0.
+        let means = sums.into_iter().zip(counts).map(|(sum, count)| sum / f64::from(count)).collect();
+        Self::of_means((columns as i32, rows as i32), means, (levels as f64 / 256.0, levels))
+    }
+
+    /// Means cut down to levels.
+    fn of_means((columns, rows): (i32, i32), means: Vec<f64>, scale: (f64, usize)) -> Self {
+        let highest = scale.1 as f64 - 1.0;
+        let level = |mean: &f64| {
+            if mean.is_nan() { NONE } else { (mean * scale.0).floor().clamp(0.0, highest) as i32 }
         };
-        let levels = sums.into_iter().zip(counts).map(level).collect();
-        Self { columns: columns as i32, rows: rows as i32, levels }
+        let levels = means.iter().map(level).collect();
+        Self { columns, rows, means, scale, levels }
+    }
+
+    /// The same picture under another exposure.
+    pub fn exposed(&self, exposure: &Exposure) -> Self {
+        let means = self.means.iter().map(|mean| exposure.gain * mean + exposure.offset).collect();
+        Self::of_means((self.columns, self.rows), means, self.scale)
     }
 
     /// Level at a cell, where it is in the picture and has one.
@@ -151,5 +168,7 @@ mod tests {
         // (255 + 7 x 7.9) / 8 = 38.79, a quarter of it 9.7.
         assert_eq!((cells.level(0, 0), cells.level(1, 0)), (Some(1), Some(9)));
         assert_eq!((cells.level(0, 14), cells.level(-1, 0), cells.level(20, 0)), (None, None, None));
+        let brighter = cells.exposed(&Exposure { gain: 2.0, offset: 8.0 });
+        assert_eq!((brighter.level(0, 0), brighter.level(1, 0), brighter.level(0, 14)), (Some(5), Some(21), None));
     }
 }

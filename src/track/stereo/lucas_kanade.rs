@@ -6,6 +6,7 @@ mod visible;
 pub(super) use visible::visible_motion;
 
 use self::task::Task;
+use super::exposure::Exposure;
 use crate::image::GaussianSmoother;
 use crate::math::median;
 use crate::types::{AffineFlow, Frame};
@@ -46,6 +47,16 @@ impl SmoothedLevels {
             GaussianSmoother::with(f64::from(sigma), 3.0, crate::image::Border::Reflect)
                 .map_or_else(|_| frame.clone(), |smoother| smoother.apply(frame))
         }))
+    }
+
+    /// The same frame under another exposure.
+    pub fn exposed(&self, exposure: &Exposure) -> Self {
+        Self(self.0.each_ref().map(|frame| exposure.applied(frame)))
+    }
+
+    /// The frame with what noise there is averaged out, but not yet the edges.
+    pub fn smooth(&self) -> &Frame<f32> {
+        &self.0[FINE - 1]
     }
 }
 

@@ -3,11 +3,13 @@
 use super::cell_luminance::CellLuminance;
 use super::clusters::Clusters;
 use super::disparity_change::{nearest, robust_mean};
+use super::exposure::Exposure;
 use super::fine_motion::{FineMotion, places};
 use super::lucas_kanade::{PlaneMotion, SmoothedLevels, affine_motion, visible_motion};
 use super::motion::Seen;
 use crate::types::Frame;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// First guesses nearer than this to one another are one, px.
 const SAME_START: f64 = 3.0;
@@ -36,8 +38,26 @@ pub(super) struct Guess {
     pub beside: Option<[f64; 3]>,
 }
 
+/// The last step's picture, under the exposure of the next one.
+struct LastView<'a> {
+    clusters: &'a Clusters,
+    luminance: Cow<'a, CellLuminance>,
+    levels: Cow<'a, SmoothedLevels>,
+}
+
+impl<'a> LastView<'a> {
+    fn new(from: &'a Seen, levels: &'a SmoothedLevels, exposure: &Exposure) -> Self {
+        let clusters = &from.clusters;
+        if !exposure.differs(&Exposure::SAME) {
+            return Self { clusters, luminance: Cow::Borrowed(&from.luminance), levels: Cow::Borrowed(levels) };
+        }
+        let (luminance, levels) = (from.luminance.exposed(exposure), levels.exposed(exposure));
+        Self { clusters, luminance: Cow::Owned(luminance), levels: Cow::Owned(levels) }
+    }
+}
+
 /// Motion of all clusters with at least so many pixels towards the next view by affine Lucas-Kanade, from the template's shift (up to `reach` cells) and from a guess. What leaves much more of the picture than motions in general is
-/// partly hidden, or a coincidence: it is looked for again from what is expected.
+/// partly hidden, or a coincidence: it is looked for again from what is expected. Where the exposure changed, both are done in the last picture as that would have made it.
 ///
 /// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell, or tell of more than is searched for.
 pub(super) fn fine_motions(
@@ -46,31 +66,49 @@ pub(super) fn fine_motions(
     guesses: &[Guess],
     (reach, least): (i32, f64),
 ) -> Vec<Option<FineMotion>> {
-    let count = from.clusters.components();
-    let Some(levels) = &from.levels else { return vec![None; count] };
-    let search = |k: usize| {
-        let pixels = places(&from.clusters, k);
-        // So few say nothing sure, and are seeded anew.
-        if (pixels.len() as f64) < least {
-            return None;
-        }
-        affine_motion(levels, next.levels, &pixels, &starts(from, next.luminance, k, guesses[k], reach))
-    };
-    let planes: Vec<Option<PlaneMotion>> = (0..count).into_par_iter().map(search).collect();
+    let Some(levels) = &from.levels else { return vec![None; from.clusters.components()] };
+    let pictures = [levels.smooth(), next.levels.smooth()];
+    let large = Exposure::large(pictures[0], pictures[1]);
+    let mut last = LastView::new(from, levels, &large);
+    let mut planes = plane_motions(&last, next, guesses, (reach, least));
+    // What motions tell of the exposure leads to better ones.
+    if let Some(told) = Exposure::of_motions(&from.clusters, &planes, pictures).filter(|told| told.differs(&large)) {
+        last = LastView::new(from, levels, &told);
+        planes = plane_motions(&last, next, guesses, (reach, least));
+    }
     let noise = noise(&from.clusters, &planes);
     let one = |k: usize| {
         let plane = match (planes[k]?, noise) {
             (plane, Some(noise)) if plane.deviation > UNEXPLAINED * noise => {
                 let expected: Vec<[f64; 2]> =
                     [guesses[k].last, guesses[k].beside].into_iter().flatten().map(|[u, v, _]| [u, v]).collect();
-                visible_motion(levels, next.levels, &places(&from.clusters, k), (plane, &expected), noise)?
+                visible_motion(&last.levels, next.levels, &places(&from.clusters, k), (plane, &expected), noise)?
             }
             (plane, _) => plane,
         };
         let depth = depth_change(&from.clusters, k, &plane, next.disparity)?;
         (depth.abs() <= f64::from(reach)).then_some(FineMotion { plane, depth })
     };
-    (0..count).into_par_iter().map(one).collect()
+    (0..from.clusters.components()).into_par_iter().map(one).collect()
+}
+
+/// Motion in the picture of all clusters with at least so many pixels.
+fn plane_motions(
+    last: &LastView<'_>,
+    next: NextView<'_>,
+    guesses: &[Guess],
+    (reach, least): (i32, f64),
+) -> Vec<Option<PlaneMotion>> {
+    let search = |k: usize| {
+        let pixels = places(last.clusters, k);
+        // So few say nothing sure, and are seeded anew.
+        if (pixels.len() as f64) < least {
+            return None;
+        }
+        let starts = starts(last, next.luminance, k, guesses[k], reach);
+        affine_motion(&last.levels, next.levels, &pixels, &starts)
+    };
+    (0..last.clusters.components()).into_par_iter().map(search).collect()
 }
 
 /// Change of the disparity of a cluster's pixels that move in the picture; `None` where too few meet a disparity, or too few of those agree.
@@ -108,9 +146,9 @@ fn noise(clusters: &Clusters, planes: &[Option<PlaneMotion>]) -> Option<f64> {
 }
 
 /// First guesses of a cluster's translation, px.
-fn starts(from: &Seen, next: &CellLuminance, k: usize, guess: Guess, reach: i32) -> Vec<[f64; 2]> {
-    let [cx, cy, _] = from.clusters.lattice().cell();
-    let matched = from.luminance.find(&from.clusters.template(k), next, reach);
+fn starts(last: &LastView<'_>, next: &CellLuminance, k: usize, guess: Guess, reach: i32) -> Vec<[f64; 2]> {
+    let [cx, cy, _] = last.clusters.lattice().cell();
+    let matched = last.luminance.find(&last.clusters.template(k), next, reach);
     let mut starts: Vec<[f64; 2]> =
         matched.iter().map(|found| [f64::from(found.shift[0]) * cx, f64::from(found.shift[1]) * cy]).collect();
     if let Some([u, v, _]) = guess.last.or(guess.beside)

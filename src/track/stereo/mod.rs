@@ -10,6 +10,7 @@
 mod cell_luminance;
 mod clusters;
 mod disparity_change;
+mod exposure;
 mod fine_motion;
 mod graph;
 mod grouping;
