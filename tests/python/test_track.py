@@ -68,8 +68,12 @@ def test_hard_scenes_are_followed(name):
 
 
 def test_the_text_to_the_letter_follows_on_a_flat_background_and_loses_elsewhere():
+    """Line of sight within 3 px, raw velocity within .06 px/frame there."""
     flat = PUBLISHED["S1 flat:90 R 16, whole pixels, no noise"]
-    assert np.linalg.norm(follow(flat, method="paper").los - flat.centres, axis=1).max() <= 3.0
+    found = follow(flat, method="paper")
+    assert np.linalg.norm(found.los - flat.centres, axis=1).max() <= 3.0
+    steps = np.diff(flat.centres, axis=0)
+    assert np.sqrt(np.mean((found.displacement[6:] - steps[5:]) ** 2, axis=0)).max() <= 0.06
     soft = PUBLISHED["S1 smooth:4,90,20 R 16, whole pixels"]
     assert np.mean(np.linalg.norm(follow(soft, method="paper").position - soft.centres, axis=1) <= 3.0) < 0.5
 
@@ -193,7 +197,7 @@ def test_one_step_has_the_published_gain_and_refining_removes_it():
         inside = np.s_[14:-14, 14:-14]
         for order, want in ((4, four), (2, two)):
             flow = track.local_flow(first, second, window=5, order=order, min_sigma=0.0, cond_max=1e9, step_max=1e9)
-            assert np.nanmean(flow.flow[inside][..., 0]) == pytest.approx(want, abs=0.01), (step, order)
+            assert np.nanmean(flow.flow[inside][..., 0]) == pytest.approx(want, abs=0.005), (step, order)
     for step, most in tracking_flow.REFINED.items():
         refined = track.refine_flow(*tracking_flow.shifted_texture(step), window=5, min_sigma=0.0, cond_max=1e9, step_max=1e9)
         wrong = refined.flow[14:-14, 14:-14] - (step, -step / 2)

@@ -1,5 +1,6 @@
 """How the gradient tracker begins: boxes round what is no square, faint targets at rest, frames that show nothing, and options and numbers that it does not take."""
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from jacoflow import track
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 import tracking_scenes
-from test_track import follow
+from test_track import follow, overlap, success
 from tracking_begin import outlined
 from tracking_pictures import background
 from tracking_scenes import Plane, Scene, circle, square
@@ -134,3 +135,38 @@ def test_a_box_too_large_round_a_figure_that_does_not_fill_it_becomes_that_of_th
         shares.append(np.mean(found.status[1:] == "tracking"))
         near.append(np.mean(np.linalg.norm(found.position - scene.centres, axis=1) <= 4.0))
     assert np.mean(shares) >= 0.5 and np.mean(near) >= 0.85
+
+
+@pytest.mark.parametrize("above", [10.0, 15.0, 20.0])
+@pytest.mark.parametrize("kind", ["smooth:4,90,10", "smooth:4,90,20", "smooth:4,90,40"])
+def test_a_faint_target_before_a_rough_background_is_followed_from_the_first_frame(kind, above):
+    """Its speed is not known then, and the gradients from rest lead to the wrong side on some of these backgrounds."""
+    for seed in (3, 5, 8, 12, 13):
+        scene = Scene("faint", (Plane(kind, seed),), square(circle(20.0), level=90.0 + above))
+        assert success(scene, follow(scene)) >= 0.9, seed
+
+
+@pytest.mark.parametrize("larger", [1.2, 1.4])
+def test_a_box_too_large_is_not_lost_before_rough_background(larger):
+    """What the box holds besides the target says that nothing moved."""
+    for seed in (3, 5, 7, 9):
+        scene = stretched_about(larger, "smooth:2,128,40", seed)
+        assert success(scene, follow(scene)) >= 0.85, seed
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("kind", ["flat:90", "flat:30"])
+def test_a_box_too_large_before_an_even_background_becomes_that_of_the_target(kind, seed):
+    """The rest of it looks the same whether it stays or goes along."""
+    scene = stretched_about(1.4, kind, seed)
+    found = follow(scene)
+    reached = overlap(np.asarray(found.box), scene.boxes)
+    assert reached[-15:].min() >= 0.85
+    assert np.linalg.norm(found.position - scene.centres, axis=1)[-15:].max() <= 0.5
+
+
+def stretched_about(larger, kind, seed):
+    """Simulation 1 begun with a box so many times as large as the target, about its centre."""
+    scene = tracking_scenes.simulation(1, kind, 24.0 if seed % 2 else 12.0, seed=seed)
+    x, y, w, h = scene.start_box
+    return dataclasses.replace(scene, start=(x + w * (1 - larger) / 2, y + h * (1 - larger) / 2, w * larger, h * larger))

@@ -30,6 +30,11 @@ pub(super) fn kernels_of(order: usize) -> &'static DerivativeKernels {
     &KERNELS.get_or_init(|| [1, 2, 3, 4].map(derivative_kernels))[order.clamp(1, 4) - 1]
 }
 
+/// Largest gradient that rounding to whole grey levels makes of a flat picture, grey levels/px: half a level at each pixel, by the mask along x.
+pub(super) fn gradient_of_rounding(order: usize) -> f64 {
+    0.5 * kernels_of(order).x.iter().flatten().map(|k| k.abs()).sum::<f64>()
+}
+
 /// The masks for polynomials of total degree `order`, 1 to 4 (clamped).
 pub fn derivative_kernels(order: usize) -> DerivativeKernels {
     let order = order.clamp(1, 4) as i32;
@@ -120,5 +125,16 @@ mod tests {
                 assert!((apply(&k.y, f) - f64::from((a, b) == (0, 1))).abs() < 1e-11, "{order} {a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn rounding_makes_no_larger_gradient_than_it_is_said_to() {
+        for order in 1..=4 {
+            let mask = derivative_kernels(order).x;
+            let at = |x: f64, y: f64| mask[(y + 2.0) as usize][(x + 2.0) as usize];
+            let worst = apply(&mask, |x, y| 0.5 * at(x, y).signum());
+            assert!((worst - gradient_of_rounding(order)).abs() < 1e-12, "{order}");
+        }
+        assert!((gradient_of_rounding(2) - 0.3).abs() < 1e-12);
     }
 }

@@ -220,7 +220,7 @@ impl LocalLoop {
         let first = &self.before;
         let velocity = self.filter.speed();
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
-        let mut flow = self.rules.flow.flow_from(first, second, starts);
+        let mut flow = self.rules.flow.flow_from(first, second, starts, self.rules.flat);
         self.keep_window(&mut flow);
         let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
         let mut mean = flow.mean(eps);

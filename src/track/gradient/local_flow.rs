@@ -75,9 +75,16 @@ impl LocalFlowOptions {
         if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second)) } else { 0.0 }
     }
 
-    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made.
-    pub(super) fn flow_from(&self, first: &Frame<f64>, second: &Frame<f64>, starts: &[[f64; 2]]) -> LocalFlow {
-        let (kernels, least) = (kernels_of(self.order), self.least(first, second));
+    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made. Windows with gradients up to `flat`, grey levels/px, are flat: their condition number
+    /// (8) is infinite.
+    pub(super) fn flow_from(
+        &self,
+        first: &Frame<f64>,
+        second: &Frame<f64>,
+        starts: &[[f64; 2]],
+        flat: f64,
+    ) -> LocalFlow {
+        let (kernels, least) = (kernels_of(self.order), self.least(first, second).max(flat));
         let equations: Vec<_> = starts
             .iter()
             .map(|start| (*start, Equations::new(first, &shifted(second, *start), kernels, self.window)))
@@ -122,7 +129,7 @@ impl LocalFlow {
 
 /// Flow of single pixels from the first frame to the second, one step from rest (1)-(8).
 pub fn local_flow(first: &Frame<f64>, second: &Frame<f64>, options: &LocalFlowOptions) -> LocalFlow {
-    options.flow_from(first, second, &[[0.0; 2]])
+    options.flow_from(first, second, &[[0.0; 2]], 0.0)
 }
 
 /// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the frame.
@@ -260,7 +267,7 @@ mod tests {
         let first = texture(60, 40);
         let moved = shifted(&first, [-3.0, 1.0]);
         let second = Frame::from_fn(60, 40, |x, y| if x < 30 { first.get(x, y) } else { moved.get(x, y) });
-        let found = LocalFlowOptions::default().flow_from(&first, &second, &[[0.0; 2], [2.9, -0.9]]);
+        let found = LocalFlowOptions::default().flow_from(&first, &second, &[[0.0; 2], [2.9, -0.9]], 0.0);
         let (still, moving) = (found.flow.get(12, 20), found.flow.get(46, 20));
         assert!(still[0].abs() < 1e-9 && (moving[0] - 3.0).abs() < 0.05 && (moving[1] + 1.0).abs() < 0.05);
     }

@@ -1,6 +1,7 @@
 //! What the paper's loop does to the letter, and what with the repairs that it needs.
 
 use super::gauss_markov::{Dynamics, Velocity};
+use super::kernels::gradient_of_rounding;
 use super::local_flow::LocalFlowOptions;
 use super::options::{GradientOptions, Mode};
 
@@ -8,6 +9,8 @@ use super::options::{GradientOptions, Mode};
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub flow: LocalFlowOptions,
+    /// Gradient up to which a window is flat, grey levels/px. Without a gate for weak gradients it is what rounding to whole grey levels makes: what interpolation leaves beside an edge would pass for texture.
+    pub flat: f64,
     pub dynamics: Dynamics,
     pub velocity: Velocity,
     /// Variances of the measured position and velocity, px^2.
@@ -28,12 +31,14 @@ impl Rules {
         let mut rules = if options.mode == Mode::Paper { Self::paper() } else { Self::repaired() };
         rules.flow.window = options.window.unwrap_or(rules.flow.window);
         rules.flow.order = options.order.unwrap_or(rules.flow.order);
+        rules.flat = if rules.flow.min_sigma > 0.0 { 0.0 } else { gradient_of_rounding(rules.flow.order) };
         rules
     }
 
     fn repaired() -> Self {
         Self {
             flow: LocalFlowOptions::default(),
+            flat: 0.0,
             dynamics: Dynamics::default(),
             velocity: Velocity::Mean,
             variances: [1.0, 0.25],
@@ -47,6 +52,7 @@ impl Rules {
     fn paper() -> Self {
         Self {
             flow: LocalFlowOptions { window: 5, order: 2, min_sigma: 0.0, ..LocalFlowOptions::default() },
+            flat: 0.0,
             dynamics: Dynamics { q: 0.25, ..Dynamics::default() },
             velocity: Velocity::AsPrinted,
             variances: [4.0, 0.25],

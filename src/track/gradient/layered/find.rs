@@ -106,6 +106,7 @@ impl Layered {
         let interrupted = self.hidden || self.missed > 0;
         let levels = if self.age > 0 && self.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
+        let plain = self.instead_of_astray(frame, plain.as_ref()).or(plain);
         let mut best = plain;
         let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
         let held_back = plain.filter(|plain| self.is_known() && self.may_be_held_back(plain));

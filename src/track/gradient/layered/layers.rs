@@ -2,6 +2,7 @@
 //!
 //! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
 
+use super::margin::Margin;
 use super::nodes::Places;
 use super::pose::Pose;
 use crate::image::cubic_at;
@@ -35,6 +36,8 @@ pub(super) struct Target {
     pub d: Frame<f64>,
     /// How much of what is seen next of a point becomes its brightness, where that was hidden at first; 0 where it was seen.
     pub fresh: Option<Frame<f64>>,
+    /// How far the points of the box differ from what is behind them, until that is told.
+    pub margin: Option<Margin>,
     /// Sides at first, px.
     pub size: [f64; 2],
 }
@@ -55,6 +58,7 @@ impl Target {
         });
         Self {
             a: prior.clone(),
+            margin: Some(Margin::new(t.clone())),
             t,
             n: prior.map(|a| prior_weight * a),
             d: prior.map(|_| prior_weight),

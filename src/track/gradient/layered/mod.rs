@@ -4,6 +4,7 @@
 //! of the segmented target. Background, support and brightness of the target are learnt as it goes.
 
 mod align;
+mod astray;
 mod camera;
 mod find;
 mod front;
@@ -12,6 +13,7 @@ mod learn;
 mod level;
 mod light;
 mod look;
+mod margin;
 mod nodes;
 mod outgrown;
 mod outline;

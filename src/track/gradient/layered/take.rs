@@ -111,6 +111,7 @@ impl Layered {
         learn::learn_target(&mut self.target, &view, gain, self.noise);
         self.settle(before);
         self.gain *= gain;
+        self.target.learn_margin(&view, self.gain, self.noise);
         self.usual += VISIBILITY_RATE * (visibility - self.usual);
         let hidden = self.hides();
         learn::learn_background(&mut self.background, frame, &hidden, self.noise);
