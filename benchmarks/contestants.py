@@ -61,7 +61,7 @@ def coarse_to_fine(preset: str, frames: int = 3) -> Setting:
 
 
 PRESETS = ("fast", "balanced", "accurate")
-RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0), *(coarse_to_fine(preset) for preset in PRESETS)]
+RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0), *(coarse_to_fine(preset) for preset in PRESETS), coarse_to_fine("balanced", frames=2)]
 """The same for every recording."""
 
 CONTROLLED = [windowed(1.5, 4.0, rows="brightness"), coarse_to_fine("balanced", frames=2), coarse_to_fine("balanced")]

@@ -39,6 +39,9 @@ impl<T: SimdReal> Comparison<'_, T> {
         // Comparisons with what is not known are false.
         let better = |n: usize| ADVANTAGE * (found[n] + usual) < known[n] + usual && distance(n) > apart;
         let wins: Vec<bool> = (0..known.len()).map(better).collect();
+        if !wins.contains(&true) {
+            return false;
+        }
         for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
             let share = share_around(&wins, size, (x, y));
             if share > 0.0 {
@@ -48,7 +51,7 @@ impl<T: SimdReal> Comparison<'_, T> {
                 }
             }
         }
-        wins.contains(&true)
+        true
     }
 
     /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is seen.

@@ -1,10 +1,12 @@
 //! What a level found, refined before the next finer one begins with it.
 
 use super::data::{MOTION, summary};
-use super::grid::Planes;
+use super::grid::{LEFT, Planes};
 use super::memory::Space;
 use super::refine::{Evidence, Options, refine};
-use crate::simd::{Level, SimdReal};
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use std::ops::Range;
 
 /// Refinement that moves a site this far, px of the level, counts half: it takes noise away, while what it would move by more is a small object's own motion.
 const CLOSE: f64 = 0.35;
@@ -15,21 +17,42 @@ const CLOSE: f64 = 0.35;
 pub(super) fn refine_further<T: SimdReal>(simd: Level, space: &Space<T>, motion: &mut Planes<T>, data: &Planes<T>) {
     let data = summary(space, data);
     let (refined, evidence) = refine(simd, space, &Options::further(), motion, &data);
-    draw_near(motion, &refined);
+    draw_near(simd, motion, &refined);
     evidence.into_iter().flat_map(Evidence::into_planes).chain([data, refined]).for_each(|planes| space.keep(planes));
 }
 
 /// Moves `motion` towards what is `refined`, the less the further that is.
-fn draw_near<T: SimdReal>(motion: &mut Planes<T>, refined: &Planes<T>) {
-    let (one, scale) = (T::from_f64(1.0), T::from_f64(CLOSE.powi(-2)));
-    let (width, height) = (motion.width, motion.height);
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        let [u, v] = [0, 1].map(|k| refined.at(k, x, y) - motion.at(k, x, y));
-        let ratio = (u * u + v * v) * scale;
-        let share = one / (one + ratio * ratio);
-        for k in 0..MOTION {
-            let value = &mut motion.line_mut(k, y)[x];
-            *value += share * (refined.at(k, x, y) - *value);
+fn draw_near<T: SimdReal>(simd: Level, motion: &mut Planes<T>, refined: &Planes<T>) {
+    let (len, stride) = (motion.row_len(), motion.stride());
+    for_each_band(motion.data_mut(), len, |_, rows, out| dispatch(simd, Near { refined, rows, out, stride }));
+}
+
+/// Some rows of [`draw_near`].
+struct Near<'a, T> {
+    refined: &'a Planes<T>,
+    rows: Range<usize>,
+    out: &'a mut [T],
+    stride: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Near<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { refined, rows, out, stride } = self;
+        let (one, scale) = (V::constant(1.0), V::constant(CLOSE.powi(-2)));
+        for (y, own) in rows.zip(out.chunks_exact_mut(MOTION * stride)) {
+            let goal = refined.row(y);
+            for i in (LEFT..stride - LEFT).step_by(V::LANES) {
+                let away = |own: &[T], k: usize| V::load(&goal[k * stride + i..]) - V::load(&own[k * stride + i..]);
+                let (u, v) = (away(own, 0), away(own, 1));
+                let ratio = u.mul_add(u, v * v) * scale;
+                let share = one / ratio.mul_add(ratio, one);
+                for k in 0..MOTION {
+                    let value = away(own, k).mul_add(share, V::load(&own[k * stride + i..]));
+                    value.store(&mut own[k * stride + i..]);
+                }
+            }
         }
     }
 }
@@ -45,7 +68,7 @@ mod tests {
             refined.line_mut(0, 1)[x] = u;
             refined.line_mut(5, 1)[x] = 1.0;
         }
-        draw_near(&mut motion, &refined);
+        draw_near(Level::detect(), &mut motion, &refined);
         let [near, half, far] = [0, 1, 2].map(|x| motion.at(5, x, 1));
         assert!(near > 0.999_99 && (half - 0.5).abs() < 1e-12 && far < 2e-4, "{near} {half} {far}");
         assert_eq!(motion.at(0, 1, 1), half * CLOSE);

@@ -43,7 +43,7 @@ impl Preset {
     pub(super) fn effort(self, frames: usize) -> Effort {
         let coupling = Coupling::default();
         // Three frames are more exact than two: they are worth another linearisation.
-        let (finest_settled, finest_sweeps) = if frames == 2 { (0.03, 8) } else { (0.023, 4) };
+        let (finest_settled, finest_sweeps) = if frames == 2 { (0.035, 6) } else { (0.023, 4) };
         match self {
             Self::Fast => Effort {
                 last: 1,

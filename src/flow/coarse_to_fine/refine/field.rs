@@ -141,9 +141,25 @@ fn reflect<T: SimdReal>(edge: &[T], inside: &[T], target: &mut [T], beyond: Beyo
     }
 }
 
+/// Values beyond an edge from those `inside`, in the order of the target.
+fn mirror<'a, T: SimdReal>(target: &mut [T], inside: impl Iterator<Item = &'a T>, edge: T, beyond: Beyond) {
+    match beyond {
+        Beyond::Even => target.iter_mut().zip(inside).for_each(|(t, i)| *t = *i),
+        Beyond::Odd => target.iter_mut().zip(inside).for_each(|(t, i)| *t = edge + edge - *i),
+    }
+}
+
 fn extend_line<T: SimdReal>(line: &mut [T], width: usize, beyond: Beyond, reach: usize) {
     let (first, last) = (LEFT, LEFT + width - 1);
     let (left, right) = (line[first], line[last]);
+    if width > reach {
+        // Nothing beyond one edge is mirrored at the other.
+        let (before, inside) = line.split_at_mut(first + 1);
+        mirror(&mut before[first - reach..first], inside[..reach].iter().rev(), left, beyond);
+        let (inside, after) = line.split_at_mut(last + 1);
+        mirror(&mut after[..reach], inside[last - reach..last].iter().rev(), right, beyond);
+        return;
+    }
     for step in 1..=reach {
         let mirrored = if width == 1 { 0 } else { step };
         let (a, b) = (line[first + mirrored], line[last - mirrored]);

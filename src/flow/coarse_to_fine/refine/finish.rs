@@ -70,7 +70,9 @@ impl<T: SimdReal> Last<'_, T> {
     /// Plane `k` of the plain estimate without the smoothing that is the same everywhere, as far as edge fits do not count: beside a step there is no smooth flow to be restored.
     #[inline(always)]
     fn sharpened<V: Lanes<Scalar = T>>(&self, k: usize, (at, y): (usize, usize), share: V) -> V {
-        let [above, here, below] = [-1, 0, 1].map(|step| self.plain.line(k, y as isize + step));
+        let row = y as isize;
+        // Written out: the optimiser does not inline a closure over the three.
+        let (above, here, below) = (self.plain.line(k, row - 1), self.plain.line(k, row), self.plain.line(k, row + 1));
         let value = V::load(&here[at..]);
         let around =
             V::load(&here[at - 1..]) + V::load(&here[at + 1..]) + V::load(&above[at..]) + V::load(&below[at..]);
