@@ -35,12 +35,14 @@ def test_three_frames_are_four_times_as_accurate(case):
 
 
 @pytest.mark.parametrize("name", ["coarse to fine, balanced, pair", "coarse to fine, balanced"])
-@pytest.mark.parametrize("case", [controlled.Case(64.0, 1.0, 3.0), controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)], ids=str)
-def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(case, name):
-    """Least squares with exact gradients and nothing but noise would have the bound."""
+def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(name):
+    """Least squares with exact gradients and nothing but noise would have the bound; what is asked of the mean is 1.7 times it."""
     ours = contestant(name)
-    _, _, error = ours.errors(case)
-    assert 1.0 < error / ours.bound(case) < 1.7
+    cases = [controlled.Case(64.0, 1.0, 3.0), controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)]
+    ratios = np.array([ours.errors(case)[2] / ours.bound(case) for case in cases])
+    print(f"{name}: {ratios}")
+    assert np.all(ratios > 1.0) and np.all(ratios < 1.75)
+    assert np.exp(np.log(ratios).mean()) < 1.5
 
 
 def test_windows_follow_the_flow(tmp_path):

@@ -35,5 +35,5 @@ pub(super) use run::CoarseToFine;
 /// How far errors of neighbouring estimates from so many frames go together, px: that of wide windows, so that means over regions are not told too well. Those of three frames, whose windows
 /// are chosen once more in what they have made smooth, go together further.
 pub(super) fn correlation_length(frames: usize) -> f64 {
-    if frames == 3 { 20.0 } else { 8.0 }
+    if frames == 3 { 17.0 } else { 8.0 }
 }
