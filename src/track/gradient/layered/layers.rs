@@ -4,14 +4,19 @@
 
 use super::margin::Margin;
 use super::nodes::Places;
+use super::patch::{Patch, bounds_about};
 use super::pose::Pose;
-use crate::image::cubic_at;
+use crate::image::{cubic_at, fill_holes};
 use crate::types::{Frame, TargetBox};
 
 /// Around the box, share of its sides, and least margin, px.
 const MARGIN: (f64, f64) = (0.2, 4.0);
 /// Around the box, nothing is known of the background: share of its sides, and px.
 pub(super) const UNSEEN: (f64, f64) = (0.1, 2.0);
+/// Distance from the box at which the first frame most likely shows what is behind the target, px.
+const BESIDE: f64 = 0.5;
+/// Around what is guessed, what the guess rests on, px.
+const AROUND: f64 = 3.0;
 /// Support from which on a point is the target's.
 pub(super) const CORE: f64 = 0.6;
 /// Distance from the support at which points still count, px of the target.
@@ -158,25 +163,25 @@ impl Background {
         let hidden = grown(bounds, UNSEEN);
         let known = Frame::from_fn(frame.width(), frame.height(), |x, y| !holds(&hidden, x, y));
         let mut this = Self { picture: frame.clone(), known, spare: Vec::new() };
-        this.guess(&hidden);
+        let inside = grown(bounds, (0.0, BESIDE));
+        this.guess(&hidden, |x, y| !holds(&inside, x, y));
         this
     }
 
-    /// Unknown pixels get the mean of the known ones around the box.
-    pub fn guess(&mut self, hidden: &TargetBox) {
-        let around = grown(*hidden, (0.0, 3.0));
-        let pixels = || (0..self.known.height()).flat_map(|y| (0..self.known.width()).map(move |x| (x, y)));
-        let known: Vec<f64> = pixels()
-            .filter(|(x, y)| holds(&around, *x, *y) && self.known.get(*x, *y))
-            .map(|(x, y)| self.picture.get(x, y))
-            .collect();
-        if known.is_empty() {
-            return;
+    /// Pixels in and around a box that are neither known nor `told` get a smooth continuation of those that are.
+    pub fn guess(&mut self, hidden: &TargetBox, told: impl Fn(usize, usize) -> bool) {
+        let reach = [hidden.width, hidden.height].map(|side| 0.5 * side + AROUND);
+        let mut around = Patch::cut(&self.picture, bounds_about(hidden.centre(), reach, self.picture.size()));
+        let [left, top] = around.corner;
+        let (width, height) = around.frame.size();
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            if !self.known.get(left + x, top + y) && !told(left + x, top + y) {
+                around.frame.row_mut(y)[x] = f64::NAN;
+            }
         }
-        let mean = known.iter().sum::<f64>() / known.len() as f64;
-        let unknown: Vec<_> = pixels().filter(|(x, y)| !self.known.get(*x, *y)).collect();
-        for (x, y) in unknown {
-            self.picture.row_mut(y)[x] = mean;
+        let filled = fill_holes(&around.frame, None);
+        for y in 0..height {
+            self.picture.row_mut(top + y)[left..left + width].copy_from_slice(filled.row(y));
         }
     }
 

@@ -20,6 +20,7 @@ mod outline;
 mod outset;
 mod patch;
 mod pose;
+mod refit;
 mod reshaped;
 mod resized;
 mod rest;

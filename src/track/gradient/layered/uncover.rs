@@ -27,8 +27,8 @@ impl Layered {
         let Some(mut outset) = self.outset.take().filter(|_| motion == [0.0; 2]) else { return };
         match outset.tell(frame, self.noise) {
             Some(found) => self.begin_anew(&outset, &found, frame),
-            None => match outset.outgrown(frame, self.noise) {
-                Some(larger) => self.begin_with(&larger, frame, outset.frames()),
+            None => match outset.outgrown(frame, self.noise).or_else(|| outset.refitted(frame, self.noise)) {
+                Some(found) => self.begin_with(&found, frame, outset.frames()),
                 None if outset.is_over() => {}
                 None => self.outset = Some(outset),
             },
@@ -51,11 +51,11 @@ impl Layered {
         self.front = Front::of(outset, &found.hidden);
     }
 
-    /// The first box held only the middle of what moves: all of that is the target.
-    fn begin_with(&mut self, larger: &MovingTarget, frame: &Frame<f64>, frames: usize) {
-        self.target = Target::new(frame, larger.bounds, learn::PRIOR);
-        self.background = Background::new(frame, larger.bounds);
-        self.begin_at(larger.bounds.centre(), larger.displacement, frames);
+    /// The first box was not that of what moves.
+    fn begin_with(&mut self, found: &MovingTarget, frame: &Frame<f64>, frames: usize) {
+        self.target = Target::new(frame, found.bounds, learn::PRIOR);
+        self.background = Background::new(frame, found.bounds);
+        self.begin_at(found.bounds.centre(), found.displacement, frames);
     }
 
     /// Begins at a place that was reached in so many frames, by a displacement in whole pixels.
@@ -128,6 +128,6 @@ impl Background {
                 (self.picture.row_mut(y)[x], self.known.row_mut(y)[x]) = (value, known);
             }
         }
-        self.guess(&now);
+        self.guess(&now, |_, _| false);
     }
 }

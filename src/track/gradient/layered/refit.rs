@@ -1,0 +1,119 @@
+//! A first box that is too large, too wide or beside the target: what moves has another outline.
+//!
+//! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where it has clearly other sides than the box, what the box holds besides stayed where it was and
+//! does not look like the target, and what the box leaves out moved along, it is the target.
+
+use super::layers::{grown, holds};
+use super::outset::{Changes, Outset};
+use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
+use crate::types::{Frame, TargetBox};
+
+/// Frames in which that may be seen: what turns or grows leaves its box later.
+const SOON: usize = 8;
+/// Least and greatest displacement along the axis it is greater on, px.
+const MOVED: [f64; 2] = [2.0, 7.0];
+/// What a side must be off by: share of its length, and px.
+const OFF: (f64, f64) = (0.1, 1.5);
+/// Sides of what moves over those of the box, at least and at most.
+const SIDES: [f64; 2] = [0.55, 1.6];
+/// Distance of the middles of the two, share of the box's sides.
+const ASIDE: f64 = 0.4;
+/// The same, and px, where the box holds all of what moves: of a target that something hides in part the box holds the hidden part, on one side.
+const CENTRED: (f64, f64) = (0.08, 0.75);
+/// Share of the pixels between the two that may not do as they should.
+const STRAYS: f64 = 0.25;
+/// Fewest of them.
+const FEWEST: usize = 12;
+/// Shares of the target's pixels that are darker than its usual range, and not brighter.
+const USUAL: [f64; 2] = [0.1, 0.9];
+
+impl Outset {
+    /// What moved, where that has clearly other sides than the box.
+    pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
+        if self.frames() > SOON {
+            return None;
+        }
+        let changes = self.changes(frame, noise);
+        let corner = self.first.corner.map(|at| at as f64);
+        let centre = self.bounds.centre();
+        let found = detect_moving_target(&self.first.frame, &changes.now, Some([0, 1].map(|k| centre[k] - corner[k])))?;
+        let moved = found.displacement[0].abs().max(found.displacement[1].abs());
+        let first = TargetBox {
+            x: found.bounds.x + corner[0] - found.displacement[0],
+            y: found.bounds.y + corner[1] - found.displacement[1],
+            ..found.bounds
+        };
+        let other = (MOVED[0]..=MOVED[1]).contains(&moved) && is_another(&self.bounds, &first);
+        let bounds = TargetBox { x: first.x + found.displacement[0], y: first.y + found.displacement[1], ..first };
+        let found = MovingTarget { bounds, ..found };
+        (other && changes.are_explained(&first, &found)).then_some(found)
+    }
+}
+
+/// Least and greatest coordinate along both axes.
+fn ends(bounds: &TargetBox) -> [[f64; 2]; 2] {
+    [[bounds.x, bounds.x + bounds.width], [bounds.y, bounds.y + bounds.height]]
+}
+
+/// Whether what moves has clearly other sides than the box, and may still be what the box is about.
+fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
+    let (held, found) = (ends(bounds), ends(first));
+    let mut off = false;
+    let mut within = true;
+    for k in 0..2 {
+        let (side, other) = (held[k][1] - held[k][0], found[k][1] - found[k][0]);
+        let most = (OFF.0 * side).max(OFF.1);
+        off |= (0..2).any(|end| (held[k][end] - found[k][end]).abs() >= most);
+        within &= found[k][0] > held[k][0] - OFF.1 && found[k][1] < held[k][1] + OFF.1;
+        let aside = (0.5 * (held[k][0] + held[k][1] - found[k][0] - found[k][1])).abs();
+        if !(SIDES[0]..SIDES[1]).contains(&(other / side)) || aside > ASIDE * side {
+            return false;
+        }
+    }
+    let centred = (0..2).all(|k| {
+        let side = held[k][1] - held[k][0];
+        (0.5 * (held[k][0] + held[k][1] - found[k][0] - found[k][1])).abs() <= CENTRED.0 * side + CENTRED.1
+    });
+    off && (!within || centred)
+}
+
+impl Changes<'_> {
+    /// Whether what lies in only one of the box and the outline of what moves did as it should: in the box alone it stayed and does not look like the target, in the outline alone it moved along.
+    fn are_explained(&self, first: &TargetBox, found: &MovingTarget) -> bool {
+        let corner = self.outset.first.corner;
+        let d = found.displacement.map(|d| d as isize);
+        let (outline, core, now) =
+            (grown(*first, (0.0, 1.0)), grown(*first, (0.0, -1.0)), grown(found.bounds, (0.0, 1.0)));
+        let usual = self.usual(&core);
+        let (mut counts, mut strays) = ([0; 2], [0; 2]);
+        let (width, height) = self.now.size();
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let at = (x + corner[0], y + corner[1]);
+            let in_box = self.outset.inside.get(x, y);
+            if in_box && !holds(&outline, at.0, at.1) && !holds(&now, at.0, at.1) {
+                counts[0] += 1;
+                let value = self.outset.first.frame.get(x, y);
+                let like = value > usual[0] - self.bar && value < usual[1] + self.bar;
+                let along = self.on([x, y], d).is_none_or(|to| self.along([x, y], to) <= self.bar);
+                strays[0] += usize::from(self.at_rest([x, y]) > self.bar || like && along);
+            } else if !in_box && holds(&core, at.0, at.1) {
+                counts[1] += 1;
+                let along = self.on([x, y], d).is_some_and(|to| self.along([x, y], to) <= self.bar);
+                strays[1] += usize::from(!along);
+            }
+        }
+        counts[0] + counts[1] >= FEWEST && (0..2).all(|k| strays[k] as f64 <= STRAYS * counts[k] as f64)
+    }
+
+    /// Usual range of the brightness in a part of the first frame, grey levels.
+    fn usual(&self, part: &TargetBox) -> [f64; 2] {
+        let corner = self.outset.first.corner;
+        let (width, height) = self.now.size();
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let inside = pixels.filter(|(x, y)| holds(part, x + corner[0], y + corner[1]));
+        let mut values: Vec<f64> = inside.map(|(x, y)| self.outset.first.frame.get(x, y)).collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().saturating_sub(1) as f64;
+        USUAL.map(|share| values.get((share * last).round() as usize).copied().unwrap_or(f64::NAN))
+    }
+}
