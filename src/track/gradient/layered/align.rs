@@ -100,8 +100,8 @@ pub(super) struct Aligned {
     pub moved: Increment,
     /// Covariance of the position in the picture, px^2.
     pub covariance: [[f64; 2]; 2],
-    /// How much of the rotation was told by the picture, 0 to 1.
-    pub rotation_told: f64,
+    /// How much of the rotation was told by the picture, 0 to 1; `None` where it was not asked.
+    pub rotation_told: Option<f64>,
     /// Brightness over that of the template.
     pub gain: f64,
 }
@@ -182,9 +182,10 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Aligned> 
         })
     });
     let rotation_told = match task.freedom {
-        Freedom::Similarity if round => 0.0,
-        Freedom::Similarity => 1.0 - s * s * inverse[(3, 3)] / task.prior[1].powi(2),
-        _ => 1.0,
+        Freedom::Translation => None,
+        Freedom::Similarity if round => Some(0.0),
+        Freedom::Similarity => Some(1.0 - s * s * inverse[(3, 3)] / task.prior[1].powi(2)),
+        Freedom::Affine => Some(1.0),
     };
     Some(Aligned { pose, moved: task.freedom.increment(&total), covariance, rotation_told, gain })
 }

@@ -43,6 +43,8 @@ const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago"
 pub(super) const SEARCHED: &str = "found by looking all around";
 /// Change of size from one frame to the next that a look-alike makes, or cover.
 const GROWN: f64 = 0.04;
+/// Loss of size from one frame to the next that only cover makes.
+const SHRUNK: f64 = 0.1;
 /// Loss of visibility that is one.
 pub(super) const DROP: f64 = 0.08;
 /// Visibility of a target of which nothing is hidden.
@@ -108,7 +110,9 @@ impl Layered {
         let plain = self.try_at(frame, &self.expected(!interrupted), (self.freedom, Silence::None, PRIOR, levels));
         let plain = self.instead_of_astray(frame, plain.as_ref()).or(plain);
         let mut best = plain;
-        let doubted = plain.is_none_or(|found| found.look.visibility < WELL || found.nis > DOUBT);
+        let doubted = plain.is_none_or(|found| {
+            found.look.visibility < WELL || found.nis > DOUBT || self.became_smaller(&found.aligned.pose)
+        });
         let held_back = plain.filter(|plain| self.is_known() && self.may_be_held_back(plain));
         if (doubted || interrupted || held_back.is_some()) && self.is_known() {
             let begun = || held_back.and_then(|plain| self.begun(frame, &plain));
@@ -117,7 +121,9 @@ impl Layered {
         if let Some(plain) = plain.filter(|_| self.age > 0) {
             best = self.reshaped(frame, &plain, levels).or(best);
         }
-        let touched = best.filter(|found| !found.occluded).and_then(|found| self.is_touched(&found));
+        let tells_look_alikes = self.is_known() || self.most_seen > WHOLE;
+        let touched =
+            best.filter(|found| tells_look_alikes && !found.occluded).and_then(|found| self.is_touched(&found));
         if let Some(reason) = touched {
             best = self.touched(frame, levels, reason).or(best);
         }
@@ -135,13 +141,15 @@ impl Layered {
     /// Whether what was found is only what is left of a target that was covered in the frame before: it is seen badly and became smaller, and it is off the way, for the edge of what covers it stands for its own.
     /// Such a target is not seen; its way would end at that edge.
     fn is_a_rest(&self, found: &Finding) -> bool {
-        let badly = found.look.visibility < WELL && found.look.leak < LEAK && self.became_smaller(found);
-        self.hidden && !found.occluded && found.nis > DOUBT && badly
+        let pose = &found.aligned.pose;
+        let off = found.nis > DOUBT && found.look.leak < LEAK && self.became_smaller(pose);
+        let halved = found.nis > SURE && pose.scale() < (1.0 - SHRUNK) * self.pose.scale();
+        self.hidden && !found.occluded && found.look.visibility < WELL && (off || halved)
     }
 
     /// Whether the target is smaller than in the frame before by what cover makes of it.
-    fn became_smaller(&self, found: &Finding) -> bool {
-        found.aligned.pose.scale() < (1.0 - GROWN) * self.pose.scale()
+    pub(super) fn became_smaller(&self, pose: &Pose) -> bool {
+        pose.scale() < (1.0 - GROWN) * self.pose.scale()
     }
 
     /// The target comes out from what hid part of it in the first frame, or goes behind it: its size is that of the first box.
@@ -160,8 +168,9 @@ impl Layered {
         let found = self.try_at(frame, &self.expected(false), how)?;
         let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
         // What is seen as well as ever in a place that nobody expected has made a turn; unless it became smaller at that, as what lies between the bars of a fence.
-        let turned =
-            |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !self.became_smaller(plain);
+        let turned = |plain: &Finding| {
+            plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !self.became_smaller(&plain.aligned.pose)
+        };
         // Nor has one that is where it is expected but for a strip along its side, and would be smaller or less seen elsewhere.
         let begins =
             plain.is_some_and(|plain| plain.nis > DOUBT && !turned(&plain) && self.is_held_back(&found, &plain));

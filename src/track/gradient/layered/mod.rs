@@ -28,6 +28,7 @@ mod scene;
 mod search;
 mod segment;
 mod slanted;
+mod sound;
 mod take;
 mod tell;
 mod uncover;
@@ -43,6 +44,7 @@ use layers::{Background, Target};
 use outset::Outset;
 use pose::{Increment, Pose};
 use rest::Rest;
+use sound::Sound;
 
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 const SURE: f64 = 4.0;
@@ -98,6 +100,8 @@ pub(super) struct Layered {
     adapts_until: usize,
     /// The picture when it last moved, unless it was not seen or the camera moved since.
     resting: Option<Rest>,
+    /// The target when it was last seen whole, unless the camera moved since.
+    sound: Option<Sound>,
     /// What the first box held, until that is told.
     outset: Option<Outset>,
     /// What hid part of it then, as long as it does.
@@ -129,6 +133,7 @@ impl Layered {
         let target = Target::new(&frame, bounds, learn::PRIOR);
         let mut this = Self {
             resting: None,
+            sound: None,
             front: None,
             doubt: [0.0; 2],
             unsettled: [0.0; 2],
@@ -190,7 +195,7 @@ impl Layered {
         self.filter.predict();
         self.look_back(&seen.frame, motion);
         if motion != [0.0; 2] {
-            self.resting = None;
+            (self.resting, self.sound) = (None, None);
         }
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
         let finding = finding.map(|found| self.unless_at_rest(found, &seen.frame));

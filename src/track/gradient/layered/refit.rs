@@ -20,6 +20,10 @@ const SIDES: [f64; 2] = [0.55, 1.6];
 const ASIDE: f64 = 0.4;
 /// The same, and px, where the box holds all of what moves: of a target that something hides in part the box holds the hidden part, on one side.
 const CENTRED: (f64, f64) = (0.08, 0.75);
+/// Width of the rim around what moved in which it must stand out, px.
+const RIM: f64 = 2.0;
+/// Share of the pixels there that may look like it.
+const ALIKE: f64 = 0.35;
 /// Share of the pixels between the two that may not do as they should.
 const STRAYS: f64 = 0.25;
 /// Fewest of them.
@@ -85,24 +89,31 @@ impl Changes<'_> {
         let (outline, core, now) =
             (grown(*first, (0.0, 1.0)), grown(*first, (0.0, -1.0)), grown(found.bounds, (0.0, 1.0)));
         let usual = self.usual(&core);
+        let is_usual = |value: f64| value > usual[0] - self.bar && value < usual[1] + self.bar;
+        let rim = grown(*first, (0.0, 1.0 + RIM));
         let (mut counts, mut strays) = ([0; 2], [0; 2]);
+        let (mut around, mut alike) = (0, 0);
         let (width, height) = self.now.size();
         for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
             let at = (x + corner[0], y + corner[1]);
             let in_box = self.outset.inside.get(x, y);
+            let like = is_usual(self.outset.first.frame.get(x, y));
+            if holds(&rim, at.0, at.1) && !holds(&outline, at.0, at.1) {
+                around += 1;
+                alike += usize::from(like);
+            }
             if in_box && !holds(&outline, at.0, at.1) && !holds(&now, at.0, at.1) {
                 counts[0] += 1;
-                let value = self.outset.first.frame.get(x, y);
-                let like = value > usual[0] - self.bar && value < usual[1] + self.bar;
                 let along = self.on([x, y], d).is_none_or(|to| self.along([x, y], to) <= self.bar);
                 strays[0] += usize::from(self.at_rest([x, y]) > self.bar || like && along);
             } else if !in_box && holds(&core, at.0, at.1) {
                 counts[1] += 1;
                 let along = self.on([x, y], d).is_some_and(|to| self.along([x, y], to) <= self.bar);
-                strays[1] += usize::from(!along);
+                strays[1] += usize::from(!along || !like && self.at_rest([x, y]) <= self.bar);
             }
         }
-        counts[0] + counts[1] >= FEWEST && (0..2).all(|k| strays[k] as f64 <= STRAYS * counts[k] as f64)
+        let stands_out = alike as f64 <= ALIKE * around as f64;
+        stands_out && counts[0] + counts[1] >= FEWEST && (0..2).all(|k| strays[k] as f64 <= STRAYS * counts[k] as f64)
     }
 
     /// Usual range of the brightness in a part of the first frame, grey levels.

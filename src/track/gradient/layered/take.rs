@@ -1,9 +1,9 @@
 //! What a measurement changes of all that is known of the target, and what a frame without one does.
 
-use super::align::Freedom;
 use super::find::{COVERED, DROP, Finding, LEAST, SEARCHED, TOUCHED, WELL, YOUNG};
 use super::look::view;
 use super::pose::Pose;
+use super::sound::DAMPED;
 use super::{Layered, begun, learn, resized};
 use crate::track::gradient::gauss_markov::Measurement;
 use crate::types::Frame;
@@ -31,8 +31,9 @@ impl Layered {
         let Finding { aligned, look, occluded, .. } = *found;
         let interrupted = self.missed > 0 || self.hidden || occluded;
         let mut pose = aligned.pose;
-        self.rotation_told =
-            self.freedom != Freedom::Similarity || aligned.rotation_told >= TOLD || occluded && self.rotation_told;
+        if let Some(told) = aligned.rotation_told {
+            self.rotation_told = told >= TOLD || occluded && self.rotation_told;
+        }
         let at = self.position(&pose);
         if !self.rotation_told && !occluded {
             pose = self.placed(pose.turned_to(self.pose.angle()), at);
@@ -54,13 +55,15 @@ impl Layered {
             self.filter = begun(at);
         }
         if occluded && !self.hidden {
-            self.filter.x.iter_mut().for_each(|x| x[2] *= 0.3);
+            self.filter.x.iter_mut().for_each(|x| x[2] *= DAMPED);
         }
         self.filter.update(&Measurement {
             position: Some((at, variance)),
             velocity: step.map(|step| (step, variance.map(|v| 2.0 * v))),
         });
+        let smaller = self.became_smaller(&pose);
         self.turn_to(&pose);
+        self.remember(found, smaller);
         if interrupted {
             self.rate = [0.0; 6];
         } else {
@@ -119,6 +122,9 @@ impl Layered {
 
     /// No measurement.
     pub(super) fn miss(&mut self) {
+        if self.missed == 0 {
+            self.recall();
+        }
         self.missed += 1;
         self.covered = 0;
         self.before = None;

@@ -15,6 +15,8 @@ use crate::types::{Frame, TargetBox};
 const WHOLE_PIXELS: f64 = 0.5;
 /// Difference of displacements that whole pixels, and what is behind the target, may make, px.
 const WHOLE: f64 = 2.0;
+/// Deviation of the middle of what moved, whose sides are told to a pixel, px.
+const UNSETTLED: f64 = 0.6;
 /// Change in still places that noise does not make, over the noise.
 const STILL: f64 = 4.0;
 
@@ -56,6 +58,8 @@ impl Layered {
         self.target = Target::new(frame, found.bounds, learn::PRIOR);
         self.background = Background::new(frame, found.bounds);
         self.begin_at(found.bounds.centre(), found.displacement, frames);
+        // The sides of what moved are told to a pixel.
+        self.unsettled = [UNSETTLED; 2];
     }
 
     /// Begins at a place that was reached in so many frames, by a displacement in whole pixels.
@@ -69,13 +73,16 @@ impl Layered {
         (self.rate, self.before, self.usual) = ([0.0; 6], None, 1.0);
         (self.missed, self.hidden, self.age, self.most_seen) = (0, false, 0, 0.0);
         (self.turned, self.wary, self.front) = (0.0, 0, None);
-        (self.resting, self.adapts_until) = (None, ADAPTED);
+        (self.resting, self.sound, self.adapts_until) = (None, None, ADAPTED);
+        self.doubt = [0.0; 2];
     }
 
     /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
     pub(super) fn look_at_the_whole_way(&mut self) {
-        let told = self.outset.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
-        let Some((moved, first)) = told else { return self.doubt = [0.0; 2] };
+        // What was doubtful at the end of that time stays so.
+        let Some(outset) = &self.outset else { return };
+        let first = outset.bounds.centre();
+        let Some(moved) = outset.moved() else { return self.doubt = [0.0; 2] };
         let (at, size) = (self.filter.position(), self.target.size);
         // The sides of what grows move otherwise than its middle.
         let grown = (self.pose.scale() - 1.0).abs();
