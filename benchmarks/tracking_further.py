@@ -12,7 +12,7 @@ import tracking_hard_scenes as hard_scenes
 import tracking_scenes as scenes
 from tracking_pictures import Array, Figure
 from tracking_scores import Truth, scores
-from tracking_scenes import TIMES, Plane, Scene, circle, disc, figure, square
+from tracking_scenes import TIMES, Plane, Scene, circle, disc, figure, line, square
 from trackers import Tracker
 
 Row = dict[str, object]
@@ -24,6 +24,9 @@ CONTRAST_KINDS = ("smooth:4,90,10", "smooth:4,90,20", "smooth:4,90,40")
 SEEDS = range(3, 7)
 """Of backgrounds."""
 BEGIN_SEEDS = range(4)
+BAR_SEEDS = range(30, 36)
+BARS = ((200.0, 40.0), (200.0, 90.0), (200.0, 110.0), (200.0, 250.0), (150.0, 40.0), (160.0, 250.0), (140.0, 220.0), (20.0, 90.0), (20.0, 150.0), (20.0, 250.0))
+"""Grey levels of targets and of the bars that they go behind."""
 ASKED_TIMES = {"jacoflow layered": {"5 deg/frame": "<= 1", "level 140, camera pans": "<= 4", "level 140, camera jitter": "<= 4"}, "jacoflow local": {"5 deg/frame": "<= 0.3"}}
 """ms a frame on one thread, by tracker and scene."""
 
@@ -83,6 +86,20 @@ def begin(trackers: list[Tracker]) -> list[Row]:
                 "greatest error over its deviation": float(deviations.max()),
             }
         )
+    return rows
+
+
+def covered(trackers: list[Tracker]) -> list[Row]:
+    """Share of frames found, mean and worst over six backgrounds of two kinds each, of a target that goes behind a bar as in the hard scenes, but for the brightness of both; background of mean 90."""
+    rows: list[Row] = []
+    for level, bar_level in BARS:
+        row: Row = {"target": f"level {level:g}", "bar": f"level {bar_level:g}"}
+        bar = figure(np.full((len(TIMES), 2), (129.5, 127.5)), np.full((len(TIMES), 2), (20.0, 256.0)), bar_level)
+        target = square(line((70.0, 128.0), (2.4, 0.4)), level=level)
+        for tracker in _named(trackers, "layered", "local"):
+            each = [_scores(Scene("bar", (Plane(kind, seed),), target, others=(bar,)), tracker)["success"] for kind in tracking_begin.KINDS for seed in BAR_SEEDS]
+            row[tracker.name] = f"{np.mean(each):.2f} / {min(each):.2f}"
+        rows.append(row)
     return rows
 
 

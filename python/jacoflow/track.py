@@ -274,7 +274,10 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 
     Options are those of `GradientTracker`. The result has T entries.
     """
-    rest = iter(frames)
+    try:
+        rest = iter(frames)
+    except TypeError:
+        raise TypeError(f"frames: expected an array (T, H, W) or an iterable of frames (H, W), got {type(frames).__name__}") from None
     try:
         first = next(rest)
     except StopIteration:

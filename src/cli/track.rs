@@ -12,6 +12,7 @@ use super::report::Report;
 use crate::error::{Error, Result};
 use clap::Args;
 use output::TrackOutputArguments;
+use std::path::Path;
 
 /// Options of `track`.
 #[derive(Debug, Args)]
@@ -52,6 +53,7 @@ pub struct TrackCommand {
 impl TrackCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        self.refuse_the_input_as_output()?;
         if self.output.enlarge > 1 && self.output.overlay.is_none() && self.stereo.disparity_overlay.is_none() {
             return Err(Error::argument(
                 "enlarge",
@@ -63,6 +65,24 @@ impl TrackCommand {
             "stereo" => self.follow_everything(watch),
             _ => self.follow_targets(watch),
         }
+    }
+
+    /// Refuses to replace what is read: not even `--force` is meant for that.
+    fn refuse_the_input_as_output(&self) -> Result<()> {
+        let inputs: Vec<_> = self.input.input.iter().filter_map(|input| Path::new(input).canonicalize().ok()).collect();
+        let outputs = [
+            ("overlay", &self.output.overlay),
+            ("disparity-overlay", &self.stereo.disparity_overlay),
+            ("graph", &self.stereo.graph),
+            ("output", &self.output.output),
+        ];
+        for (option, path) in outputs {
+            let Some(path) = path else { continue };
+            if path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
+                return Err(Error::argument(option, "another place than the input", path.display()));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses an option that belongs to another method.

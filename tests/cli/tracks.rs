@@ -139,6 +139,10 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     place.good(&format!("track s.y4m {BOX} --limit 2 --overlay local --force"));
     assert_eq!(place.names("local"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
     // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
+    let before = std::fs::read(place.path("s.y4m")).unwrap();
+    let onto_itself = place.line(&format!("track s.y4m {BOX} --overlay ./s.y4m --force"));
+    assert!(onto_itself.code == 2 && onto_itself.err.contains("overlay"), "{}", onto_itself.err);
+    assert_eq!(std::fs::read(place.path("s.y4m")).unwrap(), before);
     let film = format!("track s.y4m {BOX} --overlay film.y4m --enlarge 2");
     place.good(&film);
     let again = place.line(&film);

@@ -186,6 +186,8 @@ def test_later_frames_have_the_size_of_the_first():
         tracker.update(FRAME.astype(complex))
     with pytest.raises(ValueError, match="frames"):
         track.track([], (10, 10, 9, 9))
+    with pytest.raises(TypeError, match="frames"):
+        track.track(None, (10, 10, 9, 9))
 
 
 def test_one_step_has_the_published_gain_and_refining_removes_it():

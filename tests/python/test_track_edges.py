@@ -22,15 +22,17 @@ SIMULATION = {scene.name: scene for scene in tracking_scenes.simulations()}
 
 @pytest.mark.parametrize(("right", "down", "larger"), [(2, -2, 1), (-2, 2, 1), (2, 2, 1), (0, 0, 1.4), (0, 0, 0.6), (1, -1, 1.2), (-2, 0, 1.3), (0, 2, 0.7)])
 def test_support_adapts_to_wrong_boxes(right, down, larger):
-    """Box off by 2 px or by 40 % of its size: the target is held all the same, in Simulation 1 on two backgrounds."""
-    for kind in ("smooth:4,90,20", "fractal:1,90,30"):
-        scene = tracking_scenes.simulation(1, kind, 20.0)
-        x, y, w, h = scene.start_box
-        wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
-        found = follow(wrong)
-        # An even target does not tell where in it a smaller box is, until its edges are learnt.
-        assert np.linalg.norm(found.position - scene.centres, axis=1)[1:].max() <= (3.0 if larger >= 1 else 4.0), kind
-        assert success(wrong, found) >= (0.98 if larger >= 1 else 0.8), kind
+    """Box off by 2 px or by 40 % of its size: the target is held all the same, in Simulation 1 on several backgrounds, slow and fast."""
+    for kind in ("flat:90", "smooth:4,90,20", "smooth:2,128,40", "fractal:1,90,30"):
+        for radius in (8.0, 20.0):
+            scene = tracking_scenes.simulation(1, kind, radius, seed=4)
+            x, y, w, h = scene.start_box
+            wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
+            found = follow(wrong)
+            off = np.linalg.norm(found.position - scene.centres, axis=1)
+            # An even target does not tell where in it a smaller box is, until its edges are learnt.
+            assert off[1:].max() <= (3.0 if larger >= 1 else 4.0) and np.median(off[8:]) <= 1.0, (kind, radius)
+            assert success(wrong, found) >= 0.98, (kind, radius)
 
 
 def test_starts_five_px_beside_the_centre_find_the_box():
@@ -83,8 +85,10 @@ def test_stated_deviations_hold_the_centre():
         found = follow(scene)
         deviations = np.sqrt(found.covariance[:, :, 0, 0])
         held.append((np.abs(found.position - scene.centres) < 2 * deviations)[1:].mean())
+        # The specification's range for targets of one size; it says itself that growing ones are told too sure of.
+        assert held[-1] >= 0.92 or scene.name.startswith("S3"), scene.name
         assert deviations[5:].max() <= 0.9 and deviations[10:].max() <= 0.45, scene.name
-    assert np.mean(held) >= 0.85 and np.median(held) >= 0.9
+    assert np.mean(held) >= 0.95
 
 
 def test_a_target_that_stops_is_held_by_the_rule_for_it():

