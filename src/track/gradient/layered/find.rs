@@ -127,7 +127,9 @@ impl Layered {
         if let Some(reason) = touched {
             best = self.touched(frame, levels, reason).or(best);
         }
-        if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded) {
+        // What comes out where it is expected is seen badly at first.
+        let comes_out = |found: &Finding| self.returning > 0 && self.missed == 0 && found.nis < DOUBT;
+        if best.is_none_or(|found| found.look.visibility < BADLY && !found.occluded && !comes_out(&found)) {
             best = self.searched(frame).or(best);
         }
         if let Some(covered) = best.filter(|found| found.occluded) {
@@ -143,8 +145,9 @@ impl Layered {
     fn is_a_rest(&self, found: &Finding) -> bool {
         let pose = &found.aligned.pose;
         let off = found.nis > DOUBT && found.look.leak < LEAK && self.became_smaller(pose);
-        let halved = found.nis > SURE && pose.scale() < (1.0 - SHRUNK) * self.pose.scale();
-        self.hidden && !found.occluded && found.look.visibility < WELL && (off || halved)
+        let shrunk = pose.scale() < (1.0 - SHRUNK) * self.pose.scale();
+        let was_hidden = self.hidden || self.missed > 0;
+        !found.occluded && found.look.visibility < WELL && (self.hidden && off || was_hidden && shrunk)
     }
 
     /// Whether the target is smaller than in the frame before by what cover makes of it.
