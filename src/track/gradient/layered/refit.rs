@@ -12,6 +12,8 @@ use crate::types::{Frame, TargetBox};
 const SOON: usize = 8;
 /// Least and greatest displacement along the axis it is greater on, px.
 const MOVED: [f64; 2] = [2.0, 7.0];
+/// The same as what the box holds tells it, which its other content may blur.
+const NEARLY: [f64; 2] = [1.0, 8.0];
 /// What a side must be off by: share of its length, and px.
 const OFF: (f64, f64) = (0.1, 1.5);
 /// Sides of what moves over those of the box, at least and at most.
@@ -34,24 +36,30 @@ const USUAL: [f64; 2] = [0.1, 0.9];
 impl Outset {
     /// What moved, where that has clearly other sides than the box.
     pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
-        if self.frames() > SOON {
+        // Where what the box holds tells its displacement, that spares looking in vain.
+        let far = self.moved().is_none_or(|moved| (NEARLY[0]..=NEARLY[1]).contains(&greater(moved)));
+        if self.frames() > SOON || !far {
             return None;
         }
         let changes = self.changes(frame, noise);
         let corner = self.first.corner.map(|at| at as f64);
         let centre = self.bounds.centre();
         let found = detect_moving_target(&self.first.frame, &changes.now, Some([0, 1].map(|k| centre[k] - corner[k])))?;
-        let moved = found.displacement[0].abs().max(found.displacement[1].abs());
         let first = TargetBox {
             x: found.bounds.x + corner[0] - found.displacement[0],
             y: found.bounds.y + corner[1] - found.displacement[1],
             ..found.bounds
         };
-        let other = (MOVED[0]..=MOVED[1]).contains(&moved) && is_another(&self.bounds, &first);
+        let other = (MOVED[0]..=MOVED[1]).contains(&greater(found.displacement)) && is_another(&self.bounds, &first);
         let bounds = TargetBox { x: first.x + found.displacement[0], y: first.y + found.displacement[1], ..first };
         let found = MovingTarget { bounds, ..found };
         (other && changes.are_explained(&first, &found)).then_some(found)
     }
+}
+
+/// Displacement along the axis it is greater on, px.
+fn greater(displacement: [f64; 2]) -> f64 {
+    displacement[0].abs().max(displacement[1].abs())
 }
 
 /// Least and greatest coordinate along both axes.
