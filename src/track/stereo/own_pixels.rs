@@ -45,7 +45,7 @@ pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64;
 /// The places among those of a cluster's pixels that show its own surface.
 fn own_places(all: &[[f64; 2]], view: View<'_>) -> Vec<[f64; 2]> {
     let squares = Squares::new(all);
-    let crowds: Vec<usize> = all.iter().map(|&place| squares.crowd(place)).collect();
+    let crowds = squares.crowds(all);
     let mut sorted = crowds.clone();
     sorted.sort_unstable();
     let least = sorted.get(sorted.len() / 2).map_or(0.0, |usual| STRAY * *usual as f64);
@@ -83,6 +83,8 @@ struct Squares<'a> {
     first: [i64; 2],
     size: [i64; 2],
     places: Vec<Vec<&'a [f64; 2]>>,
+    /// Steps to the squares of a neighbourhood, nearest rings first: most pixels are among others, and the nearest ones say so.
+    rings: Vec<[i64; 2]>,
 }
 
 impl<'a> Squares<'a> {
@@ -93,7 +95,10 @@ impl<'a> Squares<'a> {
             (first, along().max().unwrap_or(0) - first + 1)
         };
         let ((left, width), (top, height)) = (bounds(0), bounds(1));
-        let mut squares = Self { first: [left, top], size: [width, height], places: vec![] };
+        let mut rings: Vec<[i64; 2]> =
+            (-RINGS..=RINGS).flat_map(|dy| (-RINGS..=RINGS).map(move |dx| [dx, dy])).collect();
+        rings.sort_by_key(|[dx, dy]| dx.abs().max(dy.abs()));
+        let mut squares = Self { first: [left, top], size: [width, height], places: vec![], rings };
         squares.places.resize((width * height) as usize, vec![]);
         for place in all {
             if let Some(index) = squares.index(square_of(place[0]), square_of(place[1])) {
@@ -109,30 +114,24 @@ impl<'a> Squares<'a> {
         inside.then_some((row * self.size[0] + column) as usize)
     }
 
-    /// The squares of a place's neighbourhood, nearest rings first.
-    fn about(&self, [x, y]: [f64; 2]) -> impl Iterator<Item = &Vec<&'a [f64; 2]>> {
-        let (column, row) = (square_of(x), square_of(y));
-        let ring = |ring: i64| {
-            let span = move || -ring..=ring;
-            span()
-                .flat_map(move |dy| span().map(move |dx| (dx, dy)))
-                .filter(move |(dx, dy)| dx.abs().max(dy.abs()) == ring)
-        };
-        (0..=RINGS)
-            .flat_map(ring)
-            .filter_map(move |(dx, dy)| self.index(column + dx, row + dy))
-            .map(|index| &self.places[index])
+    /// Squares about one, nearest rings first.
+    fn about(&self, column: i64, row: i64) -> impl Iterator<Item = &Vec<&'a [f64; 2]>> {
+        let square = move |[dx, dy]: &[i64; 2]| self.index(column + dx, row + dy);
+        self.rings.iter().filter_map(square).map(|index| &self.places[index])
     }
 
-    /// How many places are about one.
-    fn crowd(&self, place: [f64; 2]) -> usize {
-        self.about(place).map(Vec::len).sum()
+    /// How many places are about each one of all.
+    fn crowds(&self, all: &[[f64; 2]]) -> Vec<usize> {
+        let [left, top] = self.first;
+        let crowd = |i: i64| self.about(left + i % self.size[0], top + i / self.size[0]).map(Vec::len).sum();
+        let crowds: Vec<usize> = (0..self.size[0] * self.size[1]).map(crowd).collect();
+        all.iter().filter_map(|place| self.index(square_of(place[0]), square_of(place[1]))).map(|i| crowds[i]).collect()
     }
 
     /// On which side of the edge at a place with a unit normal all the cluster's others are, 1 or -1 along the normal; `None` where they are on both, or too few.
     fn only_side(&self, [x, y]: [f64; 2], normal: [f64; 2]) -> Option<f64> {
         let mut counts = [0, 0];
-        for other in self.about([x, y]).flatten() {
+        for other in self.about(square_of(x), square_of(y)).flatten() {
             let (dx, dy) = (other[0] - x, other[1] - y);
             let (from, along) = (dx * normal[0] + dy * normal[1], dy * normal[0] - dx * normal[1]);
             let aside = from.abs() > ON_EDGE && along.abs() <= ALONG * from.abs();
