@@ -59,6 +59,7 @@ impl Given {
         let Some(mode) = StereoMode::ALL.into_iter().find(|mode| mode.name() == self.mode) else {
             return Err(Error::argument("mode", "\"improved\" or \"paper\"", format!("{:?}", self.mode)).into());
         };
+        let camera = self.camera()?;
         let mut options = StereoTrackerOptions::new(mode);
         options.tol = match self.tol {
             Tolerance::Number(tol) => tol,
@@ -107,7 +108,7 @@ impl Given {
         let (reach, motion, depth_motion) = self.group_limits;
         options.grouping =
             self.grouping.unwrap_or(options.grouping.is_some()).then_some(Grouping { reach, motion, depth_motion });
-        options.camera = self.camera()?;
+        options.camera = camera;
         options.step_time = self.step_time;
         options.threads = Threads::new(self.threads)?;
         Ok(options)
