@@ -43,7 +43,7 @@ class StereoCluster:
     next_velocity: Array
     """Motion (u, v, w) to the next step, (3,), px/step and disparity/step, at `middle` and in depth the robust mean; known in the graph one step later, NaN before."""
     middle: Array
-    """Medians of its pixels along x and y, (2,), px."""
+    """Medians along x and y, (2,), px, of its pixels; in "improved" of those that show its own surface, neither strays nor those of its outline that lie beyond it: so `velocity` is the median of the affine motion over these."""
     affine: Array
     """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at `middle`, (6,), px/step and 1/step ("improved")."""
     next_affine: Array

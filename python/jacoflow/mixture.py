@@ -71,9 +71,9 @@ class VariationalGaussianMixture(_Base):
     n_components : int
         K, the most components there may be, up to 65536 (no unit).
     weight_concentration_prior : float
-        `alpha0` of the Dirichlet prior, above 0, at most 1e100, no unit.
+        `alpha0` of the Dirichlet prior, from 1e-100 to 1e100, no unit.
     mean_precision_prior : float
-        `beta0`, precision of the means over that of the points, above 0, at most 1e100, no unit.
+        `beta0`, precision of the means over that of the points, from 1e-100 to 1e100, no unit.
     mean_prior : array (D,), units of X
         `m0`; default: the weighted mean.
     degrees_of_freedom_prior : float
@@ -87,7 +87,7 @@ class VariationalGaussianMixture(_Base):
     n_init : int
         Fits from different seeds, of which the one with the greatest lower bound is kept.
     init : "kmeans++" or "random"
-        First responsibilities: clusters of weighted k-means, or random numbers.
+        First responsibilities: clusters of weighted k-means, or random numbers. These are drawn row by row, so that another order of the points, or a point twice in place of one of twice the weight, is another start; from k-means++ it is the same one.
     prune_weight : float
         Components with less weight of points than this are left out by `fit` and by the first `partial_fit`; 0: none.
     warm_start : bool
@@ -243,8 +243,8 @@ class VariationalGaussianMixture(_Base):
         """Mean of `score_samples` over points (N, D) with weights (N,)."""
         _warn_of(y, sample_weight)
         scores, weights = self.score_samples(X), _weights(sample_weight)
-        if weights is not None and (weights.shape != scores.shape or not np.isfinite(weights).all() or (weights < 0).any() or weights.sum() <= 0):
-            raise ValueError(f"sample_weight: expected {len(scores)} finite weights that are not negative nor all zero, got shape {weights.shape}")
+        if weights is not None:
+            _check_weights(weights, len(scores))
         return float(np.average(scores, weights=weights))
 
     def __sklearn_is_fitted__(self) -> bool:
@@ -338,7 +338,10 @@ def _reals(name: str, values: ArrayLike) -> Array:
         raise TypeError(f"{name}: sparse data was passed, but dense data is required. Use '.toarray()' to convert to a dense numpy array.")
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError(f"{name}: expected a plain array, got a masked one; leave masked points out, or give them no weight")
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected numbers, rows of one length: {error}") from error
     if array.dtype.kind in "mM":
         raise TypeError(f"{name}: expected real numbers, got {array.dtype}")
     if array.dtype.kind == "c":
@@ -351,6 +354,17 @@ def _reals(name: str, values: ArrayLike) -> Array:
 
 def _weights(sample_weight: ArrayLike | None) -> Array | None:
     return None if sample_weight is None else _reals("sample_weight", sample_weight)
+
+
+def _check_weights(weights: Array, count: int) -> None:
+    """ValueError naming what is wrong with the weights of so many points."""
+    expected = f"sample_weight: expected {count} finite weights that are not negative nor all zero, got"
+    if weights.shape != (count,):
+        raise ValueError(f"{expected} shape {weights.shape}")
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise ValueError(f"{expected} {weights[~(np.isfinite(weights) & (weights >= 0))][0]}")
+    if not weights.any():
+        raise ValueError(f"{expected} all zero")
 
 
 def _demand(name: str, value: object, kind: type, words: str) -> None:

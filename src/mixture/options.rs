@@ -7,6 +7,8 @@ use crate::parallel::Threads;
 const MOST_COMPONENTS: usize = 1 << 16;
 /// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers any more.
 const MOST_PRIOR: f64 = 1e100;
+/// And of fewer, the bound is none any more.
+const LEAST_PRIOR: f64 = 1e-100;
 
 /// Where the inverse scale matrix of the Wishart prior, `W0^-1` (D, D), comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,8 +106,9 @@ impl MixtureOptions {
             ("mean_precision_prior", self.mean_precision_prior),
         ] {
             positive(name, value)?;
-            if value > MOST_PRIOR {
-                return Err(Error::argument(name, format!("a positive number up to {MOST_PRIOR:e}"), value));
+            if !(LEAST_PRIOR..=MOST_PRIOR).contains(&value) {
+                let expected = format!("a positive number from {LEAST_PRIOR:e} to {MOST_PRIOR:e}");
+                return Err(Error::argument(name, expected, format!("{value:e}")));
             }
         }
         for (name, value) in [("tol", self.tol.unwrap_or(0.0)), ("prune_weight", self.prune_weight)] {

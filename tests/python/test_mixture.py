@@ -316,6 +316,20 @@ def test_scores_check_their_weights(weights):
         VariationalGaussianMixture(2, random_state=0).fit(x).score(x, sample_weight=weights)
 
 
+def test_refusals_say_what_is_wrong():
+    x = np.random.default_rng(0).normal(size=(50, 2))
+    mixture = VariationalGaussianMixture(2, random_state=0).fit(x)
+    for weights, named in [(np.zeros(50), "all zero"), (np.ones(49), "shape \\(49,\\)"), (np.full(50, -1.0), "-1"), (np.full(50, np.nan), "nan")]:
+        with pytest.raises(ValueError, match=f"^sample_weight: .*got {named}"):
+            mixture.score(x, sample_weight=weights)
+    with pytest.raises(ValueError, match="^X: .*one length"):
+        mixture.fit([[1.0, 2.0], [3.0]])
+    for name in ("mean_precision_prior", "weight_concentration_prior"):
+        with pytest.raises(ValueError, match=f"^{name}: .*1e-100"):
+            VariationalGaussianMixture(2, **{name: 5e-324}).fit(x)
+        assert np.isfinite(VariationalGaussianMixture(2, random_state=0, **{name: 1e-100}).fit(x).lower_bound_)
+
+
 def test_scikit_learns_conventions():
     mixture = VariationalGaussianMixture(3, tol=1e-3, random_state=1)
     assert clone(mixture).get_params() == mixture.get_params()

@@ -324,8 +324,9 @@ def test_known_cameras_give_depth_and_speed():
     assert np.isnan(biggest(followed()[1], 5).depth)
     with pytest.raises(ValueError, match="baseline"):
         StereoTracker(focal=100.0)
-    with pytest.raises(ValueError, match="focal"):
-        StereoTracker(focal=-1.0, baseline=1.0)
+    for given, named in [({"focal": -1.0, "baseline": 1.0}, "focal"), ({"focal": -1.0}, "focal"), ({"focal": np.nan}, "focal"), ({"baseline": 0.0}, "baseline"), ({"d_infinity": np.nan}, "d_infinity")]:
+        with pytest.raises(ValueError, match=f"^{named}: .*(above 0|disparity)"):
+            StereoTracker(**given)
 
 
 def leaving(steps=9):

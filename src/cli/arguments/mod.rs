@@ -41,8 +41,11 @@ pub fn parse_pair(text: &str) -> Result<(f64, f64), String> {
 /// Two whole numbers `A,B`, the lesser first.
 pub fn parse_range(text: &str) -> Result<(i32, i32), String> {
     let ends = text.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
-    ends.filter(|(least, greatest)| least <= greatest)
-        .ok_or_else(|| "expected LEAST,GREATEST, two whole numbers".into())
+    match ends {
+        Some((least, greatest)) if least > greatest => Err(format!("expected the least first, {greatest},{least}")),
+        Some(ends) => Ok(ends),
+        None => Err("expected LEAST,GREATEST, two whole numbers".into()),
+    }
 }
 
 /// A positive finite number.
@@ -77,7 +80,8 @@ mod tests {
     #[test]
     fn ranges_are_two_whole_numbers_in_order() {
         assert_eq!(parse_range("-40, 24"), Ok((-40, 24)));
-        assert!(parse_range("3,2").is_err() && parse_range("3").is_err() && parse_range("1.5,2").is_err());
+        assert!(parse_range("3,2").is_err_and(|told| told.contains("2,3")));
+        assert!(parse_range("3").is_err() && parse_range("1.5,2").is_err());
     }
 
     #[test]

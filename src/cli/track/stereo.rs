@@ -22,6 +22,9 @@ impl TrackCommand {
     /// Runs the command with the stereo tracker.
     pub(super) fn follow_everything(&self, watch: &Watch) -> Result<Report> {
         self.refuse(self.targets.given().or(self.tracker.given()), "gradient")?;
+        if let Some(limit) = self.input.selection.limit.filter(|limit| *limit < 2) {
+            return Err(Error::argument("limit", "at least 2 pairs of views to track through", limit));
+        }
         let threads = Threads::new(self.threads.threads)?;
         let options = self.stereo.options(self.tracker.stereo_mode()?, threads)?;
         let pictures = self.pictures(&options);

@@ -59,6 +59,7 @@ impl Given {
         let Some(mode) = StereoMode::ALL.into_iter().find(|mode| mode.name() == self.mode) else {
             return Err(Error::argument("mode", "\"improved\" or \"paper\"", format!("{:?}", self.mode)).into());
         };
+        let camera = self.camera()?;
         let mut options = StereoTrackerOptions::new(mode);
         options.tol = match self.tol {
             Tolerance::Number(tol) => tol,
@@ -107,18 +108,21 @@ impl Given {
         let (reach, motion, depth_motion) = self.group_limits;
         options.grouping =
             self.grouping.unwrap_or(options.grouping.is_some()).then_some(Grouping { reach, motion, depth_motion });
-        options.camera = match (self.focal, self.baseline) {
-            (Some(focal), Some(baseline)) => Some(StereoCamera { focal, baseline, d_infinity: self.d_infinity }),
-            (None, None) => None,
-            (None, Some(_)) => {
-                return Err(Error::argument("focal", "a length in px beside the baseline", "None").into());
-            }
-            (Some(_), None) => {
-                return Err(Error::argument("baseline", "a length beside the focal length", "None").into());
-            }
-        };
+        options.camera = camera;
         options.step_time = self.step_time;
         options.threads = Threads::new(self.threads)?;
         Ok(options)
+    }
+    /// The cameras, where both lengths were given; what was given of them is checked first.
+    fn camera(&self) -> PyResult<Option<StereoCamera>> {
+        let (focal, baseline) = (self.focal.unwrap_or(1.0), self.baseline.unwrap_or(1.0));
+        let camera = StereoCamera { focal, baseline, d_infinity: self.d_infinity };
+        camera.check()?;
+        match (self.focal, self.baseline) {
+            (Some(_), Some(_)) => Ok(Some(camera)),
+            (None, None) => Ok(None),
+            (None, Some(_)) => Err(Error::argument("focal", "a length in px beside the baseline", "None").into()),
+            (Some(_), None) => Err(Error::argument("baseline", "a length beside the focal length", "None").into()),
+        }
     }
 }

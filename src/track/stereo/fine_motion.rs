@@ -13,6 +13,13 @@ pub(super) struct FineMotion {
 }
 
 impl FineMotion {
+    /// The motion in the picture as `(u, v, u_x, v_x, u_y, v_y)` at a place of the step that it begins with.
+    pub fn affine_at(&self, [x, y]: [f64; 2]) -> [f64; 6] {
+        let PlaneMotion { flow, centre, .. } = self.plane;
+        let (u, v) = flow.at_offset(x - centre[0], y - centre[1]);
+        AffineFlow { u, v, ..flow }.to_array()
+    }
+
     /// `(u, v, w)` at the centre, px and disparity: medians of the pixels along x and y, which stray pixels hardly move.
     pub fn at_centre(&self) -> [f64; 3] {
         [self.plane.flow.u, self.plane.flow.v, self.depth]

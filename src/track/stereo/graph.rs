@@ -27,7 +27,7 @@ pub struct Node {
     pub velocity: Option<[f64; 3]>,
     /// Motion `(u, v, w)` to the next step, medians over its pixels, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
-    /// Medians of its pixels along x and y, px.
+    /// Medians of its pixels along x and y, px; in the improved mode of those that show its own surface, neither strays nor those of its outline that are beyond it.
     pub middle: [f64; 2],
     /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle.
     pub affine: Option<[f64; 6]>,

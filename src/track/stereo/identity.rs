@@ -43,8 +43,8 @@ const AS_THICK: (f64, f64) = (2.0, 0.5);
 const AS_LARGE: f64 = 1.5;
 /// Half the extent of something even, over its median deviation.
 const HALF_EXTENT: f64 = 2.0;
-/// What the memory of the most pixels keeps for each ordinary step.
-const FORGET: f64 = 0.9;
+/// What the memory of the most pixels keeps for each ordinary step: little enough to forget what shrinks as it goes away, and so much that what is being covered over several steps is not taken for that.
+const FORGET: f64 = 0.95;
 
 /// Times differ by more than this, ordinary steps, unless they are the same one summed up otherwise.
 const SAME_TIME: f64 = 1e-6;

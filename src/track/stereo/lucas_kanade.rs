@@ -54,6 +54,11 @@ impl SmoothedLevels {
         Self(self.0.each_ref().map(|frame| exposure.applied(frame)))
     }
 
+    /// The frame with all its edges, as at the finest level.
+    pub fn sharpest(&self) -> &Frame<f32> {
+        &self.0[FINE]
+    }
+
     /// The frame with what noise there is averaged out, but not yet the edges.
     pub fn smooth(&self) -> &Frame<f32> {
         &self.0[FINE - 1]

@@ -21,6 +21,7 @@ mod moment;
 mod motion;
 mod options;
 mod overlap;
+mod own_pixels;
 mod settings;
 mod step;
 mod succession;

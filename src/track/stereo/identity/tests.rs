@@ -200,3 +200,21 @@ fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
     all.name_all(late(2.5, 2.5), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [15.0, 10.0, 30.0]);
 }
+
+#[test]
+fn what_is_covered_little_by_little_comes_to_light_on_the_other_side_as_itself() {
+    let limits = Recognition::default();
+    let mut all = identities();
+    let moved =
+        |all: &mut Identities, component| all.carry(component, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+    // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole being at 20.
+    for (time, x, pixels) in [(1, 12.0, 100), (2, 13.5, 85), (3, 14.0, 70), (4, 13.5, 35)] {
+        moved(&mut all, 0);
+        all.name_all(Moment::at(time), &[Sighting { pixels, ..at(0, [x, 10.0, 30.0]) }], LEAST, Some(&limits));
+    }
+    moved(&mut all, 0);
+    let left = Sighting { pixels: 6, ..at(0, [13.0, 10.0, 30.0]) };
+    let right = Sighting { pixels: 25, ..at(2, [24.2, 10.0, 30.0]) };
+    all.name_all(Moment::at(5), &[left, right], LEAST, Some(&limits));
+    assert_eq!(all.live[2].as_ref().unwrap().id, 0);
+}

@@ -66,15 +66,23 @@ impl StereoTrackerOptions {
         if !STEP_TIMES.contains(&self.step_time) {
             return Err(Error::argument("step_time", "a time above 0, from 1e-12 to 1e12", self.step_time));
         }
-        if let Some(StereoCamera { focal, baseline, d_infinity }) = self.camera {
-            for (name, value) in [("focal", focal), ("baseline", baseline)] {
-                if !(value > 0.0 && value.is_finite()) {
-                    return Err(Error::argument(name, "a length above 0", value));
-                }
+        self.camera.map_or(Ok(()), |camera| camera.check())
+    }
+}
+
+impl StereoCamera {
+    /// Checks what is told of the cameras.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the field.
+    pub fn check(&self) -> Result<()> {
+        for (name, value) in [("focal", self.focal), ("baseline", self.baseline)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::argument(name, "a length above 0", value));
             }
-            if !d_infinity.is_finite() {
-                return Err(Error::argument("d_infinity", "a disparity, px", d_infinity));
-            }
+        }
+        if !self.d_infinity.is_finite() {
+            return Err(Error::argument("d_infinity", "a disparity, px", self.d_infinity));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::super::cell_luminance::CellLuminance;
 use super::super::clusters::Clusters;
-use super::super::fine_motion::{places, voxel_motion};
+use super::super::fine_motion::{FineMotion, places, voxel_motion};
 use super::super::grouping::{GroupMotion, groups};
 use super::super::identity::Carried;
 use super::super::lucas_kanade::{SmoothedLevels, middle};
@@ -10,6 +10,7 @@ use super::super::measured_motion::NextView;
 use super::super::motion::{CellMotion, Seen, cell_motions};
 use super::super::options::Grouping;
 use super::super::overlap::Row;
+use super::super::own_pixels::{View, own_middle};
 use super::super::step::Step;
 use super::super::voxels::{EdgePoints, Voxels};
 use super::super::warm_start::{is_left_over, moved};
@@ -20,6 +21,7 @@ use super::record::{Arrival, Departure};
 use crate::error::Result;
 use crate::mixture::Posterior;
 use crate::types::Frame;
+use rayon::prelude::*;
 
 impl StereoTracker {
     /// The paper's step: a new mixture, matching and overlaps forwards and backwards (sections 2.5 to 2.8).
@@ -59,7 +61,8 @@ impl StereoTracker {
         let arcs = arcs(self.time, &rows(forward), &rows(backward));
         self.name_by_arcs(&seen.clusters, &arcs);
         let grouped: Vec<usize> = (0..seen.clusters.components()).collect();
-        let step = self.record(&seen.clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
+        let middles: Vec<_> = (0..seen.clusters.components()).map(|k| middle(&places(&seen.clusters, k))).collect();
+        let step = self.record(&seen.clusters, posterior.as_ref(), rounds, (&arrivals, &middles), &grouped);
         self.connect(&departures, arcs)?;
         Ok((step, seen, posterior))
     }
@@ -110,10 +113,12 @@ impl StereoTracker {
         };
         let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
         self.name_by_components(&clusters, &lost);
+        let shown = View { plain: left, smooth: levels.sharpest() };
+        let middles: Vec<[f64; 2]> = (0..components).into_par_iter().map(|k| own_middle(&clusters, k, shown)).collect();
         let arrivals: Vec<Arrival> = (0..components)
             .map(|k| match own(k) {
                 Some((motion, Carried { coasting, .. })) => {
-                    let affine = motion.affine_after(middle(&places(&clusters, k)));
+                    let affine = motion.affine_after(middles[k]);
                     Arrival {
                         motion: Some([affine[0], affine[1], motion.depth]),
                         affine: Some(affine),
@@ -146,19 +151,18 @@ impl StereoTracker {
             }
             None => (0..components).collect(),
         };
-        let step = self.record(&clusters, posterior.as_ref(), rounds, &arrivals, &grouped);
-        let departures: Vec<_> = motions
-            .iter()
-            .map(|motion| {
-                motion.map(|(motion, _)| Departure {
-                    motion: motion.at_centre(),
-                    affine: Some(motion.plane.flow.to_array()),
-                })
-            })
-            .collect();
+        let step = self.record(&clusters, posterior.as_ref(), rounds, (&arrivals, &middles), &grouped);
+        let departures: Vec<_> =
+            motions.iter().enumerate().map(|(k, motion)| self.departure(k, motion.as_ref()?.0)).collect();
         let arcs = arcs(self.time, &forward, &backward);
         self.connect(&departures, arcs)?;
         Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
+    }
+
+    /// How a cluster of the last step goes on, told of its middle.
+    fn departure(&self, k: usize, motion: FineMotion) -> Option<Departure> {
+        let affine = motion.affine_at(self.graph.node(self.time.checked_sub(1)?, k)?.middle);
+        Some(Departure { motion: [affine[0], affine[1], motion.depth], affine: Some(affine) })
     }
 
     fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {

@@ -1,10 +1,8 @@
 //! Names, graph and tracks: what is kept of a step.
 
 use super::super::clusters::Clusters;
-use super::super::fine_motion::places;
 use super::super::graph::{Arc, Node};
 use super::super::identity::Sighting;
-use super::super::lucas_kanade::middle;
 use super::super::step::Step;
 use super::StereoTracker;
 use crate::error::Result;
@@ -68,13 +66,13 @@ impl StereoTracker {
         self.identities.name_all(self.moment, &seen, self.options.reseed_below, limits);
     }
 
-    /// Puts the clusters into the graph and the tracks, and tells of them.
+    /// Puts the clusters into the graph and the tracks, and tells of them: how each came and where the middle of its pixels is, px.
     pub(super) fn record(
         &mut self,
         clusters: &Clusters,
         posterior: Option<&Posterior>,
         rounds: usize,
-        arrivals: &[Arrival],
+        (arrivals, middles): (&[Arrival], &[[f64; 2]]),
         grouped: &[usize],
     ) -> Step {
         let lattice = *clusters.lattice();
@@ -100,7 +98,7 @@ impl StereoTracker {
                 covariance: covariance(posterior, k, lattice.cell()),
                 velocity: arrival.motion.map(|motion| self.moment.velocity(motion)),
                 next_velocity: None,
-                middle: middle(&places(clusters, k)),
+                middle: middles[k],
                 affine: arrival.affine.map(|affine| self.moment.velocity(affine)),
                 next_affine: None,
                 residual: arrival.residual,

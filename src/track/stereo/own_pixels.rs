@@ -1,0 +1,195 @@
+//! Which pixels of a cluster show its own surface.
+//!
+//! An edge is located to a pixel: along the outline of a thing half of its edge pixels lie just beyond the line, on what is behind it, and which half differs from side to side. They move with the thing, and have
+//! its disparity, but medians over the cluster's pixels shift by rows where they are many on one side; of what grows or shrinks the motion there is another. A pixel shows what it has the brightness of.
+
+use super::clusters::Clusters;
+use super::fine_motion::places;
+use super::lucas_kanade::middle;
+use crate::image::Interpolation;
+use crate::types::Frame;
+
+/// Side of the squares that pixels are sorted into, px.
+const SQUARE: f64 = 8.0;
+/// How many squares about its own belong to a pixel's neighbourhood on every side.
+const RINGS: i64 = 3;
+/// Radius of the neighbourhood, px.
+const RADIUS: f64 = SQUARE * RINGS as f64;
+/// Farther along the gradient than this, px, a neighbour is on one side of the edge and not on it.
+const ON_EDGE: f64 = 2.0;
+/// Farther along the edge than so many times the distance from it, a neighbour may be on it as well: the gradient is not known better.
+const ALONG: f64 = 2.5;
+/// Neighbours that make a side of an edge one that the cluster is on.
+const LEAST_NEIGHBOURS: usize = 3;
+/// Distances, px, at which the brightness on both sides of an edge is taken.
+const SIDES: [f64; 3] = [2.0, 2.5, 3.0];
+/// Least share of the way from the brightness beyond an edge to that before it of a pixel that is before it: half, and what makes those exactly on the line, which are on neither side, not go by the noise.
+const BEFORE: f64 = 0.55;
+/// Share of the neighbours of pixels in general below which a pixel is a stray one.
+const STRAY: f64 = 0.1;
+
+/// A view: as it is, and with so little smoothing that its gradient is told.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub plain: &'a Frame<f32>,
+    pub smooth: &'a Frame<f32>,
+}
+
+/// Medians along x and y, px, of the pixels of a cluster that show its own surface: neither stray ones, nor those of its outline that are beyond it. Of all where hardly half would be left.
+pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64; 2] {
+    let all = places(clusters, k);
+    let own = own_places(&all, view);
+    middle(if 2 * own.len() > all.len() { &own } else { &all })
+}
+
+/// The places among those of a cluster's pixels that show its own surface.
+fn own_places(all: &[[f64; 2]], view: View<'_>) -> Vec<[f64; 2]> {
+    let squares = Squares::new(all);
+    let crowds = squares.crowds(all);
+    let mut sorted = crowds.clone();
+    sorted.sort_unstable();
+    let least = sorted.get(sorted.len() / 2).map_or(0.0, |usual| STRAY * *usual as f64);
+    let own = |&(&place, &crowd): &(&[f64; 2], &usize)| crowd as f64 >= least && !is_beyond(place, &squares, view);
+    all.iter().zip(&crowds).filter(own).map(|(place, _)| *place).collect()
+}
+
+/// Whether a pixel is of the cluster's outline and has the brightness of what is beyond.
+fn is_beyond([x, y]: [f64; 2], squares: &Squares<'_>, view: View<'_>) -> bool {
+    let Some(normal) = direction(view.smooth, x as usize, y as usize) else { return false };
+    let Some(sign) = squares.only_side([x, y], normal) else { return false };
+    let at = |distance: f64| {
+        let along = sign * distance;
+        f64::from(Interpolation::Bilinear.at(view.plain, x + along * normal[0], y + along * normal[1]))
+    };
+    let mean = |sign: f64| SIDES.iter().map(|distance| at(sign * distance)).sum::<f64>() / SIDES.len() as f64;
+    let (before, beyond) = (mean(1.0), mean(-1.0));
+    let contrast = before - beyond;
+    (at(0.0) - beyond) * contrast < BEFORE * contrast * contrast
+}
+
+/// Direction of the gradient at a pixel; `None` beside the border and where there is none.
+fn direction(frame: &Frame<f32>, x: usize, y: usize) -> Option<[f64; 2]> {
+    if x == 0 || y == 0 || x + 1 >= frame.width() || y + 1 >= frame.height() {
+        return None;
+    }
+    let along_x = f64::from(frame.get(x + 1, y) - frame.get(x - 1, y));
+    let along_y = f64::from(frame.get(x, y + 1) - frame.get(x, y - 1));
+    let size = along_x.hypot(along_y);
+    (size > 0.0 && size.is_finite()).then(|| [along_x / size, along_y / size])
+}
+
+/// Places by the square of the picture that they are in.
+struct Squares<'a> {
+    first: [i64; 2],
+    size: [i64; 2],
+    places: Vec<Vec<&'a [f64; 2]>>,
+    /// Steps to the squares of a neighbourhood, nearest rings first: most pixels are among others, and the nearest ones say so.
+    rings: Vec<[i64; 2]>,
+}
+
+impl<'a> Squares<'a> {
+    fn new(all: &'a [[f64; 2]]) -> Self {
+        let bounds = |i: usize| {
+            let along = || all.iter().map(|place| square_of(place[i]));
+            let first = along().min().unwrap_or(0);
+            (first, along().max().unwrap_or(0) - first + 1)
+        };
+        let ((left, width), (top, height)) = (bounds(0), bounds(1));
+        let mut rings: Vec<[i64; 2]> =
+            (-RINGS..=RINGS).flat_map(|dy| (-RINGS..=RINGS).map(move |dx| [dx, dy])).collect();
+        rings.sort_by_key(|[dx, dy]| dx.abs().max(dy.abs()));
+        let mut squares = Self { first: [left, top], size: [width, height], places: vec![], rings };
+        squares.places.resize((width * height) as usize, vec![]);
+        for place in all {
+            if let Some(index) = squares.index(square_of(place[0]), square_of(place[1])) {
+                squares.places[index].push(place);
+            }
+        }
+        squares
+    }
+
+    fn index(&self, column: i64, row: i64) -> Option<usize> {
+        let (column, row) = (column - self.first[0], row - self.first[1]);
+        let inside = (0..self.size[0]).contains(&column) && (0..self.size[1]).contains(&row);
+        inside.then_some((row * self.size[0] + column) as usize)
+    }
+
+    /// Squares about one, nearest rings first.
+    fn about(&self, column: i64, row: i64) -> impl Iterator<Item = &Vec<&'a [f64; 2]>> {
+        let square = move |[dx, dy]: &[i64; 2]| self.index(column + dx, row + dy);
+        self.rings.iter().filter_map(square).map(|index| &self.places[index])
+    }
+
+    /// How many places are about each one of all.
+    fn crowds(&self, all: &[[f64; 2]]) -> Vec<usize> {
+        let [left, top] = self.first;
+        let crowd = |i: i64| self.about(left + i % self.size[0], top + i / self.size[0]).map(Vec::len).sum();
+        let crowds: Vec<usize> = (0..self.size[0] * self.size[1]).map(crowd).collect();
+        all.iter().filter_map(|place| self.index(square_of(place[0]), square_of(place[1]))).map(|i| crowds[i]).collect()
+    }
+
+    /// On which side of the edge at a place with a unit normal all the cluster's others are, 1 or -1 along the normal; `None` where they are on both, or too few.
+    fn only_side(&self, [x, y]: [f64; 2], normal: [f64; 2]) -> Option<f64> {
+        let mut counts = [0, 0];
+        for other in self.about(square_of(x), square_of(y)).flatten() {
+            let (dx, dy) = (other[0] - x, other[1] - y);
+            let (from, along) = (dx * normal[0] + dy * normal[1], dy * normal[0] - dx * normal[1]);
+            let aside = from.abs() > ON_EDGE && along.abs() <= ALONG * from.abs();
+            if !aside || dx * dx + dy * dy > RADIUS * RADIUS {
+                continue;
+            }
+            counts[usize::from(from < 0.0)] += 1;
+            if counts[0] > 0 && counts[1] > 0 {
+                return None;
+            }
+        }
+        match counts {
+            [before, 0] if before >= LEAST_NEIGHBOURS => Some(1.0),
+            [0, before] if before >= LEAST_NEIGHBOURS => Some(-1.0),
+            _ => None,
+        }
+    }
+}
+
+fn square_of(along: f64) -> i64 {
+    (along / SQUARE) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bright thing from `left` to `left + 40` px and as high, on black; its outline is as wide as that of a picture is, and what it shows has edges within.
+    fn square(left: f64) -> Frame<f32> {
+        let ramp = |along: f64| (along / 1.4 + 0.5).clamp(0.0, 1.0);
+        Frame::from_fn(120, 120, |x, y| {
+            let (x, y) = (x as f64 - left, y as f64 - 40.0);
+            let shown = if (y - 20.0).abs() < 10.0 { 200.0 } else { 150.0 };
+            (ramp(x) * ramp(40.0 - x) * ramp(y) * ramp(40.0 - y) * shown) as f32
+        })
+    }
+
+    #[test]
+    fn pixels_beyond_the_outline_are_not_its_own() {
+        let frame = square(40.4);
+        let view = View { plain: &frame, smooth: &frame };
+        // The left edge, found a pixel too far left below; an edge within; the right edge where it is.
+        let edge = |x: f64, rows: std::ops::Range<i32>| rows.map(move |y| [x, f64::from(y)]);
+        let within = (46..76).step_by(3).flat_map(|x| [[f64::from(x), 51.0], [f64::from(x), 69.0]]);
+        let right: Vec<_> = edge(41.0, 44..60).chain(within).chain(edge(80.0, 44..77)).collect();
+        let beyond: Vec<_> = edge(40.0, 60..77).collect();
+        let all: Vec<_> = right.iter().chain(&beyond).copied().collect();
+        assert_eq!(own_places(&all, view), right);
+        // What is alone far away is no part of it, either.
+        let strayed: Vec<_> = right.iter().copied().chain([[110.0, 5.0]]).collect();
+        assert_eq!(own_places(&strayed, view), right);
+        assert_eq!(own_places(&[], view), [] as [[f64; 2]; 0]);
+    }
+
+    #[test]
+    fn where_the_view_says_nothing_all_are_its_own() {
+        let blind = Frame::filled(120, 120, f32::NAN);
+        let all: Vec<_> = (0..40).map(|i| [40.0 + f64::from(i % 8), 40.0 + f64::from(i)]).collect();
+        assert_eq!(own_places(&all, View { plain: &blind, smooth: &blind }), all);
+    }
+}
