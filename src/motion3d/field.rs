@@ -1,10 +1,10 @@
-//! Points of a flow field that may be taken for independent.
+//! Points of a flow field that share no window.
 
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites, Status};
 
-/// Errors at a distance of this many correlation lengths have a correlation of about `exp(-4)`: they may be taken for independent.
+/// Errors at a distance of this many correlation lengths share no window. On real scenes a fifth of them goes together still, which the motion's covariance sums (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 
 /// Least spacing, px, where the field does not know how far its errors go together.
@@ -38,6 +38,8 @@ pub struct FieldPoints {
     pub covariances: Vec<f64>,
     /// How many points share one error: what the covariances are multiplied with. For [`MotionOptions::shared`](super::MotionOptions).
     pub shared: f64,
+    /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
+    pub correlation_length: f64,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
@@ -46,7 +48,12 @@ impl FieldPoints {
     /// The points outside of a rectangle of pixels.
     #[must_use]
     pub fn outside(&self, region: Rect) -> Self {
-        let mut out = Self { spacing: self.spacing, shared: self.shared, ..Self::default() };
+        let mut out = Self {
+            spacing: self.spacing,
+            shared: self.shared,
+            correlation_length: self.correlation_length,
+            ..Self::default()
+        };
         for (k, &[x, y]) in self.points.iter().enumerate() {
             if !within(Some(region), x as usize, y as usize) {
                 out.points.push([x, y]);
@@ -60,8 +67,8 @@ impl FieldPoints {
 
 /// Takes every so manieth valid estimate of a field.
 ///
-/// Windowed estimates share pixels, and their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
-/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one.
+/// Windowed estimates share pixels, and where they do their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
+/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one. What goes together farther than that is for [`MotionOptions::correlation_length`](super::MotionOptions).
 ///
 /// A list of points is taken whole.
 ///
@@ -91,7 +98,8 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Grid { stride, .. } => (step * stride) as f64,
         Sites::Points(_) => spacing,
     };
-    let mut out = FieldPoints { shared, spacing, ..FieldPoints::default() };
+    let correlation_length = field.layout.correlation_length;
+    let mut out = FieldPoints { shared, spacing, correlation_length, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
@@ -104,9 +112,13 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             if !within(options.region, x, y) {
                 continue;
             }
+            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
+            // Rounded, that of an edge may be none.
+            if nalgebra::Matrix2::new(uu, 0.5 * (uv + vu), 0.5 * (uv + vu), vv).cholesky().is_none() {
+                continue;
+            }
             out.points.push([x as f64, y as f64]);
             out.flow.push([m[0], m[1]]);
-            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
             out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
         }
     }
