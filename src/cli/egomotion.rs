@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Rows: frame, time_s, status, method, points, inliers, direction u (the scene's relative to the camera; the camera moves by -u) with its deviation in\n\
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
-    contact (frames) with their deviations. Points are taken as far apart as the errors of the flow go together, in a small --region closer.\n\
+    contact (frames) with their deviations. Points are taken twice as far apart as errors of the flow go together, in a small --region closer; the deviations heed what they share.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
     its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
@@ -48,7 +48,7 @@ pub struct EgomotionCommand {
     /// Take all points for parts of one rigid scene, instead of looking for those that are
     #[arg(long, help_heading = "Motion")]
     pub no_robust: bool,
-    /// Distance of the points, px [default: 4 times the length over which errors of the flow go together, at least 8, less where --region would have fewer than 30 points, not below that length]
+    /// Distance of the points, px [default: twice the length over which errors of the flow go together, at least 8, less where --region would have fewer than 30 points, not below that length]
     #[arg(long, value_name = "PX", value_parser = parse_positive, help_heading = "Motion")]
     pub spacing: Option<f64>,
     /// Most points of a field

@@ -240,6 +240,10 @@ fn on(
         solution.covariance = at.map(|at| at.covariance);
     }
     solution.widen(&inliers, flow, options.correlation_length);
+    if let Some(known) = known {
+        let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
+        solution.covariance = solution.covariance.map(|covariance| covariance * strays);
+    }
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })

@@ -7,6 +7,9 @@ use crate::types::{FlowField, Rect, Sites, Status};
 /// Errors at a distance of this many correlation lengths share no window. On real scenes a fifth of them goes together still, which the motion's covariance sums (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 
+/// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and outliers among them less well; closer ones tell hardly more.
+const SPACED: f64 = 2.0;
+
 /// Least spacing, px, where the field does not know how far its errors go together.
 const LEAST_SPACING: f64 = 8.0;
 
@@ -19,7 +22,7 @@ const WANTED: usize = 30;
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FieldOptions {
-    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 4 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
+    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 2 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
     pub spacing: Option<f64>,
     /// Only points in this rectangle of pixels.
     pub region: Option<Rect>,
@@ -76,7 +79,7 @@ impl FieldPoints {
 /// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     measured(field)?;
-    let usual = LEAST_SPACING.max(INDEPENDENT * field.layout.correlation_length);
+    let usual = LEAST_SPACING.max(SPACED * field.layout.correlation_length);
     let spacing = options.spacing.unwrap_or(usual);
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(Error::argument("spacing", "a positive number", spacing));
@@ -192,7 +195,7 @@ mod tests {
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: 0,
-            correlation_length: 2.5,
+            correlation_length: 5.0,
         };
         let mut field = FlowField::empty(layout, true).unwrap();
         field.status.fill(Status::Ok);
@@ -206,16 +209,20 @@ mod tests {
         let mut field = field();
         let points = field_points(&field, &FieldOptions::default()).unwrap();
         assert_eq!((points.spacing, points.points.len()), (10.0, 24));
-        assert_eq!((points.points[0], points.points[1]), ([5.0, 5.0], [15.0, 5.0]));
-        assert_eq!((points.flow[3], &points.covariances[..4]), ([0.5, 0.5], &[0.25; 4][..]));
+        assert_eq!((points.points[0], points.points[1], points.flow[3]), ([5.0, 5.0], [15.0, 5.0], [0.5, 0.5]));
         let few = FieldOptions { most: Some(7), ..FieldOptions::default() };
         assert_eq!(field_points(&field, &few).unwrap().points.len(), 6);
         let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
         let covariance = field_points(&field, &dense).unwrap().covariances[0];
-        assert!((covariance / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{covariance}");
-        assert_eq!((points.shared, field_points(&field, &dense).unwrap().shared), (1.0, covariance / 0.25));
+        assert!((covariance / 0.25 - 4.0 * std::f64::consts::PI).abs() < 1e-12, "{covariance}");
+        assert!((points.covariances[0] / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{}", points.covariances[0]);
+        assert_eq!(field_points(&field, &dense).unwrap().shared, covariance / 0.25);
+        assert_eq!((points.shared, points.correlation_length), (points.covariances[0] / 0.25, 5.0));
         let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
-        assert_eq!(field_points(&field, &denser).unwrap().spacing, 3.0);
+        assert_eq!(field_points(&field, &denser).unwrap().spacing, 5.0);
+        let far = FieldOptions { spacing: Some(20.0), ..FieldOptions::default() };
+        let far = field_points(&field, &far).unwrap();
+        assert_eq!((far.shared, &far.covariances[..4]), (1.0, &[0.25; 4][..]));
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
     }
