@@ -200,7 +200,10 @@ mod tests {
         let mut field = FlowField::empty(layout, true).unwrap();
         field.status.fill(Status::Ok);
         field.motion.fill(0.5);
-        field.covariance.as_mut().unwrap().fill(0.25);
+        // Of u and v alone, which are independent.
+        let (size, covariance) = (field.len(), field.covariance.as_mut().unwrap());
+        covariance.fill(0.25);
+        covariance[size..2 * size].fill(0.0);
         field
     }
 
@@ -222,7 +225,7 @@ mod tests {
         assert_eq!(field_points(&field, &denser).unwrap().spacing, 5.0);
         let far = FieldOptions { spacing: Some(20.0), ..FieldOptions::default() };
         let far = field_points(&field, &far).unwrap();
-        assert_eq!((far.shared, &far.covariances[..4]), (1.0, &[0.25; 4][..]));
+        assert_eq!((far.shared, &far.covariances[..4]), (1.0, &[0.25, 0.0, 0.0, 0.25][..]));
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
     }

@@ -28,7 +28,10 @@ pub(super) const SPACING: f64 = 4.0;
 const CONSISTENT: f64 = 3.0;
 
 /// Standard deviation of the direction, degrees, up to which a covariance tells the shape of what is not known: the theory is linear.
-const LINEAR: f64 = 6.0;
+const LINEAR: f64 = 8.0;
+
+/// Fewer points are known to tell little; what they tell is not judged by the linear theory alone.
+const MANY: usize = 100;
 
 /// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
@@ -89,7 +92,7 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
         Status::Ambiguous
-    } else if evidence.low || deviation > LINEAR {
+    } else if evidence.low || (deviation > LINEAR && inliers.n >= MANY) {
         Status::LowSnr
     } else {
         Status::Ok
@@ -117,7 +120,8 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
         let farther = Farther {
             residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
-            chance: CONSISTENT * own * fewer + SPACING,
+            // Of so many points chance hides no more.
+            chance: if most > SEARCHED { f64::INFINITY } else { CONSISTENT * own * fewer + SPACING },
         };
         plausible_beyond(inliers, motions, farther, most, rng)
     };
