@@ -102,7 +102,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Points(_) => spacing,
     };
     let correlation_length = field.layout.correlation_length;
-    let mut out = FieldPoints { shared, spacing, correlation_length, ..FieldPoints::default() };
+    let mut out = FieldPoints { shared, correlation_length, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
