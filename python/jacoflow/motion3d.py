@@ -81,7 +81,7 @@ class MotionEstimate:
     """Rotation rate `w` (3,) of the scene relative to the camera, rad/frame."""
     status: Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
     """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (another
-    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees, or directions beyond 4 deviations explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
+    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees, or directions beyond the covariance explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights; or, of 100 points and more, `direction_std` is above 8 degrees, where the covariance no longer tells the shape of what is not known)."""
     method_used: Literal["ml", "efficient"]
     """Whose result `translation` and `rotation` are (no unit)."""
     fell_back: bool
@@ -162,6 +162,7 @@ def estimate_motion(
     rotation_prior: tuple[ArrayLike, ArrayLike] | None = None,
     initial: tuple[ArrayLike, ArrayLike] | None = None,
     shared: float = 1.0,
+    correlation_length: float = 0.0,
     seed: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
@@ -202,6 +203,8 @@ def estimate_motion(
         Look for the minimum near this motion instead of everywhere.
     shared : float, no unit
         How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
+    correlation_length : float, px with K, else units of points; rad on the sphere
+        How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. 0: errors are independent.
     seed : int
         Seed of the random choices.
     threads : int or None
@@ -212,14 +215,21 @@ def estimate_motion(
     ValueError
         For shapes and values that do not fit; each message names the argument.
     """
+    for name, value in (("projection", projection), ("method", method), ("placement", placement), ("smoother", smoother)):
+        _word(name, value)
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
         "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": None if shared == 1 else float(shared), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": None if shared == 1 else float(shared), "correlation_length": None if correlation_length == 0 else float(correlation_length), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
     return _estimate(_motion3d_estimate(points, flow, layout, options))
+
+
+def _word(name: str, value: object) -> None:
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: expected a word, got {value!r}")
 
 
 def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLike, ArrayLike] | None:
@@ -263,12 +273,22 @@ def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
     """(N, 6) numbers (u, v, u_x, v_x, u_y, v_y), px/frame and 1/frame."""
     if sigma is not None:
         raise ValueError("sigma: expected None with a jacobian, whose covariances (N, 6, 6) are needed, got a number")
-    flow, slopes = np.asarray(flow, dtype=float), np.asarray(jacobian, dtype=float)
+    flow, slopes = _real("flow", flow), _real("jacobian", jacobian)
     if flow.ndim != 2 or flow.shape[1] != 2:
         raise ValueError(f"flow: expected shape (N, 2), got shape {flow.shape}")
     if slopes.shape != (len(flow), 2, 2):
         raise ValueError(f"jacobian: expected shape ({len(flow)}, 2, 2), got shape {slopes.shape}")
     return np.concatenate([flow, slopes.transpose(0, 2, 1).reshape(-1, 4)], axis=1)
+
+
+def _real(name: str, given: ArrayLike) -> Array:
+    try:
+        array = np.asarray(given)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected rows of equal length, got {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected real numbers, got {array.dtype}")
+    return array.astype(float)
 
 
 def _estimate(told: dict[str, Any]) -> MotionEstimate:
@@ -318,6 +338,7 @@ def motion_bound(
     NotObservableError
         When the points do not determine the motion.
     """
+    _word("projection", projection)
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": bool(jacobian)}
     return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, layout))
 
@@ -391,7 +412,7 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: 4 times the field's `correlation_length`, at which errors are independent, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than that get larger covariances: times `4 pi l^2 / spacing^2` with the correlation length `l`.
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that (`correlation_length` of `estimate_motion`).
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
@@ -408,10 +429,10 @@ def estimate_field_motion(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, and for options that do not fit.
     """
-    points, flow, covariances, _, shared = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
+    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)
-    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, **options}), points
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, **options}), points
 
 
 def time_to_contact_map(
@@ -438,6 +459,7 @@ def time_to_contact_map(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, and for a matrix that is none of a camera.
     """
+    _word("placement", placement)
     return _motion3d_contact_map(field, K, (result.translation, result.rotation, result.tangent, result.covariance), placement)
 
 

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Rows: frame, time_s, status, method, points, inliers, direction u (the scene's relative to the camera; the camera moves by -u) with its deviation in\n\
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
-    contact (frames) with their deviations. Points are taken as far apart as the errors of the flow go together, in a small --region closer.\n\
+    contact (frames) with their deviations. Points are taken twice as far apart as errors of the flow go together, in a small --region closer; the deviations heed what they share.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
     its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
@@ -48,7 +48,7 @@ pub struct EgomotionCommand {
     /// Take all points for parts of one rigid scene, instead of looking for those that are
     #[arg(long, help_heading = "Motion")]
     pub no_robust: bool,
-    /// Distance of the points, px [default: 4 times the length over which errors of the flow go together, at least 8, less where --region would have fewer than 30 points, not below that length]
+    /// Distance of the points, px [default: twice the length over which errors of the flow go together, at least 8, less where --region would have fewer than 30 points, not below that length]
     #[arg(long, value_name = "PX", value_parser = parse_positive, help_heading = "Motion")]
     pub spacing: Option<f64>,
     /// Most points of a field
@@ -168,6 +168,16 @@ impl EgomotionCommand {
 
 /// `FX,FY,CX,CY[,SKEW]`, or a file with the 9 numbers of K or the 12 of a projection matrix; words in it (as `P0:`) are skipped, and only its first line counts where that has enough numbers.
 fn intrinsics(text: &str) -> Result<Intrinsics> {
+    read_intrinsics(text).map_err(|error| match error {
+        // The core calls the matrix K.
+        Error::Argument { argument: "K", expected, got } => {
+            Error::argument("intrinsics", expected, format!("{got}, from {text}"))
+        }
+        other => other,
+    })
+}
+
+fn read_intrinsics(text: &str) -> Result<Intrinsics> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some(&[fx, fy, cx, cy]) => return Intrinsics::new([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
@@ -176,6 +186,9 @@ fn intrinsics(text: &str) -> Result<Intrinsics> {
         None => {}
     }
     let path = Path::new(text);
+    if text.contains(',') && !path.exists() {
+        return Err(Error::argument("intrinsics", "numbers FX,FY,CX,CY[,SKEW] or a file", text));
+    }
     let content = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
     let read = |text: &str| -> Vec<f64> {
         text.split(|c: char| c.is_whitespace() || c == ',').filter_map(|word| word.parse().ok()).collect()
@@ -208,7 +221,11 @@ mod tests {
         std::fs::write(&file, "1 2 3").unwrap();
         assert!(intrinsics(file.to_str().unwrap()).unwrap_err().to_string().contains("got 3"));
         assert!(intrinsics("1,2,3").unwrap_err().to_string().starts_with("intrinsics: "));
-        assert!(intrinsics("0,500,3,4").unwrap_err().to_string().starts_with("K: "));
+        for wrong in ["0,500,3,4", "707,707,a,1", "nan,500,3,4"] {
+            assert!(intrinsics(wrong).unwrap_err().to_string().starts_with("intrinsics: "), "{wrong}");
+        }
+        std::fs::write(&file, "1 2 3 4 5 6 7 8 9").unwrap();
+        assert!(intrinsics(file.to_str().unwrap()).unwrap_err().to_string().starts_with("intrinsics: "));
         assert!(intrinsics("no/such/file").is_err());
     }
 }

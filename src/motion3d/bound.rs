@@ -10,6 +10,9 @@ use super::result::nested;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2x3, SMatrix, Vector2};
 
+/// Least number of points for a motion.
+const LEAST: usize = 5;
+
 /// Covariances of `(psi, w)` that theory predicts, rad and rad/frame, in the axes `tangent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionBound {
@@ -60,6 +63,9 @@ pub fn motion_bound(
     let known: Vec<u32> = (0..observations.n as u32)
         .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
         .collect();
+    if known.len() < LEAST && observations.n >= LEAST {
+        return Err(Error::argument("inv_depth", "finite values at five points at least", known.len()));
+    }
     let observations = observations.subset(&known);
     let mut nu: Vec<f64> = observations.source.iter().map(|&k| inverse_depth[k as usize]).collect();
     nu.resize(observations.stride, 0.0);

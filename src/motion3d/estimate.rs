@@ -16,7 +16,7 @@ use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
 use super::trial::{DISTINCT, Trial, close, smoothed};
 use super::verdict::{Evidence, judge};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
 
@@ -38,47 +38,11 @@ const ROUNDING: f64 = 1e-11;
 /// not finite are left out and come back as NaN. Scenes that do not determine a motion are told by [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`.
+/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
-    check(flow, options)?;
-    check_shared(noise, options)?;
+    options.check(flow, noise)?;
     Ok(options.threads.check()?.install(|| estimate(flow, noise, options)))
-}
-
-fn check(flow: &Flow<'_>, options: &MotionOptions) -> Result<()> {
-    if let Some(depths) = options.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
-        let expected = format!("{} values, one for each point", flow.len());
-        return Err(Error::argument("weight_inv_depth", expected, depths.len()));
-    }
-    if let Some(prior) = options.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
-        let expected = "a finite rotation with a positive definite covariance";
-        return Err(Error::argument("rotation_prior", expected, format!("{prior:?}")));
-    }
-    match &options.initial {
-        Some(_) if options.robust => {
-            Err(Error::argument("initial", "none, as a robust search looks everywhere", "a motion"))
-        }
-        Some(m) if m.translation == [0.0; 3] => {
-            Err(Error::argument("initial", "a translation with a direction", "zero"))
-        }
-        Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
-            Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn check_shared(noise: &Noise<'_>, options: &MotionOptions) -> Result<()> {
-    match options.shared {
-        Some(shared) if !(shared.is_finite() && shared >= 1.0) => {
-            Err(Error::argument("shared", "a number of at least 1", shared))
-        }
-        Some(_) if matches!(noise, Noise::Unknown) => {
-            Err(Error::argument("shared", "a noise that is known", "sigma and cov left out"))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Points in units of their noise, and that in the flow's unit.
@@ -274,6 +238,11 @@ fn on(
         let mut smoother = DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
         let at = unsolved(&inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
         solution.covariance = at.map(|at| at.covariance);
+    }
+    solution.widen(&inliers, flow, options.correlation_length);
+    if let Some(known) = known {
+        let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
+        solution.covariance = solution.covariance.map(|covariance| covariance * strays);
     }
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()

@@ -1,11 +1,14 @@
-//! Points of a flow field that may be taken for independent.
+//! Points of a flow field that share no window.
 
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites, Status};
 
-/// Errors at a distance of this many correlation lengths have a correlation of about `exp(-4)`: they may be taken for independent.
+/// Errors at a distance of this many correlation lengths share no window. On real scenes a fifth of them goes together still, which the motion's covariance sums (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
+
+/// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and outliers among them less well; closer ones tell hardly more.
+const SPACED: f64 = 2.0;
 
 /// Least spacing, px, where the field does not know how far its errors go together.
 const LEAST_SPACING: f64 = 8.0;
@@ -19,7 +22,7 @@ const WANTED: usize = 30;
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FieldOptions {
-    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 4 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
+    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 2 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
     pub spacing: Option<f64>,
     /// Only points in this rectangle of pixels.
     pub region: Option<Rect>,
@@ -38,6 +41,8 @@ pub struct FieldPoints {
     pub covariances: Vec<f64>,
     /// How many points share one error: what the covariances are multiplied with. For [`MotionOptions::shared`](super::MotionOptions).
     pub shared: f64,
+    /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
+    pub correlation_length: f64,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
@@ -46,7 +51,12 @@ impl FieldPoints {
     /// The points outside of a rectangle of pixels.
     #[must_use]
     pub fn outside(&self, region: Rect) -> Self {
-        let mut out = Self { spacing: self.spacing, shared: self.shared, ..Self::default() };
+        let mut out = Self {
+            spacing: self.spacing,
+            shared: self.shared,
+            correlation_length: self.correlation_length,
+            ..Self::default()
+        };
         for (k, &[x, y]) in self.points.iter().enumerate() {
             if !within(Some(region), x as usize, y as usize) {
                 out.points.push([x, y]);
@@ -60,8 +70,8 @@ impl FieldPoints {
 
 /// Takes every so manieth valid estimate of a field.
 ///
-/// Windowed estimates share pixels, and their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
-/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one.
+/// Windowed estimates share pixels, and where they do their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
+/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one. What goes together farther than that is for [`MotionOptions::correlation_length`](super::MotionOptions).
 ///
 /// A list of points is taken whole.
 ///
@@ -69,7 +79,7 @@ impl FieldPoints {
 /// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     measured(field)?;
-    let usual = LEAST_SPACING.max(INDEPENDENT * field.layout.correlation_length);
+    let usual = LEAST_SPACING.max(SPACED * field.layout.correlation_length);
     let spacing = options.spacing.unwrap_or(usual);
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(Error::argument("spacing", "a positive number", spacing));
@@ -91,7 +101,8 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Grid { stride, .. } => (step * stride) as f64,
         Sites::Points(_) => spacing,
     };
-    let mut out = FieldPoints { shared, spacing, ..FieldPoints::default() };
+    let correlation_length = field.layout.correlation_length;
+    let mut out = FieldPoints { shared, correlation_length, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
@@ -104,9 +115,13 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             if !within(options.region, x, y) {
                 continue;
             }
+            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
+            // Rounded, that of an edge may be none.
+            if nalgebra::Matrix2::new(uu, 0.5 * (uv + vu), 0.5 * (uv + vu), vv).cholesky().is_none() {
+                continue;
+            }
             out.points.push([x as f64, y as f64]);
             out.flow.push([m[0], m[1]]);
-            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
             out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
         }
     }
@@ -180,12 +195,15 @@ mod tests {
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: 0,
-            correlation_length: 2.5,
+            correlation_length: 5.0,
         };
         let mut field = FlowField::empty(layout, true).unwrap();
         field.status.fill(Status::Ok);
         field.motion.fill(0.5);
-        field.covariance.as_mut().unwrap().fill(0.25);
+        // Of u and v alone, which are independent.
+        let (size, covariance) = (field.len(), field.covariance.as_mut().unwrap());
+        covariance.fill(0.25);
+        covariance[size..2 * size].fill(0.0);
         field
     }
 
@@ -194,16 +212,20 @@ mod tests {
         let mut field = field();
         let points = field_points(&field, &FieldOptions::default()).unwrap();
         assert_eq!((points.spacing, points.points.len()), (10.0, 24));
-        assert_eq!((points.points[0], points.points[1]), ([5.0, 5.0], [15.0, 5.0]));
-        assert_eq!((points.flow[3], &points.covariances[..4]), ([0.5, 0.5], &[0.25; 4][..]));
+        assert_eq!((points.points[0], points.points[1], points.flow[3]), ([5.0, 5.0], [15.0, 5.0], [0.5, 0.5]));
         let few = FieldOptions { most: Some(7), ..FieldOptions::default() };
         assert_eq!(field_points(&field, &few).unwrap().points.len(), 6);
         let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
         let covariance = field_points(&field, &dense).unwrap().covariances[0];
-        assert!((covariance / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{covariance}");
-        assert_eq!((points.shared, field_points(&field, &dense).unwrap().shared), (1.0, covariance / 0.25));
+        assert!((covariance / 0.25 - 4.0 * std::f64::consts::PI).abs() < 1e-12, "{covariance}");
+        assert!((points.covariances[0] / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{}", points.covariances[0]);
+        assert_eq!(field_points(&field, &dense).unwrap().shared, covariance / 0.25);
+        assert_eq!((points.shared, points.correlation_length), (points.covariances[0] / 0.25, 5.0));
         let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
-        assert_eq!(field_points(&field, &denser).unwrap().spacing, 3.0);
+        assert_eq!(field_points(&field, &denser).unwrap().spacing, 5.0);
+        let far = FieldOptions { spacing: Some(20.0), ..FieldOptions::default() };
+        let far = field_points(&field, &far).unwrap();
+        assert_eq!((far.shared, &far.covariances[..4]), (1.0, &[0.25, 0.0, 0.0, 0.25][..]));
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
     }

@@ -1,7 +1,7 @@
 //! The search over directions: where on the half sphere the residuals are small.
 
-use super::kernels::{best_rotation, equations};
-use super::motion::{Motion, tangents};
+use super::kernels::best_rotation;
+use super::motion::Motion;
 use super::observations::Observations;
 use crate::math::random::CounterRng;
 use nalgebra::Vector3;
@@ -71,7 +71,7 @@ pub(super) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -
 }
 
 /// All points, or `most` random ones.
-fn at_most(observations: &Observations, most: usize, rng: CounterRng) -> Cow<'_, Observations> {
+pub(super) fn at_most(observations: &Observations, most: usize, rng: CounterRng) -> Cow<'_, Observations> {
     if observations.n > most {
         Cow::Owned(observations.subset(&sample(observations.n, most, rng)))
     } else {
@@ -84,36 +84,6 @@ pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion
     let searched = &*at_most(observations, SEARCHED, rng);
     let found = evaluate(|u| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     apart(found, APART, STARTS).into_iter().map(|(motion, _)| motion).collect()
-}
-
-/// The 0.95 quantile of chi-squared with five degrees of freedom.
-pub(super) const PLAUSIBLE: f64 = 11.07;
-
-/// The largest angle, degrees, between the direction of one of `motions` (the first: the estimate) and any direction of the half sphere that explains the flow of `most` points as well as the best of them, depth signs included.
-///
-/// A covariance is that of one minimum; a valley of minima shows here.
-pub(super) fn reach_of_plausible(observations: &Observations, motions: &[Motion], most: usize, rng: CounterRng) -> f64 {
-    let searched = &*at_most(observations, most, rng);
-    let cost = |u: &Vector3<f64>| {
-        let (w, cost) = best_rotation(searched, u)?;
-        let behind = |u: &Vector3<f64>| {
-            let motion = Motion::of(u, &w);
-            equations(searched, &motion, &tangents(u), None).behind
-        };
-        Some((w, cost, behind(u).min(behind(&-u))))
-    };
-    let Some(least) = motions.iter().filter_map(|m| cost(&m.u())).map(|(_, j, b)| j + b).reduce(f64::min) else {
-        return 0.0;
-    };
-    let limit = least + PLAUSIBLE;
-    let first = motions[0].u();
-    let angles = evaluate(|u| {
-        // Signs are looked at only where the residuals alone would do.
-        let (_, j) = best_rotation(searched, u)?;
-        let plausible = j < limit && cost(u).is_some_and(|(_, j, behind)| j + behind < limit);
-        plausible.then(|| first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees())
-    });
-    angles.into_iter().fold(0.0, f64::max)
 }
 
 #[cfg(test)]

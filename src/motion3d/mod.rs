@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod bend;
 mod bound;
 mod camera;
 mod contact;
@@ -45,6 +46,7 @@ mod neighbours;
 mod observations;
 mod options;
 mod patches;
+mod plausible;
 mod refine;
 mod regression;
 mod report;
@@ -55,6 +57,7 @@ mod smoothing;
 mod special;
 #[cfg(test)]
 mod tests;
+mod together;
 mod trial;
 mod verdict;
 

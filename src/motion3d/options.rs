@@ -1,11 +1,13 @@
 //! What is given and how it is worked on.
 
 use super::camera::Intrinsics;
-use super::motion::{Motion, Projection};
+use super::motion::{Motion, Projection, tangents};
+use super::observations::Known;
 use super::result::MotionEstimate;
 use super::smoothing::Smoother;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Points with their flow, N of each.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +38,7 @@ pub enum Noise<'a> {
     Unknown,
     /// Standard deviation of each component, in the unit of the flow.
     Sigma(f64),
-    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not positive definite are left out.
+    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not finite are left out; others must be symmetric and positive definite, on the sphere across the bearing.
     Covariances(&'a [f64]),
 }
 
@@ -102,10 +104,57 @@ pub struct MotionOptions {
     pub rotation_prior: Option<RotationPrior>,
     /// How many points share one error, at least 1: the noise given is so many times their own in variance, so that together they tell no more than they know. What is an outlier, and what chance explains, is judged by their own. Default: 1.
     pub shared: Option<f64>,
+    /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the sphere), as those of windowed flow do: the covariance is then that of the sums over points whose errors correlate (`together`), in no direction smaller than that of independent points. Default: not at all.
+    pub correlation_length: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.
     pub threads: Threads,
+}
+
+impl MotionOptions {
+    pub(super) fn check(&self, flow: &Flow<'_>, noise: &Noise<'_>) -> Result<()> {
+        if let Some(depths) = self.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
+            let expected = format!("{} values, one for each point", flow.len());
+            return Err(Error::argument("weight_inv_depth", expected, depths.len()));
+        }
+        if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
+            let expected = "a finite rotation with a positive definite covariance";
+            return Err(Error::argument("rotation_prior", expected, format!("{prior:?}")));
+        }
+        self.check_initial()?;
+        self.check_correlation(noise)
+    }
+
+    fn check_initial(&self) -> Result<()> {
+        match &self.initial {
+            Some(_) if self.robust => {
+                Err(Error::argument("initial", "none, as a robust search looks everywhere", "a motion"))
+            }
+            Some(m) if m.translation == [0.0; 3] => {
+                Err(Error::argument("initial", "a translation with a direction", "zero"))
+            }
+            Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
+                Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_correlation(&self, noise: &Noise<'_>) -> Result<()> {
+        if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
+            return Err(Error::argument("correlation_length", "a number of at least 0", length));
+        }
+        match self.shared {
+            Some(shared) if !(shared.is_finite() && shared >= 1.0) => {
+                Err(Error::argument("shared", "a number of at least 1", shared))
+            }
+            Some(_) if matches!(noise, Noise::Unknown) => {
+                Err(Error::argument("shared", "a noise that is known", "sigma and cov left out"))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Flow<'_> {
@@ -120,12 +169,39 @@ impl Flow<'_> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+    /// Where point `k` lies, in the unit of the points.
+    pub(super) fn place(&self, k: usize) -> Vector3<f64> {
+        match self {
+            Self::Plane { points, .. } => Vector3::new(points[k][0], points[k][1], 0.0),
+            Self::Sphere { bearings, .. } => bearings[k].into(),
+        }
+    }
     /// The screen.
     pub fn projection(&self) -> Projection {
         match self {
             Self::Plane { .. } => Projection::Plane,
             Self::Sphere { .. } => Projection::Sphere,
         }
+    }
+
+    /// Whether all covariances that are finite are some; on the sphere only across the bearing, where the flow is.
+    fn check_covariances(&self, covariances: &[f64], values: usize) -> Result<()> {
+        for (k, given) in covariances.chunks_exact(values).enumerate() {
+            let good = match self {
+                Self::Plane { .. } => is_covariance(&DMatrix::from_row_slice(2, 2, given)),
+                Self::Sphere { bearings, .. } => {
+                    let axes = tangents(&Vector3::from(bearings[k]).normalize());
+                    let given = Matrix3::from_row_slice(given);
+                    let across = axes * given * axes.transpose();
+                    symmetric(given.as_slice(), 3)
+                        && is_covariance(&DMatrix::from_column_slice(2, 2, across.as_slice()))
+                }
+            };
+            if !good {
+                return Err(not_covariance(k, given));
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn check(&self, noise: &Noise<'_>) -> Result<()> {
@@ -150,7 +226,30 @@ impl Flow<'_> {
                 let expected = format!("{points} matrices of {values} values");
                 Err(Error::argument("cov", expected, format!("{} values", c.len())))
             }
+            Noise::Covariances(c) => self.check_covariances(c, values),
             _ => Ok(()),
         }
     }
+}
+
+/// Asymmetry of a covariance, in shares of its largest entry, that is rounding.
+const ROUNDED: f64 = 1e-5;
+
+fn symmetric(values: &[f64], size: usize) -> bool {
+    let largest = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+    let off = |i: usize, j: usize| (values[size * i + j] - values[size * j + i]).abs();
+    (0..size).all(|i| (0..i).all(|j| off(i, j) <= ROUNDED * largest))
+}
+
+/// Whether a matrix is symmetric and positive definite, or not finite: then its point is left out.
+pub(super) fn is_covariance(matrix: &DMatrix<f64>) -> bool {
+    if !matrix.iter().all(|value| value.is_finite()) {
+        return true;
+    }
+    let even = 0.5 * (matrix + matrix.transpose());
+    symmetric(matrix.as_slice(), matrix.nrows()) && even.cholesky().is_some()
+}
+
+pub(super) fn not_covariance(k: usize, got: &[f64]) -> Error {
+    Error::argument("cov", "symmetric positive definite matrices", format!("{got:?} at point {k}"))
 }

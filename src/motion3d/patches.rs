@@ -12,12 +12,12 @@ use super::camera::Intrinsics;
 use super::covariance::{inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
-use super::options::{Method, MotionOptions, Noise, Placement};
+use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::{RotationOnly, by_chance};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use report::{tell, turning_report};
 use shrink::shrunk;
 use std::collections::HashSet;
@@ -56,6 +56,11 @@ impl AffinePatches<'_> {
         if self.covariances.len() != 36 * n {
             let expected = format!("{n} matrices of 36 values");
             return Err(Error::argument("cov", expected, format!("{} values", self.covariances.len())));
+        }
+        for (k, given) in self.covariances.chunks_exact(36).enumerate() {
+            if !is_covariance(&DMatrix::from_row_slice(6, 6, given)) {
+                return Err(not_covariance(k, given));
+            }
         }
         Ok(())
     }
@@ -99,7 +104,7 @@ impl AffinePatches<'_> {
 /// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so. Other minima and opposite directions that no patch behind the camera excludes are told as for points.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`, `rotation_prior` and `shared`, which this form does not have.
+/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`, `rotation_prior`, `shared` and `correlation_length`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let refuse = |name: &'static str| {
@@ -110,6 +115,7 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
         MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
         MotionOptions { shared: Some(_), .. } => return refuse("shared"),
+        MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
     let system = patches.system(options.placement);
@@ -215,6 +221,9 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
     let known: Vec<u32> = (0..system.patches.len() as u32)
         .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
         .collect();
+    if known.len() < LEAST && system.patches.len() >= LEAST {
+        return Err(Error::argument("inv_depth", "finite surfaces of two patches at least", known.len()));
+    }
     let system = system.subset(&known);
     let surfaces: Vec<Vector3<f64>> = system.source.iter().map(|&k| surfaces[k as usize].into()).collect();
     let tangent = tangents(&motion.u());

@@ -1,5 +1,6 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
+use super::bend::bent;
 use super::contact::Rates;
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
@@ -11,6 +12,7 @@ use super::observations::Observations;
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::RotationOnly;
+use super::together::{Weighted, together};
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 
 /// A motion found on the inliers.
@@ -61,6 +63,28 @@ impl Solution {
             Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
             None => plain,
         }
+    }
+
+    /// Takes into the covariance what a linear theory of independent points leaves out: the bend of the valley that the direction lies in, and errors that go together over a length, in the unit of the points.
+    pub fn widen(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
+        let Some(mut covariance) = self.covariance else { return };
+        if let Some(nu) = &self.smooth {
+            covariance = bent(&covariance, inliers, &self.motion, &self.tangent, nu);
+        }
+        self.covariance = match length.filter(|length| *length > 0.0) {
+            Some(length) => {
+                let own;
+                let nu = if let Some(smooth) = &self.smooth {
+                    smooth
+                } else {
+                    own = depths(inliers, &self.motion).nu;
+                    &own
+                };
+                let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu };
+                together(&covariance, inliers, &at, flow, length)
+            }
+            None => Some(covariance),
+        };
     }
 }
 

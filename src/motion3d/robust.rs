@@ -14,7 +14,7 @@ use super::observations::Observations;
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use gate::Gate;
-pub(super) use hanging::hangs_on_few;
+pub(super) use hanging::{hangs_on_few, with_strays};
 use rayon::prelude::*;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.

@@ -7,3 +7,5 @@ mod estimators;
 mod patches;
 mod published;
 pub(super) mod scenes;
+mod silent;
+mod together;

@@ -1,10 +1,11 @@
 //! How far a motion can be trusted.
 
 use super::covariance::direction_deviation;
-use super::grid::{SEARCHED, reach_of_plausible};
+use super::grid::SEARCHED;
 use super::kernels::equations;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
+use super::plausible::{Farther, plausible_beyond};
 use super::report::Solution;
 use super::result::{Alternative, Status};
 use super::robust::Rival;
@@ -22,6 +23,15 @@ pub(super) const WIDE: f64 = 20.0;
 /// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are [`SPACING`] degrees apart, half of that from one of them.
 pub(super) const FAR: f64 = 4.0;
 pub(super) const SPACING: f64 = 4.0;
+
+/// The same in the estimate's own deviations, for directions that the smoothed weights do not exclude.
+const CONSISTENT: f64 = 3.0;
+
+/// Standard deviation of the direction, degrees, up to which a covariance tells the shape of what is not known: the theory is linear.
+const LINEAR: f64 = 8.0;
+
+/// Fewer points are known to tell little; what they tell is not judged by the linear theory alone.
+const MANY: usize = 100;
 
 /// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
@@ -77,12 +87,12 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
         Status::Ambiguous
     } else if deviation.is_nan()
         || deviation > WIDE
-        || far(inliers, &motions, deviation.max(evidence.deviation.min(MOST * deviation)), rng.stream(1))
+        || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
     {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
         Status::Ambiguous
-    } else if evidence.low {
+    } else if evidence.low || (deviation > LINEAR && inliers.n >= MANY) {
         Status::LowSnr
     } else {
         Status::Ok
@@ -103,12 +113,17 @@ fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct
 
 /// Whether directions explain the flow as well as the estimate that are farther than the covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
 ///
-/// `deviation`: that of maximum likelihood, whose residuals are looked at; of the points that the search sees it is that much larger. Where few of many points leave a doubt, [`ASKED_AGAIN`] of them are asked: with noisy depths the
+/// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked at; of the points that the search sees they are that much larger. Where few of many points leave a doubt, [`ASKED_AGAIN`] of them are asked: with noisy depths the
 /// deviation of the few grows faster than by the root of their number.
-fn far(inliers: &Observations, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
+fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
-        reach_of_plausible(inliers, motions, most, rng) > FAR * deviation * fewer + SPACING
+        let farther = Farther {
+            residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
+            // Of so many points chance hides no more.
+            chance: if most > SEARCHED { f64::INFINITY } else { CONSISTENT * own * fewer + SPACING },
+        };
+        plausible_beyond(inliers, motions, farther, most, rng)
     };
     beyond(SEARCHED) && (inliers.n <= SEARCHED || beyond(ASKED_AGAIN))
 }

@@ -225,7 +225,12 @@ pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> PyRes
 
 /// `length` or any number of doubles out of anything numpy can read as numbers.
 pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
-    let array = as_array(argument, object)?;
+    let ragged = |error: PyErr| {
+        let own = error.is_instance_of::<PyValueError>(object.py());
+        let said = || format!("{argument}: expected rows of equal length, got {}", error.value(object.py()));
+        if own { PyValueError::new_err(said()) } else { error }
+    };
+    let array = as_array(argument, object).map_err(ragged)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, got {}", dtype_name(&array))));

@@ -1,8 +1,9 @@
 //! How far a motion of patches can be trusted.
 
 use super::super::covariance::{Matrix5, direction_deviation};
-use super::super::grid::{PLAUSIBLE, evaluate, sample};
+use super::super::grid::{evaluate, sample};
 use super::super::motion::{Motion, tangents};
+use super::super::plausible::PLAUSIBLE;
 use super::super::result::{Alternative, MotionEstimate, Status};
 use super::super::verdict::{FAR, SPACING, WIDE};
 use super::SEARCHED;

@@ -2,9 +2,10 @@
 
 use super::super::covariance::{Matrix5, inverse};
 use super::super::kernels::depths;
+use super::super::motion::Motion;
 use super::super::observations::{Observations, median};
 use super::super::result::MotionEstimate;
-use super::INLIER;
+use super::{Consensus, INLIER};
 use nalgebra::{Matrix2x3, SMatrix, Vector3};
 
 /// From so many inliers on no few of them decide.
@@ -27,15 +28,31 @@ pub(in super::super) fn hangs_on_few(observations: &Observations, found: &Motion
     if rejected == 0 || inliers.len() >= MANY {
         return false;
     }
-    let seen = depths(observations, &found.motion);
-    let mut sizes: Vec<f64> = (0..observations.n)
-        .filter(|&k| !found.inliers[observations.source[k] as usize])
-        .map(|k| seen.e[k].abs() / observations.own())
-        .collect();
-    let chance = INLIER / (2.0 * median(&mut sizes).max(INLIER));
+    let chance = chance(observations, &found.motion, |k| found.inliers[observations.source[k] as usize]);
     let suspects = most_likely(chance * rejected as f64);
     let rows: Vec<Vector5> = inliers.iter().filter_map(|&k| row(observations, found, k)).collect();
     grows(&rows, observations, suspects)
+}
+
+/// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those evenly spread over twice the median residual of the rejected.
+fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) -> bool) -> f64 {
+    let seen = depths(observations, motion);
+    let mut sizes: Vec<f64> =
+        (0..observations.n).filter(|&k| !obeys(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
+    INLIER / (2.0 * median(&mut sizes).max(INLIER))
+}
+
+/// What outliers that obey by chance add to the variance of the inliers' residuals, as a factor.
+///
+/// Spread evenly over three deviations they have three times the variance of noise; half of them are behind the camera and were found.
+pub(in super::super) fn with_strays(observations: &Observations, known: &Consensus, motion: &Motion) -> f64 {
+    let rejected = observations.n - known.inliers.len();
+    if rejected == 0 {
+        return 1.0;
+    }
+    let chance = chance(observations, motion, |k| known.inliers.binary_search(&(k as u32)).is_ok());
+    let share = (0.5 * chance * rejected as f64 / known.inliers.len() as f64).min(1.0);
+    1.0 + share * (INLIER * INLIER / 3.0 - 1.0)
 }
 
 /// The number that a Poisson variable of this mean exceeds in no more than 5 % of all cases.

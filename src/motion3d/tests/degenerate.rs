@@ -39,6 +39,9 @@ fn lengths_and_values_are_checked_by_name() {
         refused(&scene.flow(), &Noise::Sigma(sigma), "sigma: ");
     }
     refused(&scene.flow(), &Noise::Covariances(&[1.0; 7]), "cov: ");
+    for wrong in [[-1.0, 0.0, 0.0, -1.0], [1.0, 0.0, 0.0, 0.0], [1.0, 0.5, 0.0, 1.0], [1.0, 2.0, 2.0, 1.0]] {
+        refused(&scene.flow(), &Noise::Covariances(&wrong.repeat(20)), "cov: ");
+    }
     refused(&Flow::Sphere { bearings: &[[1.0, 1.0, 0.0]], flow: &[[0.0; 3]] }, &Noise::Unknown, "points: ");
 }
 

@@ -84,7 +84,12 @@ impl Egomotion {
     /// The motion of these points, with what is known of the rotation beforehand.
     fn motion(&self, points: &FieldPoints, rotation_prior: Option<RotationPrior>) -> Result<MotionEstimate> {
         let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
-        let options = MotionOptions { rotation_prior, shared: Some(points.shared), ..self.plan.motion.clone() };
+        let options = MotionOptions {
+            rotation_prior,
+            shared: Some(points.shared),
+            correlation_length: Some(points.correlation_length),
+            ..self.plan.motion.clone()
+        };
         estimate_motion(&flow, &Noise::Covariances(&points.covariances), &options)
     }
 

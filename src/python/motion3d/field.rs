@@ -21,7 +21,7 @@ pub fn motion3d_field_points<'py>(
     spacing: Option<f64>,
     most: Option<usize>,
     region: Option<Region>,
-) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64, f64)> {
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 3])> {
     single(field)?;
     let chosen = FieldOptions { spacing, most, region: options::region(region)? };
     let found = each!(field.store(), packed => {
@@ -34,8 +34,7 @@ pub fn motion3d_field_points<'py>(
         arrays::owned(py, &[n, 2], flat(found.points))?.into_any(),
         arrays::owned(py, &[n, 2], flat(found.flow))?.into_any(),
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
-        found.spacing,
-        found.shared,
+        [found.spacing, found.shared, found.correlation_length],
     ))
 }
 

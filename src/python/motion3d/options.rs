@@ -23,6 +23,7 @@ pub struct Options<'py> {
     rotation_prior: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     shared: Option<f64>,
+    correlation_length: Option<f64>,
     seed: Integer,
     threads: Option<usize>,
 }
@@ -43,6 +44,7 @@ impl Options<'_> {
             initial: self.initial()?,
             rotation_prior: self.rotation_prior()?,
             shared: self.shared,
+            correlation_length: self.correlation_length,
             seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
             threads: Threads::new(self.threads)?,
         })

@@ -1,0 +1,111 @@
+//! What errors that go together over some distance do to a covariance.
+//!
+//! Sums over points that are taken for independent make the covariance too small where neighbours err alike. With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the covariance
+//! `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows agree, so that points which decide alone are hardly touched.
+
+use super::covariance::{Matrix5, inverse};
+use super::kernels::information;
+use super::motion::Motion;
+use super::observations::Observations;
+use super::options::Flow;
+use nalgebra::{Matrix2x3, SMatrix, SymmetricEigen, Vector3};
+use rayon::prelude::*;
+
+/// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows stop sharing pixels, the rest over so many correlation lengths.
+const QUICK: f64 = 0.4;
+const TAIL: f64 = 3.75;
+
+/// Correlation lengths at which what is left, one hundredth, no longer counts.
+const REACH: f64 = 15.0;
+
+type Vector5 = SMatrix<f64, 5, 1>;
+
+/// Correlation of the errors of windowed flow at a distance, in correlation lengths: `0.4 exp(-d^2 / 4) + 0.6 exp(-d / 3.75)`.
+fn correlation(distance: f64) -> f64 {
+    QUICK * (-0.25 * distance * distance).exp() + (1.0 - QUICK) * (-distance / TAIL).exp()
+}
+
+/// A motion whose equations have these depths in their weights.
+pub(super) struct Weighted<'a> {
+    pub motion: &'a Motion,
+    pub tangent: &'a Matrix2x3<f64>,
+    /// As long as the planes.
+    pub nu: &'a [f64],
+}
+
+/// The covariance where errors go together over `length`, in the unit of the points: in no direction smaller than `covariance`, which takes the points for independent.
+///
+/// From `covariance = X B X` with `B = sum W^t W` follows the `X` that the equations' errors are multiplied with: the geometric mean of the covariance and `B^-1`.
+pub(super) fn together(
+    covariance: &Matrix5,
+    inliers: &Observations,
+    at: &Weighted<'_>,
+    flow: &Flow<'_>,
+    length: f64,
+) -> Option<Matrix5> {
+    let squares = information(inliers, at.motion, at.tangent, at.nu);
+    let excess = excess(inliers, at, flow, length);
+    let l = squares.cholesky()?.l();
+    let back = l.try_inverse()?;
+    let relative = back * excess * back.transpose();
+    let eigen = SymmetricEigen::new(0.5 * (relative + relative.transpose()));
+    // Below 1 the points would tell more than independent ones.
+    let sizes = eigen.eigenvalues.map(|size| 1.0 + size.max(0.0));
+    let larger = eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose();
+    let told = l.transpose() * covariance * l;
+    let told = SymmetricEigen::new(0.5 * (told + told.transpose()));
+    let root = told.eigenvalues.map(|size| size.max(0.0).sqrt());
+    let root = told.eigenvectors * Matrix5::from_diagonal(&root) * told.eigenvectors.transpose();
+    let out = back.transpose() * root * larger * root * back;
+    let out = 0.5 * (out + out.transpose());
+    inverse(&out).map(|_| out)
+}
+
+/// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told has too much for each point's own where several share one error.
+fn excess(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f64) -> Matrix5 {
+    let mut points: Vec<(Vector3<f64>, Vector5)> =
+        (0..inliers.n).map(|k| (flow.place(inliers.source[k] as usize) / length, row(inliers, at, k))).collect();
+    // From top to bottom, so that only a band of them is near.
+    points.sort_by(|a, b| a.0.y.total_cmp(&b.0.y));
+    let own = inliers.own() * inliers.own();
+    let of_point = |k: usize| {
+        let (here, row) = &points[k];
+        let near = points[k + 1..].iter().take_while(|(place, _)| place.y - here.y < REACH);
+        let neighbours = near
+            .filter(|(place, _)| (place.x - here.x).abs() < REACH)
+            .fold(Vector5::zeros(), |sum, (place, row)| sum + row * (own * correlation((place - here).norm())));
+        let product = row * neighbours.transpose();
+        product + product.transpose() + row * row.transpose() * (own - 1.0)
+    };
+    // Added up in one order, whoever computes them.
+    let parts: Vec<Matrix5> = (0..points.len()).into_par_iter().map(of_point).collect();
+    parts.iter().sum()
+}
+
+/// The row `W_k = D(nu)`, 0 at the epipole.
+fn row(inliers: &Observations, at: &Weighted<'_>, k: usize) -> Vector5 {
+    let point = inliers.row(k);
+    let t = point.g * at.motion.u();
+    let s = t.norm();
+    if s * s <= inliers.floor {
+        return Vector5::zeros();
+    }
+    let across = nalgebra::RowVector2::new(t.y, -t.x) / s;
+    let psi = across * point.g * at.tangent.transpose() * at.nu[k];
+    let turn = across * point.r;
+    Vector5::new(psi.x, psi.y, turn.x, turn.y, turn.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_go_together_less_with_distance() {
+        assert_eq!(correlation(0.0), 1.0);
+        let values: Vec<f64> = (0..16).map(|d| correlation(f64::from(d))).collect();
+        assert!(values.windows(2).all(|pair| pair[1] < pair[0]), "{values:?}");
+        // At four correlation lengths a fifth is left, at fifteen one hundredth.
+        assert!((0.15..0.25).contains(&values[4]) && values[15] < 0.012, "{values:?}");
+    }
+}
