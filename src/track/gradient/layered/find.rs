@@ -140,8 +140,8 @@ impl Layered {
         best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
     }
 
-    /// Whether what was found is only what is left of a target that was covered or not seen in the frame before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by much, or
-    /// by less but off its way. Such a target is not seen; its way would end at that edge.
+    /// Whether what was found is only what is left of a target that was covered or not seen in the frame before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by much, or,
+    /// right after it was covered, by less but off its way. Such a target is not seen; its way would end at that edge.
     fn is_a_rest(&self, found: &Finding) -> bool {
         let pose = &found.aligned.pose;
         let off = found.nis > DOUBT && found.look.leak < LEAK && self.became_smaller(pose);

@@ -179,6 +179,9 @@ impl Background {
                 around.frame.row_mut(y)[x] = f64::NAN;
             }
         }
+        if around.frame.data().iter().all(|value| value.is_nan()) {
+            return;
+        }
         let filled = fill_holes(&around.frame, None);
         for y in 0..height {
             self.picture.row_mut(top + y)[left..left + width].copy_from_slice(filled.row(y));

@@ -201,7 +201,10 @@ impl Layered {
         let finding = finding.map(|found| self.unless_at_rest(found, &seen.frame));
         match &finding {
             Some((found, _)) => self.take(found, &seen.frame),
-            None => self.miss(),
+            None => {
+                self.recall();
+                self.miss();
+            }
         }
         match &finding {
             Some((found, false)) => self.resting = (!found.occluded).then(|| self.rest(&seen.frame)),

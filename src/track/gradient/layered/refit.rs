@@ -14,8 +14,14 @@ const SOON: usize = 8;
 const MOVED: [f64; 2] = [2.0, 7.0];
 /// The same as what the box holds tells it, which its other content may blur.
 const NEARLY: [f64; 2] = [1.0, 8.0];
-/// What a side must be off by: share of its length, and px.
-const OFF: (f64, f64) = (0.1, 1.5);
+/// How far the middles must be apart: share of the box's side, and px. What moves is told in whole pixels, and its extent is up to 2 px too long, on either end: its middle is off by 1 px at most.
+const APART: (f64, f64) = (0.1, 1.3);
+/// The same of the sides' difference.
+const LONGER: (f64, f64) = (0.15, 2.5);
+/// How far what moves may go beyond a box that holds all of it, px.
+const BEYOND: f64 = 1.5;
+/// Angle, rad, from which on changes since the first frame no longer tell the outline.
+pub(super) const TURNED: f64 = 0.05;
 /// Sides of what moves over those of the box, at least and at most.
 const SIDES: [f64; 2] = [0.55, 1.6];
 /// Distance of the middles of the two, share of the box's sides.
@@ -30,15 +36,15 @@ const ALIKE: f64 = 0.35;
 const STRAYS: f64 = 0.25;
 /// Fewest of them.
 const FEWEST: usize = 12;
-/// Shares of the target's pixels that are darker than its usual range, and not brighter.
+/// The 10th and the 90th percentile of a part's brightness: its usual range.
 const USUAL: [f64; 2] = [0.1, 0.9];
 
 impl Outset {
     /// What moved, where that has clearly other sides than the box.
     pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
         // Where what the box holds tells its displacement, that spares looking in vain.
-        let far = self.moved().is_none_or(|moved| (NEARLY[0]..=NEARLY[1]).contains(&greater(moved)));
-        if self.frames() > SOON || !far {
+        let promising = self.moved().is_none_or(|moved| (NEARLY[0]..=NEARLY[1]).contains(&greater(moved)));
+        if self.frames() > SOON || !promising {
             return None;
         }
         let changes = self.changes(frame, noise);
@@ -50,10 +56,10 @@ impl Outset {
             y: found.bounds.y + corner[1] - found.displacement[1],
             ..found.bounds
         };
-        let other = (MOVED[0]..=MOVED[1]).contains(&greater(found.displacement)) && is_another(&self.bounds, &first);
+        let told = (MOVED[0]..=MOVED[1]).contains(&greater(found.displacement)) && is_another(&self.bounds, &first);
         let bounds = TargetBox { x: first.x + found.displacement[0], y: first.y + found.displacement[1], ..first };
         let found = MovingTarget { bounds, ..found };
-        (other && changes.are_explained(&first, &found)).then_some(found)
+        (told && changes.are_explained(&first, &found)).then_some(found)
     }
 }
 
@@ -67,26 +73,22 @@ fn ends(bounds: &TargetBox) -> [[f64; 2]; 2] {
     [[bounds.x, bounds.x + bounds.width], [bounds.y, bounds.y + bounds.height]]
 }
 
-/// Whether what moves has clearly other sides than the box, and may still be what the box is about.
+/// Whether what moves has clearly other sides than the box, or another middle, and may still be what the box is about.
 fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
     let (held, found) = (ends(bounds), ends(first));
-    let mut off = false;
-    let mut within = true;
+    let (mut apart, mut longer, mut within, mut centred) = (0.0, false, true, true);
     for k in 0..2 {
         let (side, other) = (held[k][1] - held[k][0], found[k][1] - found[k][0]);
-        let most = (OFF.0 * side).max(OFF.1);
-        off |= (0..2).any(|end| (held[k][end] - found[k][end]).abs() >= most);
-        within &= found[k][0] > held[k][0] - OFF.1 && found[k][1] < held[k][1] + OFF.1;
         let aside = (0.5 * (held[k][0] + held[k][1] - found[k][0] - found[k][1])).abs();
         if !(SIDES[0]..SIDES[1]).contains(&(other / side)) || aside > ASIDE * side {
             return false;
         }
+        apart = f64::hypot(apart, aside / (APART.0 * side).max(APART.1));
+        longer |= (side - other).abs() >= (LONGER.0 * side).max(LONGER.1);
+        within &= found[k][0] > held[k][0] - BEYOND && found[k][1] < held[k][1] + BEYOND;
+        centred &= aside <= CENTRED.0 * side + CENTRED.1;
     }
-    let centred = (0..2).all(|k| {
-        let side = held[k][1] - held[k][0];
-        (0.5 * (held[k][0] + held[k][1] - found[k][0] - found[k][1])).abs() <= CENTRED.0 * side + CENTRED.1
-    });
-    off && (!within || centred)
+    (apart >= 1.0 || longer) && (!within || centred)
 }
 
 impl Changes<'_> {
@@ -112,6 +114,7 @@ impl Changes<'_> {
             }
             if in_box && !holds(&outline, at.0, at.1) && !holds(&now, at.0, at.1) {
                 counts[0] += 1;
+                // What looks like the target is its own if it may have moved with it; of an even background both hold.
                 let along = self.on([x, y], d).is_none_or(|to| self.along([x, y], to) <= self.bar);
                 strays[0] += usize::from(self.at_rest([x, y]) > self.bar || like && along);
             } else if !in_box && holds(&core, at.0, at.1) {

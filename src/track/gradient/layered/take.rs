@@ -122,9 +122,6 @@ impl Layered {
 
     /// No measurement.
     pub(super) fn miss(&mut self) {
-        if self.missed == 0 {
-            self.recall();
-        }
         self.missed += 1;
         self.covered = 0;
         self.before = None;

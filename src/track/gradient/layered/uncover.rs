@@ -7,6 +7,7 @@ use super::learn::{self, CONTINUED, SOLID};
 use super::outset::{Outset, Uncovered};
 use super::patch::smooth_known;
 use super::pose::Pose;
+use super::refit::TURNED;
 use super::{Layered, begun};
 use crate::track::gradient::detect::MovingTarget;
 use crate::types::{Frame, TargetBox};
@@ -29,12 +30,17 @@ impl Layered {
         let Some(mut outset) = self.outset.take().filter(|_| motion == [0.0; 2]) else { return };
         match outset.tell(frame, self.noise) {
             Some(found) => self.begin_anew(&outset, &found, frame),
-            None => match outset.outgrown(frame, self.noise).or_else(|| outset.refitted(frame, self.noise)) {
+            None => match outset.outgrown(frame, self.noise).or_else(|| self.refitted(&outset, frame)) {
                 Some(found) => self.begin_with(&found, frame, outset.frames()),
                 None if outset.is_over() => {}
                 None => self.outset = Some(outset),
             },
         }
+    }
+
+    /// The box of what moves, unless the target turned, which changes the outline as well. Its size says nothing: a box beside the target makes that seem to change.
+    fn refitted(&self, outset: &Outset, frame: &Frame<f64>) -> Option<MovingTarget> {
+        if self.turned.abs() < TURNED { outset.refitted(frame, self.noise) } else { None }
     }
 
     fn begin_anew(&mut self, outset: &Outset, found: &Uncovered, frame: &Frame<f64>) {
@@ -57,8 +63,9 @@ impl Layered {
     fn begin_with(&mut self, found: &MovingTarget, frame: &Frame<f64>, frames: usize) {
         self.target = Target::new(frame, found.bounds, learn::PRIOR);
         self.background = Background::new(frame, found.bounds);
+        let turned = self.turned;
         self.begin_at(found.bounds.centre(), found.displacement, frames);
-        // The sides of what moved are told to a pixel.
+        self.turned = turned;
         self.unsettled = [UNSETTLED; 2];
     }
 
@@ -74,15 +81,12 @@ impl Layered {
         (self.missed, self.hidden, self.age, self.most_seen) = (0, false, 0, 0.0);
         (self.turned, self.wary, self.front) = (0.0, 0, None);
         (self.resting, self.sound, self.adapts_until) = (None, None, ADAPTED);
-        self.doubt = [0.0; 2];
     }
 
     /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
     pub(super) fn look_at_the_whole_way(&mut self) {
-        // What was doubtful at the end of that time stays so.
-        let Some(outset) = &self.outset else { return };
-        let first = outset.bounds.centre();
-        let Some(moved) = outset.moved() else { return self.doubt = [0.0; 2] };
+        let told = self.outset.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
+        let Some((moved, first)) = told else { return self.doubt = [0.0; 2] };
         let (at, size) = (self.filter.position(), self.target.size);
         // The sides of what grows move otherwise than its middle.
         let grown = (self.pose.scale() - 1.0).abs();
