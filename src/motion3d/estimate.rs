@@ -38,7 +38,7 @@ const ROUNDING: f64 = 1e-11;
 /// not finite are left out and come back as NaN. Scenes that do not determine a motion are told by [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
+/// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     options.check(flow, noise)?;

@@ -199,12 +199,11 @@ impl Layered {
         }
         let finding = self.find_wherever_it_rides(&seen.frame, motion);
         let finding = finding.map(|found| self.unless_at_rest(found, &seen.frame));
-        match &finding {
-            Some((found, _)) => self.take(found, &seen.frame),
-            None => {
-                self.recall();
-                self.miss();
-            }
+        if let Some((found, _)) = &finding {
+            self.take(found, &seen.frame);
+        } else {
+            self.recall();
+            self.miss();
         }
         match &finding {
             Some((found, false)) => self.resting = (!found.occluded).then(|| self.rest(&seen.frame)),
