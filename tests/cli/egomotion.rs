@@ -178,7 +178,7 @@ fn mistakes_are_told_before_any_work() {
     approach(&place, "frames", 2);
     for (line, word) in [
         ("egomotion frames --intrinsics 1,2,3", "intrinsics"),
-        ("egomotion frames --intrinsics 0,1,2,3", "K:"),
+        ("egomotion frames --intrinsics 0,1,2,3", "focal lengths 0 and 1"),
         ("egomotion frames", "--intrinsics"),
         ("egomotion frames --intrinsics no.txt", "no.txt"),
         ("egomotion frames --intrinsics 120,120,64,48 --estimator best", "estimator"),

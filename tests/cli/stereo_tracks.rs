@@ -151,7 +151,7 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo -o t.txt", &["output", ".csv or .json"]),
         ("left right --method stereo -o old.csv", &["output", "--force"]),
         ("left right --method stereo -o - --json", &["output", "--json"]),
-        ("left right --method stereo --limit 1 -o t.csv --disparities -8,8", &["frames", "at least 2"]),
+        ("left right --method stereo --limit 1 -o t.csv --disparities -8,8", &["limit", "at least 2"]),
         ("left beside.y4m --method stereo -o t.csv", &["right", "(64, 96)", "(64, 192)"]),
     ] {
         let ended = place.line(&format!("track {options}"));
