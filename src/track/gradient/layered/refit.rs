@@ -191,7 +191,9 @@ mod tests {
     #[test]
     fn boxes_that_fit_and_targets_that_do_not_stand_out_are_left_alone() {
         assert_eq!(told(exact([0.0; 2], 1.0), [2, 3], 0, 200.0), None);
-        assert_eq!(told(exact([0.0; 2], 1.4), [0, 0], 0, 200.0), None);
+        // A displacement of which whole pixels say too little.
+        assert_eq!(told(exact([0.0; 2], 1.4), [1, 1], 0, 200.0), None);
+        assert!(told(exact([0.0; 2], 1.4), [2, 1], 0, 200.0).is_some());
         assert_eq!(told(exact([0.0; 2], 1.4), [2, 3], 0, 92.0), None);
     }
 

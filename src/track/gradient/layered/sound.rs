@@ -60,3 +60,100 @@ impl Layered {
         (self.pose.a, self.turned) = (sound.pose.a, sound.turned);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::track::gradient::layered::look::Look;
+    use crate::track::gradient::options::GradientOptions;
+    use crate::types::{Frame, TrackState};
+
+    const SIDE: usize = 14;
+    const SPEED: usize = 2;
+    /// Frames until it begins to vanish.
+    const SEEN: usize = 6;
+
+    /// A square moving to the right before waves, with noise.
+    fn frame(t: usize) -> Frame<f64> {
+        let rng = CounterRng::new(t as u64 + 1);
+        Frame::from_fn(120, 60, |x, y| {
+            let on = (20 + SPEED * t..20 + SPEED * t + SIDE).contains(&x) && (20..20 + SIDE).contains(&y);
+            let brightness = if on { 190.0 } else { 90.0 + 15.0 * (0.3 * x as f64).sin() * (0.25 * y as f64).cos() };
+            brightness + 1.5 * rng.normal((120 * y + x) as u64)
+        })
+    }
+
+    /// A tracker that has seen the square for a while, and what it found last.
+    fn followed() -> (Layered, Finding) {
+        let half = 0.5 * SIDE as f64;
+        let first = TargetBox::about([19.5 + half, 19.5 + half], 2.0 * half, 2.0 * half);
+        let mut tracker = Layered::new(frame(0), first, &GradientOptions::default());
+        let mut state = TrackState::at(first.centre(), first);
+        (1..=SEEN).for_each(|t| tracker.update(Some(&frame(t)), &mut state));
+        tracker.filter.predict();
+        let found = tracker.find(&frame(SEEN + 1)).unwrap();
+        assert!(!found.occluded, "{found:?}");
+        let whole = Look { visibility: 1.0, ..found.look };
+        (tracker, Finding { look: whole, ..found })
+    }
+
+    /// What an edge that covers the square makes of a measurement: it stays behind and shrinks.
+    fn mislead(tracker: &mut Layered, found: &Finding) {
+        tracker.filter.predict();
+        tracker.filter.x[0][0] -= 3.0;
+        tracker.filter.x[0][1] = 0.5;
+        tracker.filter.x[0][2] = -1.0;
+        tracker.pose.a = [[0.7, 0.1], [-0.1, 0.7]];
+        tracker.turned = 0.4;
+        tracker.remember(found, true);
+    }
+
+    #[test]
+    fn what_vanishes_goes_on_from_before_it_shrank() {
+        let (mut tracker, found) = followed();
+        tracker.remember(&found, false);
+        let (at, pose, turned) = (tracker.filter.position(), tracker.pose, tracker.turned);
+        (0..3).for_each(|_| mislead(&mut tracker, &found));
+        tracker.filter.predict();
+        tracker.recall();
+        let now = tracker.filter.position();
+        let reached = at[0] + 4.0 * SPEED as f64;
+        assert!((now[0] - reached).abs() < 0.5 && (now[1] - at[1]).abs() < 0.3, "{now:?}, not {reached}");
+        assert!((tracker.filter.speed()[0] - SPEED as f64).abs() < 0.2, "{:?}", tracker.filter.speed());
+        assert_eq!((tracker.pose.a, tracker.turned), (pose.a, turned));
+    }
+
+    #[test]
+    fn what_was_measured_is_kept_where_nothing_misled_it() {
+        let changed = |prepare: &dyn Fn(&mut Layered, &Finding)| {
+            let (mut tracker, found) = followed();
+            tracker.remember(&found, false);
+            prepare(&mut tracker, &found);
+            let before = (tracker.filter.clone(), tracker.pose, tracker.turned);
+            tracker.recall();
+            before != (tracker.filter, tracker.pose, tracker.turned)
+        };
+        assert!(changed(&mislead), "the scene of this test says nothing");
+        assert!(!changed(&|_, _| {}), "it vanished at once");
+        assert!(!changed(&|tracker, found| (0..=LATELY).for_each(|_| mislead(tracker, found))), "that is long ago");
+        assert!(
+            !changed(&|tracker, found| {
+                mislead(tracker, found);
+                tracker.missed = 1;
+            }),
+            "it was not seen in the frame before either"
+        );
+        assert!(
+            !changed(&|tracker, found| {
+                mislead(tracker, found);
+                tracker.pose.p[0] = 118.0;
+            }),
+            "it leaves the picture"
+        );
+        assert!(
+            !changed(&|tracker, found| tracker.remember(&Finding { occluded: true, ..*found }, false)),
+            "its cover was known, and nothing was taken for all of it"
+        );
+    }
+}
