@@ -4,7 +4,8 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking motion3d` chooses among the sections; its table is then printed and not kept.
+are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking motion3d` chooses among the sections; its table is then printed and not kept,
+unless `--out` names a folder: the newest table there is written anew with those sections, and the others as they were. A section tells its machine where that is another than the head's.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import importlib.metadata
 import json
 import os
 import platform
+from dataclasses import dataclass, field
 from pathlib import Path
 
 Rows = list[dict[str, object]]
@@ -40,15 +42,74 @@ def main() -> None:
             sections |= run(name, options.quick, data)
     machine = describe_machine(options.simd)
     date = datetime.date.today().isoformat()
-    text = markdown(date, machine, sections)
-    print(text)
-    if options.out is None and set(options.only) != set(SECTIONS):
+    record = Record(date, machine, sections)
+    print(record.markdown())
+    everything = set(options.only) == set(SECTIONS)
+    if options.out is None and not everything:
         return
     folder = options.out or Path(__file__).parent / "results"
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{date}.md").write_text(text, encoding="utf-8")
-    record = {"date": date, "machine": machine, "sections": sections}
-    (folder / f"{date}.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    before = None if everything else newest(folder)
+    (record if before is None else before.updated(record)).keep(folder)
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is kept of a comparison."""
+
+    date: str
+    machine: dict[str, str]
+    sections: dict[str, Rows]
+    elsewhere: dict[str, dict[str, str]] = field(default_factory=dict)
+    """Machines of sections that were measured on another, by title."""
+
+    def updated(self, new: Record) -> Record:
+        """With the sections of another one; titles that are new follow the one they follow there. The head stays."""
+        titles = list(self.sections)
+        before: str | None = None
+        for title in new.sections:
+            if title not in titles:
+                titles.insert(len(titles) if before is None else titles.index(before) + 1, title)
+            before = title
+        sections = {**self.sections, **new.sections}
+        elsewhere = {title: machine for title, machine in self.elsewhere.items() if title not in new.sections}
+        if new.machine != self.machine:
+            elsewhere |= dict.fromkeys(new.sections, new.machine)
+        return Record(new.date, self.machine, {title: sections[title] for title in titles}, elsewhere)
+
+    def keep(self, folder: Path) -> None:
+        """Writes `<date>.md` and `<date>.json`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        record = {"date": self.date, "machine": self.machine, "sections": self.sections, "elsewhere": self.elsewhere}
+        for ending, text in (("md", self.markdown()), ("json", json.dumps(record, indent=1) + "\n")):
+            temporary = folder / f".{self.date}.{ending}"
+            temporary.write_text(text, encoding="utf-8")
+            temporary.replace(folder / f"{self.date}.{ending}")
+
+    def markdown(self) -> str:
+        """The tables as text."""
+        parts = [f"# Comparison of {self.date}", "", told(self.machine), ""]
+        parts += ["Written by `python benchmarks/compare.py`. Times: CPU time of the busiest thread.", ""]
+        for title, rows in self.sections.items():
+            parts += [f"## {title}", ""]
+            if title in self.elsewhere:
+                other = {key: value for key, value in self.elsewhere[title].items() if self.machine.get(key) != value}
+                parts += [f"Measured on another machine: {told(other)}", ""]
+            parts += [*(table_lines(rows) if rows else ["Skipped: the rival is missing."]), ""]
+        return "\n".join(parts)
+
+
+def newest(folder: Path) -> Record | None:
+    """The last record kept in a folder, if there is one."""
+    files = sorted(folder.glob("[0-9]*.json"))
+    if not files:
+        return None
+    kept = json.loads(files[-1].read_text(encoding="utf-8"))
+    return Record(kept["date"], kept["machine"], kept["sections"], kept.get("elsewhere", {}))
+
+
+def told(machine: dict[str, str]) -> str:
+    """A machine in a line."""
+    return ", ".join(f"{key} {value}" for key, value in machine.items()) + "."
 
 
 def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
@@ -125,19 +186,6 @@ def describe_machine(simd: str) -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             machine[package] = "missing"
     return machine
-
-
-def markdown(date: str, machine: dict[str, str], sections: dict[str, Rows]) -> str:
-    """The tables as text."""
-    parts = [f"# Comparison of {date}", "", ", ".join(f"{key} {value}" for key, value in machine.items()) + ".", ""]
-    parts += ["Written by `python benchmarks/compare.py`. Times: CPU time of the busiest thread.", ""]
-    for title, rows in sections.items():
-        parts += [f"## {title}", ""]
-        if not rows:
-            parts += ["Skipped: the rival is missing.", ""]
-            continue
-        parts += [*table_lines(rows), ""]
-    return "\n".join(parts)
 
 
 def table_lines(rows: Rows) -> list[str]:

@@ -1,10 +1,10 @@
 """Disparity of edge pixels: ours beside OpenCV's semi-global matching and block matching.
 
-    python benchmarks/stereo.py [--quick] [--data FOLDER] [--only drawn recordings]
+    python benchmarks/stereo.py [--quick] [--data FOLDER] [--only drawn prior recordings]
 
 Drawn scenes with exact truth (:mod:`stereo_scenes`), some steps of each; then recordings with a known disparity. All methods are judged at the same edge pixels
 of the left view, those of section 2.2 of the specification, each at a given resolution and none with a mask of its own. OpenCV matches whole rows: on drawn scenes, whose cameras are not
-aligned, it is shown both as it is and with the right view moved by the true row offset.
+aligned, it is shown both as it is and with the right view moved by the true row offset. Between them :mod:`stereo_prior`: a fence whose pales look alike.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ except ImportError:
 
 Row = dict[str, object]
 Picture = NDArray[np.uint8]
-NAMES = ("drawn", "recordings")
+NAMES = ("drawn", "prior", "recordings")
 STEPS = {"crossing": (0, 5, 10, 15), "curved": (0, 3, 6, 9), "cart": (0, 3, 6, 9), "small": (0, 2, 4)}
 """Steps that are averaged over."""
 ASKED = {
@@ -178,6 +178,10 @@ def sections(quick: bool, data: Path | None, names: tuple[str, ...] = NAMES) -> 
     found: dict[str, list[Row]] = {}
     if "drawn" in names:
         found["Disparity of edge pixels, scenes with exact truth"] = drawn(["crossing", "small"] if quick else list(STEPS), rounds)
+    if "prior" in names:
+        import stereo_prior
+
+        found["Disparity of edge pixels, looked for near those of the step before"] = stereo_prior.table()
     if "recordings" in names and data is not None:
         import stereo_recordings
 

@@ -8,7 +8,7 @@ its largest cluster is on the track from before it was hidden by the third step 
 Short tracks are those of one step, of all that begin before the last one. Errors are medians of |error| of (u, v, w), px and disparity per step, over clusters at least 80 % pure: speed of the affine motion at the object's own pixels beside the median of the truth there, velocity of `next_velocity` beside the truth at `middle`, median of `next_velocity` beside the median of the truth over the object's own pixels; gross are those off by more than 2 px along x or y or by 1 disparity, and those off by more than 2 px of length. The latter is the harder count: in whole cells of 8 px a motion of 22 px/step cannot be told better than to 2 px.
 
 Seeds are of the textures, the noise and the mixture's starts, all of them others; the first is the specification's. The paper's mode begins anew at every step, and in which optimum a step ends is a matter of luck: where a person is half hidden,
-one start in six or so puts what is left into the wall. There each texture is followed from several starts. Everything is the mean over the films; paths, index and id are the least of them and their mean. Times are medians over steps and films: on the clock, and of all threads together, which other work on the machine changes less.
+one start in six or so puts what is left into the wall. There each texture is followed from several starts. Everything is the mean over the films; paths, index and id are the least of them and their mean. Times are medians over steps and films: on the clock, and of all threads together, which other work on the machine changes less. Rounds are those of the mixture: the improved mode stops by the bound, and after the first step begins where the components moved to.
 """
 
 from __future__ import annotations
@@ -52,22 +52,25 @@ class Cost:
     wall: float
     cpu: float
     """Of all threads together."""
+    rounds: tuple[float, float]
+    """Rounds of the mixture in the first step, and the mean of those after it."""
 
 
 def follow(scene: stereo_scenes.Scene, film: Sequence[stereo_scenes.Step], tracker: StereoTracker, from_truth: bool) -> tuple[Scores, Cost]:
     """Scores of a film, and the time of a step, the median."""
-    clusterings, costs = [], []
+    clusterings, costs, rounds = [], [], []
     rng = np.random.default_rng(scene.seed)
     for shown in film:
         disparity = edges_of_truth(shown, rng) if from_truth else None
         wall, cpu = time.perf_counter(), time.process_time()
         step = tracker.update(shown.left, shown.right) if disparity is None else tracker.update_disparity(shown.left, disparity)
         costs.append((time.perf_counter() - wall, time.process_time() - cpu))
+        rounds.append(step.rounds)
         clusterings.append(Clustering(step.rows, step.cols, step.cluster_of_pixel))
     nodes = {key: node_of(cluster) for key, cluster in tracker.graph.nodes.items()}
     arcs = {(t, start, end): sum(shares) for ((t, start), (_, end)), shares in tracker.graph.arcs.items()}
     truths = [Truth(shown.label, shown.motion) for shown in film]
-    return Scores(truths, clusterings, Graph(nodes, arcs)), Cost(*map(float, np.median(costs, axis=0)))
+    return Scores(truths, clusterings, Graph(nodes, arcs)), Cost(*map(float, np.median(costs, axis=0)), (float(rounds[0]), float(np.mean(rounds[1:]))))
 
 
 def node_of(cluster: StereoCluster) -> Node:
@@ -142,6 +145,7 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, starts: int, from_
     costs = [cost for films in followed for _, cost in films]
     row["ms a step"] = 1e3 * float(np.median([cost.wall for cost in costs]))
     row["ms, all threads"] = 1e3 * float(np.median([cost.cpu for cost in costs]))
+    row["rounds, first step / later"] = " / ".join(f"{np.mean(each):.0f}" for each in zip(*(cost.rounds for cost in costs), strict=True))
     row["asked"] = ASKED.get((scene.name, mode), "-")
     return row
 

@@ -33,6 +33,8 @@ LOCAL_BARS = {"sight_on3": ">= 1", "centre_error": "<= 1.6", "velocity_error": "
 """Asked of `local` there."""
 PAPER_BARS = {"displacement_error": "<= 0.06 (flat, no noise)"}
 """Asked of `paper`: its raw velocity on a flat background."""
+ROUNDS = 3
+"""In which a large target is followed, for other work on a machine makes single times half as long again."""
 LAST = 10
 """Frames at the end that tell whether a target was followed to it."""
 KEPT = 0.9
@@ -139,12 +141,13 @@ def summary(tested: list[Scene], trackers: list[Tracker]) -> list[Row]:
 
 
 def large(trackers: list[Tracker]) -> list[Row]:
-    """One row for each scene and tracker: CPU time of a frame, and how well it was followed. KCF is the bar for our time with a camera that stands still."""
-    kept = ("milliseconds", "success", "centre_error")
+    """One row for each scene and tracker: CPU time of a frame, the least of rounds taken in turns, and how well it was followed. KCF is the bar for our time with a camera that stands still."""
     rows: list[Row] = []
     for scene in tracking_large.large():
-        for name, figures in run(scene, trackers).items():
-            rows.append({"scene": scene.name, "tracker": name, **{column: figures[column] for column in kept}})
+        rounds = [run(scene, trackers) for _ in range(ROUNDS)]
+        for name, figures in rounds[0].items():
+            milliseconds = min(each[name]["milliseconds"] for each in rounds)
+            rows.append({"scene": scene.name, "tracker": name, "milliseconds": milliseconds, **{column: figures[column] for column in ("success", "centre_error")}})
     return rows
 
 
