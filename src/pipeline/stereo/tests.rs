@@ -82,14 +82,46 @@ fn threads_make_no_difference() {
     assert_eq!(texts[0], texts[1]);
 }
 
+/// Fails at its third pair.
+struct Failing(usize);
+
+impl StereoSink for Failing {
+    fn accept(&mut self, _: &StereoStep<'_>) -> Result<()> {
+        self.0 += 1;
+        if self.0 < 3 { Ok(()) } else { Err(Error::argument("disk", "room", "none")) }
+    }
+
+    fn finish(&mut self, _: Ending, _: &TrackGraph) -> Result<()> {
+        Ok(())
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        (0, None)
+    }
+}
+
 #[test]
 fn a_run_that_fails_keeps_what_there_is_under_other_names() {
     let folder = tempfile::tempdir().unwrap();
-    let (summary, ended) = run(1, Box::new(|| into(folder.path())), 1);
-    assert!(ended.unwrap_err().to_string().starts_with("frames: "));
+    let begin = || {
+        let mut sinks = into(folder.path())?;
+        sinks.push(Box::new(Failing(0)));
+        Ok(sinks)
+    };
+    let (summary, ended) = run(4, Box::new(begin), 1);
+    assert!(ended.unwrap_err().to_string().starts_with("disk: "));
     let mut names: Vec<_> =
         folder.path().read_dir().unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     assert_eq!(names, ["g.partial.png", "p", "t.partial.csv", "t.partial.json"]);
-    assert_eq!((summary.pairs, summary.files), (1, 5));
+    assert_eq!(summary.pairs, 2);
+}
+
+#[test]
+fn of_fewer_than_two_pairs_nothing_is_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let (summary, ended) = run(1, Box::new(|| into(folder.path())), 1);
+    let told = ended.unwrap_err().to_string();
+    assert!(told.starts_with("frames: ") && told.contains("at least 2 pairs") && told.contains('1'), "{told}");
+    assert_eq!((summary.pairs, summary.files, folder.path().read_dir().unwrap().count()), (0, 0, 0));
 }
