@@ -72,11 +72,16 @@ def further() -> Iterator[Scene]:
     x, y, w, h = square(circle(RADIUS)).boxes()[0]
     yield scene("start box off by 2 px", start=(x + 2, y - 2, w, h))
     yield scene("start box 40 % too large", start=(x - 0.2 * w, y - 0.2 * h, 1.4 * w, 1.4 * h))
-    planes = (Plane(KIND, SEED, line((0.0, 0.0), (1.0, 0.0)), (0, 128)), Plane(KIND, SEED + 1, line((0.0, 0.0), (3.0, 0.0)), (128, 256)))
-    yield scene("two background planes, 1 and 3 px/frame", planes=planes)
+    yield two_planes(SEED)
     yield scene("level 130, noise 5", square(circle(RADIUS), level=130.0), noise=5.0)
     yield meeting("a twin passes 16 px beside", (2.0, 0.0), (-2.0, 0.0), apart=(0.0, 16.0))
     yield meeting("a twin overtakes 14 px beside", (1.5, 0.0), (2.5, 0.0), apart=(0.0, 14.0))
+
+
+def two_planes(seed: int) -> Scene:
+    """A background whose left half moves by 1 px a frame and whose right half by 3."""
+    left, right = (line((0.0, 0.0), (speed, 0.0)) for speed in (1.0, 3.0))
+    return scene("two background planes, 1 and 3 px/frame", planes=(Plane(KIND, seed, left, (0, 128)), Plane(KIND, seed + 1, right, (128, 256))))
 
 
 def others_win() -> list[Scene]:
