@@ -429,6 +429,8 @@ def estimate_field_motion(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, and for options that do not fit.
     """
+    if K is None:
+        raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
     points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)

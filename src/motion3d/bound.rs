@@ -1,6 +1,6 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
-use super::covariance::{Matrix5, direction_deviation, inverse};
+use super::covariance::{Matrix5, determined, direction_deviation};
 use super::intake::whiten;
 use super::kernels::{equations, information};
 use super::motion::{Motion, tangents};
@@ -71,7 +71,7 @@ pub fn motion_bound(
     nu.resize(observations.stride, 0.0);
     let tangent = tangents(&motion.u());
     let m = information(&observations, motion, &tangent, &nu);
-    let bound = inverse(&m).ok_or_else(not_determined)?;
+    let bound = determined(&m).ok_or_else(not_determined)?;
     let noise = equations(&observations, motion, &tangent, None).p;
     let likelihood = bound + bound * noise * bound;
     let ideal = bound + bound * weighted_noise(&observations, motion, &tangent, &nu, &bound) * bound;

@@ -9,6 +9,9 @@ pub(super) type Matrix5 = SMatrix<f64, 5, 5>;
 /// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still known to be positive.
 const LEAST_INFORMATION: f64 = 1e-3;
 
+/// Least eigenvalue of an information in units of its own diagonal, below which it may be rounding; a field of half a degree leaves a million times as much.
+const ROUNDING: f64 = 1e-12;
+
 /// What the data say about the covariance of maximum likelihood and the bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plugged {
@@ -22,6 +25,15 @@ pub(super) struct Plugged {
 pub(super) fn inverse(matrix: &Matrix5) -> Option<Matrix5> {
     let inverse = matrix.cholesky()?.inverse();
     inverse.iter().all(|value| value.is_finite()).then_some(inverse)
+}
+
+/// The inverse of an information that determines all five numbers; `None` where rounding alone keeps it positive definite, as that of fewer points than a motion takes, or of all in two places.
+pub(super) fn determined(information: &Matrix5) -> Option<Matrix5> {
+    let units = Matrix5::from_diagonal(&information.diagonal().map(|own| 1.0 / own.sqrt()));
+    let unitless = units * information * units;
+    let finite = unitless.iter().all(|value| value.is_finite());
+    let least = if finite { SymmetricEigen::new(unitless).eigenvalues.min() } else { 0.0 };
+    if least > ROUNDING { inverse(information) } else { None }
 }
 
 /// The covariances that the equations at a minimum give; `None` where noise makes up nearly all of the information.

@@ -9,7 +9,7 @@ mod verdict;
 
 use super::bound::{MotionBound, check_truth, not_determined};
 use super::camera::Intrinsics;
-use super::covariance::{inverse, plugged_in};
+use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
@@ -228,7 +228,7 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
     let surfaces: Vec<Vector3<f64>> = system.source.iter().map(|&k| surfaces[k as usize].into()).collect();
     let tangent = tangents(&motion.u());
     let truth = system.equations(motion, &tangent, Some(&surfaces));
-    let bound = inverse(&truth.h).ok_or_else(not_determined)?;
+    let bound = determined(&truth.h).ok_or_else(not_determined)?;
     let likelihood = bound + bound * truth.p * bound;
     let ideal = bound + bound * system.weighted_noise(motion, &tangent, &surfaces, &bound) * bound;
     Ok(MotionBound::of(&tangent, &bound, &likelihood, &ideal))

@@ -394,6 +394,8 @@ def test_a_field_gives_the_motion_and_the_points():
     assert len(points) == len(found.inv_depth) >= 12
     assert np.diff(np.unique(points[:, 0])).min() >= max(8, 2 * field.correlation_length) - 1
     assert found.approach_rate == pytest.approx(-0.02, rel=0.15)
+    with pytest.raises(ValueError, match="K: "):
+        motion3d.estimate_field_motion(field, None)  # type: ignore[arg-type]
     coarse, fewer = motion3d.estimate_field_motion(field, camera, max_points=9)
     assert len(fewer) <= 9 and coarse.inv_depth.shape == (len(fewer),)
     _, inside = motion3d.estimate_field_motion(field, camera, region=(20, 10, 60, 50), spacing=8, robust=False)

@@ -60,6 +60,22 @@ def test_the_specifications_figures_on_the_small_scene(mode, purity, recalls, er
         assert scores.index_kept(2) == 6
 
 
+@pytest.mark.parametrize("seed", [3, 23])
+def test_a_pair_that_comes_twice_stands_still_and_changes_no_name(seed):
+    """The cart recedes by 3 px of disparity a step: a standstill would be a jump."""
+    film = replace(cart(), seed=seed).film()
+    tracker = StereoTracker()
+    of_cart = []
+    for shown in [*film[:4], film[3], *film[4:7]]:
+        step = tracker.update(shown.left, shown.right)
+        indices, counts = np.unique(step.cluster_of_pixel[shown.label[step.rows, step.cols] == 1], return_counts=True)
+        of_cart.append(next(cluster for cluster in step.clusters if cluster.index == indices[counts.argmax()]))
+    assert len({cluster.track_id for cluster in of_cart}) == 1
+    assert not any(cluster.coasting for cluster in of_cart)
+    np.testing.assert_array_equal(of_cart[4].velocity, 0)
+    assert all(cluster.velocity[2] == pytest.approx(-3, abs=0.05) for cluster in [*of_cart[1:4], *of_cart[5:]])
+
+
 EXPOSURES = {
     "darker by a twentieth a step": lambda t: (0.95**t, 0.0),
     "brighter by a fiftieth a step": lambda t: (0.8 * 1.02**t, 0.0),

@@ -219,3 +219,10 @@ def test_what_comes_out_from_behind_something_is_not_sure_of_its_place(kind):
     errors = np.linalg.norm(found.position - scene.centres, axis=1) / np.sqrt(found.covariance[:, :, 0, 0].sum(axis=1))
     out = np.flatnonzero((found.status == "tracking") & (np.arange(len(found)) > 19))[:2]
     assert errors[out].max() <= 3.0
+
+
+@pytest.mark.parametrize("seed", [101, 105, 108, 115, 119])
+def test_the_plane_behind_the_target_is_the_scene_where_two_move(seed):
+    """With the motion of both halves together, texture of the one behind the target was learnt as its own."""
+    scene = tracking_hard_scenes.two_planes(seed)
+    assert success(scene, follow(scene)) >= 0.95

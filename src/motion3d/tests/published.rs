@@ -105,3 +105,29 @@ fn points_that_determine_nothing_have_no_bound() {
         motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: ")
     );
 }
+
+#[test]
+fn too_few_places_have_no_bound_whatever_rounding_makes_of_them() {
+    let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+    let bound = |points: &[[f64; 2]]| {
+        let flow = vec![[0.0; 2]; points.len()];
+        let depths: Vec<f64> = (0..points.len()).map(|k| 0.5 + 0.37 * (k % 3) as f64).collect();
+        let points = Flow::Plane { points, flow: &flow, camera: None };
+        motion_bound(&points, &Noise::Sigma(0.01), &motion, &depths)
+    };
+    let rng = crate::math::random::CounterRng::new(5);
+    let places = |n: usize, trial: u64, half: f64| -> Vec<[f64; 2]> {
+        let at = |k: u64| half * (2.0 * rng.stream(trial).uniform(k) - 1.0);
+        (0..n as u64).map(|k| [at(2 * k), at(2 * k + 1)]).collect()
+    };
+    for trial in 0..100 {
+        for few in [3, 4] {
+            assert!(matches!(bound(&places(few, trial, 0.6)), Err(crate::Error::NotObservable(_))), "{few} {trial}");
+        }
+        let two = places(2, trial, 0.6);
+        let twice: Vec<_> = (0..20).map(|k| two[k % 2]).collect();
+        assert!(matches!(bound(&twice), Err(crate::Error::NotObservable(_))), "{trial}");
+        // A long lens does determine a motion, if badly.
+        assert!(bound(&places(30, trial, 0.02)).is_ok(), "{trial}");
+    }
+}

@@ -1,6 +1,7 @@
 //! What moves the whole picture: the camera.
 
 use super::layers::{Background, grown, holds, is_inside};
+use super::nearby::nearby;
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
@@ -20,7 +21,7 @@ const STEPS: usize = 8;
 /// A level is left when a step is shorter, reduced px.
 const SETTLED: f64 = 0.005;
 /// Motions nearer to each other than this lead to the same, px.
-const SAME: f64 = 0.5;
+pub(super) const SAME: f64 = 0.5;
 /// Shortest motion that is believed, px.
 const LEAST_MOTION: f64 = 0.05;
 /// By how much the capped residual must fall.
@@ -59,8 +60,17 @@ impl Seen {
     }
 }
 
-/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better. `before` is that of the frame before.
+/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better. `before` is that of the frame before. Where the scene moves, but not as one, that of what is around the target.
 pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64, before: [f64; 2]) -> [f64; 2] {
+    let scene = scene_motion(previous, now, target, noise, before);
+    if scene == [0.0; 2] && before == scene {
+        return scene;
+    }
+    nearby((&previous.frame, &now.frame), target, (scene, before), noise)
+}
+
+/// That of most of the picture.
+fn scene_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64, before: [f64; 2]) -> [f64; 2] {
     let hidden = grown(target, (0.0, AROUND));
     let swinging = before != [0.0; 2];
     let mut motion = [0.0; 2];
@@ -153,7 +163,7 @@ pub(super) fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> im
 }
 
 /// Pixels of a frame that its motion is told from.
-struct Samples {
+pub(super) struct Samples {
     places: Vec<(usize, usize)>,
     values: Vec<f64>,
     gradients: Vec<[f64; 2]>,
@@ -161,13 +171,21 @@ struct Samples {
 
 impl Samples {
     fn of(frame: &Frame<f64>, hidden: &TargetBox) -> Self {
-        let places: Vec<_> = spread(frame.size(), *hidden, SAMPLES).collect();
+        Self::at(frame, spread(frame.size(), *hidden, SAMPLES).collect())
+    }
+
+    /// At places at least one pixel from the border.
+    pub fn at(frame: &Frame<f64>, places: Vec<(usize, usize)>) -> Self {
         let gradient = |&(x, y): &(usize, usize)| {
             let (row, above, below) = (frame.row(y), frame.row(y - 1), frame.row(y + 1));
             [0.5 * (row[x + 1] - row[x - 1]), 0.5 * (below[x] - above[x])]
         };
         let values = places.iter().map(|&(x, y)| frame.get(x, y)).collect();
         Self { values, gradients: places.iter().map(gradient).collect(), places }
+    }
+
+    pub fn len(&self) -> usize {
+        self.places.len()
     }
 
     /// What the next frame shows at the moved samples, less what they were; NaN where that is not in the frame.
@@ -206,7 +224,7 @@ impl Samples {
     }
 
     /// Mean residual, large ones counting alike.
-    fn capped(&self, next: &Frame<f64>, motion: [f64; 2]) -> f64 {
+    pub fn capped(&self, next: &Frame<f64>, motion: [f64; 2]) -> f64 {
         let residuals = self.residuals(next, motion);
         let sizes = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan());
         let (sum, count) = sizes.fold((0.0, 0usize), |(sum, count), size| (sum + size, count + 1));
@@ -214,7 +232,7 @@ impl Samples {
     }
 
     /// Gradient steps on all samples (5); `None` where the scene has no texture.
-    fn refine(&self, next: &Frame<f64>, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
+    pub fn refine(&self, next: &Frame<f64>, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
         for _ in 0..STEPS {
             let residuals = self.residuals(next, motion);
             let s = deviation_of_the_better_half(&residuals).max(noise);

@@ -14,6 +14,7 @@ mod level;
 mod light;
 mod look;
 mod margin;
+mod nearby;
 mod nodes;
 mod outgrown;
 mod outline;

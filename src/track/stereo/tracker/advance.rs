@@ -81,7 +81,8 @@ impl StereoTracker {
             map.row_mut(points.rows[i] as usize)[points.columns[i] as usize] = points.disparities[i];
         }
         let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
-        let motions = self.carry(view);
+        // What stops for a frame has not jumped, and nothing is learnt of its way.
+        let motions = if self.is_repeated(&points, &levels) { self.stay() } else { self.carry(view) };
         let last = self.last.take();
         let carried: Vec<Option<[f64; 3]>> = match &last {
             Some(last) => (0..motions.len()).map(|k| voxel_motion(&last.clusters, k, &motions[k]?.0)).collect(),

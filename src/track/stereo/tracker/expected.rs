@@ -3,9 +3,10 @@
 use super::super::clusters::Clusters;
 use super::super::fine_motion::{FineMotion, places};
 use super::super::identity::Carried;
-use super::super::lucas_kanade::middle;
+use super::super::lucas_kanade::{SmoothedLevels, middle};
 use super::super::measured_motion::{Guess, NextView, fine_motions};
 use super::super::overlap::moved_overlaps;
+use super::super::voxels::EdgePoints;
 use super::StereoTracker;
 use crate::mixture::Points;
 
@@ -70,6 +71,24 @@ impl StereoTracker {
             best.filter(|(share, _)| *share > 0.0).map(|(_, motion)| motion)
         };
         motions.iter().enumerate().map(|(k, motion)| motion.map(|(motion, _)| motion).or_else(|| assumed(k))).collect()
+    }
+
+    /// Whether a pair is the last one again, to the bit, as recordings repeat frames.
+    pub(super) fn is_repeated(&self, points: &EdgePoints, levels: &SmoothedLevels) -> bool {
+        self.last.as_ref().is_some_and(|last| {
+            let before = last.levels.as_ref().map(|levels| levels.sharpest().data());
+            !points.is_empty() && last.clusters.points == *points && before == Some(levels.sharpest().data())
+        })
+    }
+
+    /// Every cluster stays where it is. What is known of its way is kept: after a frame that was repeated it goes on as before.
+    pub(super) fn stay(&self) -> Vec<Option<(FineMotion, Carried)>> {
+        let Some(last) = &self.last else { return vec![] };
+        let still = |k: usize| {
+            let motion = FineMotion::translation([0.0; 3], middle(&places(&last.clusters, k)));
+            (motion, Carried { motion: [0.0; 3], coasting: false })
+        };
+        (0..last.clusters.components()).map(|k| (!last.clusters.pixels[k].is_empty()).then(|| still(k))).collect()
     }
 
     /// How each cluster of the last step gets to the next view.

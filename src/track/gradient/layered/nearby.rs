@@ -1,0 +1,89 @@
+//! The motion of what is around the target, where the scene does not move as one.
+//!
+//! Two planes pass a camera at two speeds. What most of the picture does, or the mean of both, says nothing of the background that the target is before, whose texture would be taken for the target's.
+
+use super::camera::{AROUND, LESS, SAME, Samples};
+use super::layers::{grown, holds};
+use crate::types::{Frame, TargetBox};
+
+/// Farthest from the target, px.
+const NEAR: f64 = 48.0;
+/// Pixels that it is told from, about.
+const SAMPLES: usize = 1024;
+/// Fewest of them.
+const FEWEST: usize = 256;
+/// Mean residual up to which the motion of the scene explains them: so many times the noise, and grey levels.
+const EXPLAINED: (f64, f64) = (3.0, 1.0);
+/// Farthest another motion may be from it along both axes, px.
+const REACH: i32 = 3;
+
+/// `scene`, which is the motion of most of the picture, px, unless another one explains clearly better what is around the target. `before` is that of the frame before.
+pub(super) fn nearby(
+    (previous, now): (&Frame<f64>, &Frame<f64>),
+    target: TargetBox,
+    (scene, before): ([f64; 2], [f64; 2]),
+    noise: f64,
+) -> [f64; 2] {
+    let samples = Samples::at(previous, around(target, previous.size()));
+    if samples.len() < FEWEST {
+        return scene;
+    }
+    let left = samples.capped(now, scene);
+    if left < EXPLAINED.0 * noise + EXPLAINED.1 {
+        return scene;
+    }
+    // Where two motions meet, steps from the mean of both end there.
+    let whole = (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| [dx, dy]));
+    let tried = whole.map(|d| [0, 1].map(|k| scene[k].round() + f64::from(d[k]))).chain([before]);
+    let best = tried.map(|motion| (samples.capped(now, motion), motion)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let other = best.and_then(|(_, motion)| samples.refine(now, motion, noise)).filter(|other| {
+        let apart = (other[0] - scene[0]).hypot(other[1] - scene[1]);
+        apart >= SAME && samples.capped(now, *other) < LESS * left
+    });
+    other.unwrap_or(scene)
+}
+
+/// Pixels around the target, spread evenly, two from the border at least.
+fn around(target: TargetBox, (width, height): (usize, usize)) -> Vec<(usize, usize)> {
+    let (hidden, reach) = (grown(target, (0.0, AROUND)), grown(target, (0.0, NEAR)));
+    let step = ((reach.width * reach.height - hidden.width * hidden.height) / SAMPLES as f64).sqrt().ceil().max(1.0);
+    let along = |from: f64, length: f64, size: usize| {
+        let inside = |at: f64| (at.max(2.0) as usize).min(size.saturating_sub(2));
+        (inside(from)..inside(from + length)).step_by(step as usize)
+    };
+    let rows = along(reach.y, reach.height, height);
+    let pixels = rows.flat_map(|y| along(reach.x, reach.width, width).map(move |x| (x, y)));
+    pixels.filter(|(x, y)| !holds(&hidden, *x, *y)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE: f64 = 0.3;
+
+    /// Waves whose left half has moved by `left` px, and whose right half by `right`.
+    fn scene(left: f64, right: f64) -> Frame<f64> {
+        Frame::from_fn(240, 160, |x, y| {
+            let moved = x as f64 - if x < 120 { left } else { right };
+            let y = y as f64;
+            120.0 + 25.0 * (0.31 * moved + 0.05 * y).sin() * (0.23 * y).cos() + 15.0 * (0.11 * moved - 0.17 * y).sin()
+        })
+    }
+
+    #[test]
+    fn the_plane_behind_the_target_is_told() {
+        let target = TargetBox { x: 180.0, y: 70.0, width: 13.0, height: 13.0 };
+        let [before, now] = [scene(0.0, 0.0), scene(1.0, 3.0)];
+        let found = nearby((&before, &now), target, ([1.9, 0.0], [0.0; 2]), NOISE);
+        assert!((found[0] - 3.0).abs() < 0.1 && found[1].abs() < 0.1, "{found:?}");
+        let left = TargetBox { x: 50.0, ..target };
+        let found = nearby((&before, &now), left, ([1.9, 0.0], [0.0; 2]), NOISE);
+        assert!((found[0] - 1.0).abs() < 0.1 && found[1].abs() < 0.1, "{found:?}");
+        // Where the scene moves as one, or nothing is around, the motion is the scene's, to the last digit.
+        let as_one = scene(3.0, 3.0);
+        assert_eq!(nearby((&before, &as_one), target, ([2.98, 0.01], [0.0; 2]), NOISE), [2.98, 0.01]);
+        let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
+        assert_eq!(nearby((&before, &now), nowhere, ([1.9, 0.0], [0.0; 2]), NOISE), [1.9, 0.0]);
+    }
+}
