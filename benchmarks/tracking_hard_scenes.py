@@ -79,9 +79,9 @@ def further() -> Iterator[Scene]:
 
 
 def two_planes(seed: int) -> Scene:
-    """A background whose left half moves by 1 px a frame and whose right half by 3."""
-    left, right = (line((0.0, 0.0), (speed, 0.0)) for speed in (1.0, 3.0))
-    return scene("two background planes, 1 and 3 px/frame", planes=(Plane(KIND, seed, left, (0, 128)), Plane(KIND, seed + 1, right, (128, 256))))
+    """A background whose upper half moves by 1 px a frame and whose lower half by 3."""
+    upper, lower = (line((0.0, 0.0), (speed, 0.0)) for speed in (1.0, 3.0))
+    return scene("two background planes, 1 and 3 px/frame", planes=(Plane(KIND, seed, upper, (0, 128)), Plane(KIND, seed + 1, lower, (128, 256))))
 
 
 def others_win() -> list[Scene]:
