@@ -427,7 +427,7 @@ def estimate_field_motion(
     Raises
     ------
     ValueError
-        For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, and for options that do not fit.
+        For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` whose rotation is not known, for no `K`, and for options that do not fit.
     """
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")

@@ -126,9 +126,9 @@ def test_two_views_in_pixels_beat_opencv(case, monkeypatch):
     row = scores.pixels(40)[0]
     ours, asked = (float(str(row[name]).split(" / ")[1]) for name in ("efficient", "efficient asked"))
     # The published errors of ground seen obliquely lie below their bound: a test of its own.
-    assert ours < (1.45 if case == 5 else 1.25) * asked, row
+    assert ours < (1.45 if case == 5 else 1.2) * asked, row
     if case >= 7:
-        assert row["right labels %"] > 98.5, row
+        assert row["right labels %"] > (98.5 if case == 9 else 99), row
     if rivals.cv2 is not None:
         for name in rivals.METHODS:
             theirs = float(str(row[name]).split(" / ")[1])
@@ -454,7 +454,7 @@ def test_what_the_text_says_besides_its_tables():
 
 @pytest.mark.parametrize("robust", [False, True])
 def test_what_is_said_of_scenes_by_chance_holds(robust):
-    """No published scene among them. Over 6000 of them 94 % of the ellipses hold, and one `ok` in 1500 is wrong."""
+    """No published scene among them. Over 6000 of them 94 % of the ellipses hold, and four of 5427 `ok` are wrong."""
     rows = {row["scenes"]: row for row in honesty.table(1200, robust)}
     assert rows["all"]["ok"] > 1000 and rows["all"]["wrong"] <= 3
     for row in rows.values():
