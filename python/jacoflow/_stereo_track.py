@@ -232,7 +232,7 @@ class StereoTracker:
         Components with fewer pixels begin anew where the mixture explains least ("improved").
     recognition : bool
         Whether lost tracks are waited for; default yes ("paper": no). A component loses its track where less than `least_overlap` of its moved self, and of what it then is, meets the other; the track is waited for `patience` steps and given to a new component within
-        `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity).
+        `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity) behind which less than three fifths of them are seen.
     grouping : bool
         Whether clusters that move alike are grouped; default yes ("paper": no). `group_limits`: farthest apart (cells), motions in the picture (px) and in depth (disparity) that differ at most.
     focal, baseline, d_infinity : float

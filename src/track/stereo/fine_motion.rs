@@ -10,6 +10,8 @@ pub(super) struct FineMotion {
     pub plane: PlaneMotion,
     /// Change of the disparity.
     pub depth: f64,
+    /// Share of the cluster's pixels at whose new places the next step shows an edge in the new depth; 0 of what was not measured.
+    pub support: f64,
 }
 
 impl FineMotion {
@@ -28,7 +30,7 @@ impl FineMotion {
     /// A translation of a cluster whose pixels have the middle `centre`.
     pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
         let flow = AffineFlow { u, v, ..AffineFlow::default() };
-        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, depth: w }
+        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, depth: w, support: 0.0 }
     }
 
     /// Where a point `(x, y, d)` goes.

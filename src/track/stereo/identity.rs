@@ -49,6 +49,19 @@ const FORGET: f64 = 0.95;
 /// Times differ by more than this, ordinary steps, unless they are the same one summed up otherwise.
 const SAME_TIME: f64 = 1e-6;
 
+/// Share of a component's pixels that must be seen where a measured motion leads for it to be believed although it is a jump. What is being hidden jumps onto what hides it: there hardly ever more than two fifths meet
+/// anything. What stops, or moves twice as far because a frame is missing, is seen nearly whole.
+const SEEN_THERE: f64 = 0.6;
+
+/// A motion that was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    /// Cells per ordinary step.
+    pub motion: [f64; 3],
+    /// Share of the component's pixels that are seen where it leads, in the depth that it leads to.
+    pub support: f64,
+}
+
 /// What a component does from one step to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Carried {
@@ -87,14 +100,16 @@ impl Identities {
         self.next - 1
     }
 
-    /// The motion that carries component `k` on over a gap of so many ordinary steps: what was measured, or the last good motion of a steady track for a while after that jumped or was not measured.
+    /// The motion that carries component `k` on over a gap of so many ordinary steps: what was measured, or the last good motion of a steady track for a while after that jumped, with little to be seen there, or was not measured.
     pub fn carry(
         &mut self,
         k: usize,
-        (measured, gap): (Option<[f64; 3]>, f64),
+        (measured, gap): (Option<Measured>, f64),
         cell: [f64; 3],
         limits: Option<&Recognition>,
     ) -> Option<Carried> {
+        let sure = measured.is_some_and(|measured| measured.support >= SEEN_THERE);
+        let measured = measured.map(|measured| measured.motion);
         let Some(identity) = self.live.get_mut(k).and_then(Option::as_mut) else {
             return measured.map(|motion| Carried { motion, coasting: false });
         };
@@ -106,7 +121,7 @@ impl Identities {
             (Some(last), Some(now)) => !jumps(last, now, cell, limits),
             _ => false,
         };
-        if let Some(last) = identity.velocity.filter(|_| !like) {
+        if let Some(last) = identity.velocity.filter(|_| !like && !sure) {
             let steady = identity.steady >= limits.steady || measured.is_none();
             let coasted = identity.coasted + gap;
             if steady && coasted <= limits.coast as f64 + SAME_TIME {

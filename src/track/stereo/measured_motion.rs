@@ -86,8 +86,8 @@ pub(super) fn fine_motions(
             }
             (plane, _) => plane,
         };
-        let depth = depth_change(&from.clusters, k, &plane, next.disparity)?;
-        (depth.abs() <= f64::from(reach)).then_some(FineMotion { plane, depth })
+        let (depth, support) = depth_change(&from.clusters, k, &plane, next.disparity)?;
+        (depth.abs() <= f64::from(reach)).then_some(FineMotion { plane, depth, support })
     };
     (0..from.clusters.components()).into_par_iter().map(one).collect()
 }
@@ -111,8 +111,8 @@ fn plane_motions(
     (0..last.clusters.components()).into_par_iter().map(search).collect()
 }
 
-/// Change of the disparity of a cluster's pixels that move in the picture; `None` where too few meet a disparity, or too few of those agree.
-fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &Frame<f32>) -> Option<f64> {
+/// Change of the disparity of a cluster's pixels that move in the picture, and the share of all its pixels that meet it; `None` where too few meet a disparity, or too few of those agree.
+fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &Frame<f32>) -> Option<(f64, f64)> {
     let pixels = &clusters.pixels[k];
     let change = |&i: &u32| {
         let [x, y, d] = clusters.points.at(i as usize);
@@ -126,7 +126,7 @@ fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &
     let depth = robust_mean(&mut changes)?;
     // Pixels that meet another surface tell a change of disparity, too, but each another one.
     let agreeing = changes.iter().filter(|change| (*change - depth).abs() <= AGREEING).count();
-    (agreeing as f64 >= LEAST_SHARE * changes.len() as f64).then_some(depth)
+    (agreeing as f64 >= LEAST_SHARE * changes.len() as f64).then_some((depth, agreeing as f64 / pixels.len() as f64))
 }
 
 /// Deviation of what motions leave in general, grey levels: the median over the pixels of all clusters that have one.
@@ -192,9 +192,11 @@ mod tests {
             map
         };
         let told = |disparity: &dyn Fn(usize) -> f32| depth_change(&clusters, 0, &plane, &next(disparity));
-        assert!((told(&|_| -9.5).unwrap() - 0.5).abs() < 1e-6);
+        let (depth, support) = told(&|_| -9.5).unwrap();
+        assert!((depth - 0.5).abs() < 1e-6 && support == 1.0);
         // A third meets something else.
-        assert!((told(&|i| if i % 3 == 0 { 5.0 } else { -9.5 }).unwrap() - 0.5).abs() < 0.05);
+        let (depth, support) = told(&|i| if i % 3 == 0 { 5.0 } else { -9.5 }).unwrap();
+        assert!((depth - 0.5).abs() < 0.05 && (support - 2.0 / 3.0).abs() < 1e-9);
         assert_eq!(told(&|i| -40.0 + 2.0 * i as f32), None);
         assert_eq!(told(&|i| if i % 10 == 0 { -9.5 } else { f32::NAN }), None);
     }

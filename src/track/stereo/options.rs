@@ -85,7 +85,7 @@ pub struct Recognition {
     pub tolerance_per_step: [f64; 3],
     /// Steps of like motion after which a track is steady; default 2.
     pub steady: usize,
-    /// Most ordinary steps that a steady track coasts through a jump; default 3.
+    /// Most ordinary steps that a steady track coasts through a jump behind which less than 0.6 of its pixels are seen; default 3.
     pub coast: usize,
     /// A jump in the picture: change of the motion, px per ordinary step; default 24.
     pub jump: f64,

@@ -8,6 +8,11 @@ fn at(component: usize, position: [f64; 3]) -> Sighting {
     Sighting { component, position, pixels: 100, spread: [2.0, 4.0, 0.3] }
 }
 
+/// A motion behind which two fifths of it are seen.
+fn measured(motion: [f64; 3]) -> Option<Measured> {
+    Some(Measured { motion, support: 0.4 })
+}
+
 fn identities() -> Identities {
     let mut all = Identities { live: vec![None; 3], ..Identities::default() };
     all.name_all(
@@ -23,8 +28,8 @@ fn identities() -> Identities {
 fn a_hidden_track_is_recognised_where_it_is_expected() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, (Some([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
-    all.carry(0, (Some([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (measured([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (measured([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
     all.name_all(Moment::at(1), &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
     // Gone at steps 2 to 4.
     all.rest(1.0, |k| k == 0);
@@ -53,7 +58,7 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
     }
     all.rest(0.0, |k| k == 0);
     let there = at(2, [16.0, 10.0, 30.0]);
@@ -75,7 +80,7 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
     }
     all.rest(0.0, |k| k == 0);
     // At step 2 two parts of it, at step 3 another one that is larger; at last it is whole.
@@ -123,7 +128,7 @@ fn nobody_waits_for_ever_nor_without_a_history() {
     all.rest(0.0, |k| k == 1);
     all.name_all(Moment::at(3), &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-    all.carry(0, (Some([0.0; 3]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (measured([0.0; 3]), 1.0), CELL, Some(&limits)).unwrap();
     all.rest(3.0, |k| k == 0);
     all.name_all(Moment::at(14), &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
     assert_eq!(all.live[1].as_ref().unwrap().id, 3);
@@ -136,19 +141,34 @@ fn steady_tracks_coast_through_jumps_for_three_steps() {
     let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
     let mut carry = |motion| all.carry(0, (motion, 1.0), CELL, Some(&limits));
     for _ in 0..3 {
-        assert_eq!(carry(Some(good)), Some(Carried { motion: good, coasting: false }));
+        assert_eq!(carry(measured(good)), Some(Carried { motion: good, coasting: false }));
     }
-    for measured in [Some(jump), None, Some(jump)] {
-        assert_eq!(carry(measured), Some(Carried { motion: good, coasting: true }));
+    for told in [measured(jump), None, measured(jump)] {
+        assert_eq!(carry(told), Some(Carried { motion: good, coasting: true }));
     }
-    assert_eq!(carry(Some(jump)), Some(Carried { motion: jump, coasting: false }));
+    assert_eq!(carry(measured(jump)), Some(Carried { motion: jump, coasting: false }));
+}
+
+#[test]
+fn a_jump_behind_which_most_of_it_is_seen_is_believed() {
+    let limits = Recognition::default();
+    let (good, twice) = ([2.0, 0.0, -3.0], [4.0, 0.0, -6.0]);
+    for (support, believed) in [(0.4, false), (0.8, true)] {
+        let mut all = identities();
+        for _ in 0..3 {
+            all.carry(0, (measured(good), 1.0), CELL, Some(&limits)).unwrap();
+        }
+        let told = all.carry(0, (Some(Measured { motion: twice, support }), 1.0), CELL, Some(&limits));
+        let expected = if believed { twice } else { good };
+        assert_eq!(told, Some(Carried { motion: expected, coasting: !believed }));
+    }
 }
 
 #[test]
 fn what_is_mostly_covered_goes_on_where_it_went() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits)).unwrap();
     all.name_all(Moment::at(1), &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
     all.name_all(Moment::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
@@ -158,7 +178,7 @@ fn what_is_mostly_covered_goes_on_where_it_went() {
 #[test]
 fn without_recognition_what_is_measured_counts() {
     let mut all = identities();
-    all.carry(0, (Some([1.0; 3]), 1.0), CELL, None);
+    all.carry(0, (measured([1.0; 3]), 1.0), CELL, None);
     assert_eq!(all.carry(0, (None, 1.0), CELL, None), None);
     all.rest(1.0, |k| k == 0);
     all.name_all(Moment::at(4), &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
@@ -172,7 +192,7 @@ fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
     let steady = || {
         let mut all = identities();
         for _ in 0..2 {
-            all.carry(0, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+            all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
         }
         all
     };
@@ -206,7 +226,7 @@ fn what_is_covered_little_by_little_comes_to_light_on_the_other_side_as_itself()
     let limits = Recognition::default();
     let mut all = identities();
     let moved =
-        |all: &mut Identities, component| all.carry(component, (Some([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        |all: &mut Identities, component| all.carry(component, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
     // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole being at 20.
     for (time, x, pixels) in [(1, 12.0, 100), (2, 13.5, 85), (3, 14.0, 70), (4, 13.5, 35)] {
         moved(&mut all, 0);

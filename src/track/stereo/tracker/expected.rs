@@ -2,7 +2,7 @@
 
 use super::super::clusters::Clusters;
 use super::super::fine_motion::{FineMotion, places};
-use super::super::identity::Carried;
+use super::super::identity::{Carried, Measured};
 use super::super::lucas_kanade::{SmoothedLevels, middle};
 use super::super::measured_motion::{Guess, NextView, fine_motions};
 use super::super::overlap::moved_overlaps;
@@ -104,7 +104,10 @@ impl StereoTracker {
                 out.push(None);
                 continue;
             }
-            let in_cells = measured.map(|m| std::array::from_fn(|i| m.at_centre()[i] / cell[i] / gap));
+            let in_cells = measured.map(|m| Measured {
+                motion: std::array::from_fn(|i| m.at_centre()[i] / cell[i] / gap),
+                support: m.support,
+            });
             let carried = self.identities.carry(k, (in_cells, gap), cell, limits);
             out.push(carried.and_then(|carried| {
                 let motion = if carried.coasting {
