@@ -180,7 +180,7 @@ class VariationalGaussianMixture(_Base):
         X : array (N, D)
             Points.
         y : ignored
-            Only there for pipelines, as scikit-learn's conventions want it before the weights: `fit(X, w)` does not weight. A UserWarning says so where there is a `y` and no `sample_weight` (no unit).
+            Only there for pipelines, as scikit-learn's conventions want it before the weights: `fit(X, w)` does not weight. A UserWarning says so where a `y` of fractions, none negative, looks like weights and there is no `sample_weight` (no unit).
         sample_weight : array (N,)
             Evidence of each point, not negative; default 1.
         resp : array (N, n_components)
@@ -327,8 +327,11 @@ def _names(kind: type) -> list[str]:
 
 
 def _warn_of(y: object, sample_weight: ArrayLike | None) -> None:
-    """Says that `y` is not looked at, where it may have been meant for weights."""
-    if y is not None and sample_weight is None:
+    """Says that `y` is not looked at, where it may have been meant for weights: of fractions, which no labels are, none of them negative. Labels pass in silence, as pipelines hand them to everybody."""
+    if y is None or sample_weight is not None:
+        return
+    given = np.asarray(y)
+    if given.ndim == 1 and given.dtype.kind == "f" and np.isfinite(given).all() and (given >= 0).all() and (given != np.rint(given)).any():
         warnings.warn("y is ignored, and there are no weights: give weights as sample_weight=...", UserWarning, stacklevel=3)
 
 

@@ -334,10 +334,7 @@ def test_scikit_learns_conventions():
     mixture = VariationalGaussianMixture(3, tol=1e-3, random_state=1)
     assert clone(mixture).get_params() == mixture.get_params()
     assert repr(mixture) == "VariationalGaussianMixture(n_components=3, random_state=1, tol=0.001)"
-    with warnings.catch_warnings():
-        # Every check gives a y; that it is ignored is said each time.
-        warnings.filterwarnings("ignore", "y is ignored", UserWarning)
-        check_estimator(mixture, on_skip=None)
+    check_estimator(mixture, on_skip=None)
 
 
 def test_weights_in_the_place_of_y_are_not_dropped_in_silence():
@@ -345,10 +342,13 @@ def test_weights_in_the_place_of_y_are_not_dropped_in_silence():
     mixture = VariationalGaussianMixture(2, random_state=0)
     for given in (mixture.fit, mixture.partial_fit, mixture.fit_predict, mixture.score):
         with pytest.warns(UserWarning, match="sample_weight="):
-            given(x, f)
+            given(x, f / 3)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        mixture.fit(x, None, f).score(x, np.arange(100), f)
+        mixture.fit(x, None, f).score(x, np.arange(100) / 3, f)
+        # Labels, as pipelines give them, and what cannot be weights.
+        for labels in (np.arange(100) % 3, [f"kind {i % 3}" for i in range(100)], np.linspace(-1, 1, 100)):
+            mixture.fit(x, labels).score(x, labels)
 
 
 def test_the_default_prior_does_not_jump_with_the_weights():
