@@ -219,7 +219,8 @@ def _recorded(view: Array, noise: float, rng: np.random.Generator) -> NDArray[np
     return np.clip(np.rint(view + rng.normal(0, noise, view.shape)), 0, 255).astype(np.uint8)
 
 
-def _wall(x: float, y: float, vx: float, disparity: float, floor: float, cell: float = 56) -> Layer:
+def wall(x: float, y: float, vx: float, disparity: float, floor: float, cell: float = 56) -> Layer:
+    """What is behind everything: it pans by `vx` px a step, and its floor comes nearer downwards."""
     return Layer("all", 0, (x, y), (vx, 0), disparity, floor=floor, cell=cell)
 
 
@@ -227,7 +228,7 @@ def crossing() -> Scene:
     """Three groups of people cross before a panning wall."""
     person = Layer("person", 3, (515, 290), (-22, 0), 6, 0.4, (60, 150))
     layers = (
-        _wall(280, 240, 5, -32, 16),
+        wall(280, 240, 5, -32, 16),
         Layer("person", 1, (270, 245), (3, 0), -20, 0, (40, 95), 16),
         Layer("person", 2, (90, 275), (17, 0), -7, 0, (50, 125), 20),
         person,
@@ -239,7 +240,7 @@ def crossing() -> Scene:
 def curved() -> Scene:
     """A bulging cab comes nearer."""
     layers = (
-        _wall(320, 240, 0, -30, 10),
+        wall(320, 240, 0, -30, 10),
         Layer("person", 2, (600, 240), (-5, 0), -22, 0, (30, 75), 14),
         Layer("ellipse", 1, (205, 245), (14, -1), -16, 0.8, (155, 125), 30, relief=14),
     )
@@ -250,7 +251,7 @@ def cart() -> Scene:
     """A cart goes away between seats."""
     far, near, nearest = (32, 57), (65, 110), (88, 158)
     layers = (
-        _wall(320, 240, 0, -34, 14),
+        wall(320, 240, 0, -34, 14),
         Layer("box", 2, (215, 300), (0, 0), -31, 0, far, 20),
         Layer("box", 2, (430, 300), (0, 0), -31, 0, far, 20),
         Layer("box", 1, (325, 290), (1.5, -4), 2, -3, (55, 100), 22),
@@ -265,7 +266,7 @@ def cart() -> Scene:
 def small() -> Scene:
     """Two boxes before a panning wall."""
     layers = (
-        _wall(160, 120, 2.5, -16, 0, 30),
+        wall(160, 120, 2.5, -16, 0, 30),
         Layer("box", 1, (90, 120), (9, 0), -3, 0, (30, 50), 14),
         Layer("box", 2, (240, 125), (-6.4, 0), 4, 0.7, (35, 55), 14),
     )
@@ -275,7 +276,7 @@ def small() -> Scene:
 def passing() -> Scene:
     """Two people cross in opposite directions before a wall: the near one hides the far one."""
     layers = (
-        _wall(280, 240, 0, -32, 16),
+        wall(280, 240, 0, -32, 16),
         Layer("person", 1, (120, 260), (20, 0), -12, 0, (45, 105), 16),
         Layer("person", 2, (520, 280), (-18, 0), 4, 0, (55, 130), 20),
     )
@@ -285,7 +286,7 @@ def passing() -> Scene:
 def pillar() -> Scene:
     """A person walks behind a pillar that is wider than six of their steps."""
     layers = (
-        _wall(320, 240, 0, -30, 8),
+        wall(320, 240, 0, -30, 8),
         Layer("person", 1, (120, 250), (20, 0), -14, 0, (36, 85), 16),
         Layer("box", 2, (360, 240), (0, 0), 6, 0, (75, 230), 20),
     )
@@ -295,7 +296,7 @@ def pillar() -> Scene:
 def tiny() -> Scene:
     """Small things, two of them no nearer to one another in depth than in the picture."""
     layers = (
-        _wall(320, 240, 2, -30, 4),
+        wall(320, 240, 2, -30, 4),
         Layer("box", 1, (150, 150), (8, 0), -10, 0, (12, 16), 7),
         Layer("box", 2, (400, 200), (-7, 2), 0, 0, (10, 10), 6),
         Layer("box", 3, (300, 380), (0, -6), 8, 0, (16, 14), 7),
@@ -306,12 +307,19 @@ def tiny() -> Scene:
 def fence() -> Scene:
     """A person walks behind a fence."""
     layers = (
-        _wall(320, 240, 0, -30, 10),
+        wall(320, 240, 0, -30, 10),
         Layer("person", 1, (200, 240), (9, 0), -18, 0, (45, 110), 16),
         # One grey all over: only its roughness tells a pale from the next.
         Layer("pales", 2, (320, 320), (-3, 0), -8, 0, (420, 110), 2000),
     )
     return Scene("fence", layers, 6, 0.0, 9)
+
+
+def textured_fence() -> Scene:
+    """The same before a smaller fence that is as rough as everything else: its pales look less alike."""
+    plain = fence()
+    wall_, person, pales = plain.layers
+    return replace(plain, name="fence, textured", layers=(wall_, person, replace(pales, half=(200, 60), cell=14)))
 
 
 SCENES: dict[str, Callable[[], Scene]] = {scene.__name__: scene for scene in (crossing, curved, cart, passing, pillar, tiny, small, fence)}

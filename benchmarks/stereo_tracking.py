@@ -154,10 +154,13 @@ SCENES = {name: stereo_scenes.SCENES[name] for name in ("crossing", "curved", "c
 
 
 def sections(quick: bool) -> dict[str, list[Row]]:
-    """One table for each scene: both modes over three textures (`quick`: the smallest scene, one seed)."""
+    """One table for each scene: both modes over three textures (`quick`: the smallest scene, one seed); and one of films by chance."""
     names = ["small"] if quick else list(SCENES)
     modes = {name: ("improved", "paper") if (name, "paper") in ASKED else ("improved",) for name in names}
-    return {f"Stereo tracking, {name}": [scored(SCENES[name](), mode, 1 if quick else 3, 1 if quick else STARTS[mode], False) for mode in modes[name]] for name in names}
+    tables = {f"Stereo tracking, {name}": [scored(SCENES[name](), mode, 1 if quick else 3, 1 if quick else STARTS[mode], False) for mode in modes[name]] for name in names}
+    import stereo_tracking_chance
+
+    return tables | {"Stereo tracking, films by chance": stereo_tracking_chance.table(1 if quick else 20)}
 
 
 def main() -> None:

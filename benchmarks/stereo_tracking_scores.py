@@ -204,15 +204,19 @@ class Scores:
         return None if largest is None else self.graph.nodes[time, largest].track_id
 
     def recognised(self, label: int) -> bool | None:
-        """Whether the object's largest cluster is on the track it was on before it was hidden again, by the third step of those at which it is visible, and at the last of them; None where it never comes back."""
+        """Whether the object's largest cluster, from the third step on after it was hidden until it is hidden again, is on one of the tracks that its main clusters had at the last three steps before that (two things may have been one object all along). Steps at which it has no cluster of its own,
+        which `recall` counts, are left out. None where it never comes back for two steps."""
         seen = self.seen(label)
         hidden = self.first_hidden(label)
         back = next((t for t in range(hidden, len(seen)) if seen[t]), None)
         if back is None or hidden == 0:
             return None
         gone = next((t for t in range(back, len(seen)) if not seen[t]), len(seen))
-        before = self._track(hidden - 1, label)
-        return before is not None and all(self._track(time, label) == before for time in (min(back + 2, gone - 1), gone - 1))
+        if gone - back < 2:
+            return None
+        before = {track for time in range(max(0, hidden - 3), hidden) for track in self._main_tracks(time, label)}
+        own = [time for time in range(back, gone) if self.largest(time, label) is not None]
+        return bool(own) and all(self._track(time, label) in before for time in own[2:] or own[-1:])
 
     def short_tracks(self) -> float:
         """Share of the tracks that last one step, of those that do not begin at the last one."""

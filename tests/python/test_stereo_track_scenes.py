@@ -13,6 +13,8 @@ from jacoflow.track import StereoTracker
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from stereo_scenes import cart, crossing, curved, passing, pillar, small, tiny
 from stereo_tracking import follow
+from stereo_tracking_chance import comings_back, crossing_by_chance, labels, passing_by_chance
+from stereo_tracking_chance import scored as chance
 from stereo_tracking_scores import gross
 
 
@@ -74,6 +76,26 @@ def test_a_pair_that_comes_twice_stands_still_and_changes_no_name(seed):
     assert not any(cluster.coasting for cluster in of_cart)
     np.testing.assert_array_equal(of_cart[4].velocity, 0)
     assert all(cluster.velocity[2] == pytest.approx(-3, abs=0.05) for cluster in [*of_cart[1:4], *of_cart[5:]])
+
+
+@pytest.mark.parametrize("scene", [cart, crossing])
+def test_a_missing_pair_changes_no_name(scene):
+    """Nobody is told that twice the time went by: the cart recedes by 6 px of disparity at once, which is a jump but for all of it being seen there."""
+    film = scene().film(range(9))
+    scores = scored(scene(), "improved", [*film[:4], *film[5:]])
+    assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
+
+
+@pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 3)), (passing_by_chance, (0, 3, 7))])
+def test_who_was_hidden_is_recognised_in_films_by_chance(scene, seeds):
+    back = []
+    for seed in seeds:
+        drawn = scene(seed)
+        scores = chance(drawn, seed)
+        back += list(comings_back(scores, drawn).values())
+        assert scores.purity() >= 0.96
+        assert np.mean([scores.id_share(label) for label in labels(drawn)]) >= 0.9
+    assert len(back) >= 3 and all(back)
 
 
 EXPOSURES = {

@@ -149,19 +149,20 @@ impl Identities {
         }
     }
 
-    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track or one that has only just begun; which
-    /// its own component gets in exchange.
+    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track, one that has only just begun, or a younger
+    /// one that it outgrows; which its own component gets in exchange.
     fn pass_to_larger_parts(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(identity) = self.live[own.component].as_ref() else { continue };
             if own.pixels as f64 >= COVERED * identity.peak {
                 continue;
             }
-            let young =
-                |other: &Identity| other.born > identity.born && at.now <= other.born + limits.coast as f64 + SAME_TIME;
+            let begun = |other: &Identity| at.now <= other.born + limits.coast as f64 + SAME_TIME;
             let larger = seen.iter().filter(|new| {
-                let free = self.live[new.component].as_ref().is_none_or(young);
-                free && new.pixels > own.pixels
+                let gives_way =
+                    |other: &Identity| other.born > identity.born && (begun(other) || other.is_outgrown(new));
+                self.live[new.component].as_ref().is_none_or(gives_way)
+                    && new.pixels > own.pixels
                     && new.pixels as f64 >= least
                     && identity.distance(at.gap, new, limits).is_some()
             });
@@ -171,8 +172,8 @@ impl Identities {
         }
     }
 
-    /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one.
-    /// Then all are where they were seen.
+    /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one. A component
+    /// whose track is of a part that was seen of something, which more and more of comes to light, is called after the lost whole instead. Then all are where they were seen.
     pub fn name_all(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| {
             limits.is_some_and(|limits| at.now - resting.since <= limits.patience as f64 + SAME_TIME)
@@ -180,7 +181,11 @@ impl Identities {
         if let Some(limits) = limits {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
-                for new in seen.iter().filter(|new| new.pixels as f64 >= least && self.live[new.component].is_none()) {
+                let waits_for = |new: &&Sighting| {
+                    let part = |own: &Identity| own.born > resting.identity.born && own.is_outgrown(new);
+                    new.pixels as f64 >= least && self.live[new.component].as_ref().is_none_or(part)
+                };
+                for new in seen.iter().filter(waits_for) {
                     if let Some(distance) = resting.identity.distance(at.now - resting.since, new, limits) {
                         pairs.push((new.pixels, distance, r, new.component));
                     }
@@ -188,9 +193,10 @@ impl Identities {
             }
             pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
             let mut taken = vec![false; self.resting.len()];
+            let mut named = vec![false; self.live.len()];
             for (_, _, r, k) in pairs {
-                if !taken[r] && self.live[k].is_none() {
-                    taken[r] = true;
+                if !taken[r] && !named[k] {
+                    (taken[r], named[k]) = (true, true);
                     self.live[k] = Some(self.resting[r].awake(at));
                 }
             }
@@ -246,11 +252,16 @@ impl Identity {
         Some(sum)
     }
 
+    /// Whether a thing is larger than anything that has been seen of this one.
+    fn is_outgrown(&self, seen: &Sighting) -> bool {
+        seen.pixels as f64 > AS_LARGE * self.peak
+    }
+
     /// Whether a thing may be this one, seen wholly or in part.
     fn resembles(&self, seen: &Sighting) -> bool {
         let (factor, layers) = AS_THICK;
         let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
-        thicker <= factor * thinner + layers && seen.pixels as f64 <= AS_LARGE * self.peak
+        thicker <= factor * thinner + layers && !self.is_outgrown(seen)
     }
 }
 

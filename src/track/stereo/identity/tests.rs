@@ -122,6 +122,29 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
 }
 
 #[test]
+fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
+    let limits = Recognition::default();
+    let mut all = identities();
+    for _ in 0..2 {
+        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+    }
+    all.rest(0.0, |k| k == 0);
+    // A glimpse too small to be named after it, which gets a track of its own.
+    let part = |position, pixels| Sighting { pixels, ..at(2, position) };
+    all.name_all(Moment::at(2), &[part([14.0, 10.0, 30.0], 12)], LEAST, Some(&limits));
+    assert_eq!(all.live[2].as_ref().unwrap().id, 2);
+    for _ in 0..2 {
+        all.carry(2, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+    }
+    // Where it is a little more, it is a part still; where it is far more, and the whole is expected there, it is that.
+    for (pixels, place, id) in [(17, 22.0, 2), (90, 22.0, 0), (90, 32.0, 2)] {
+        let mut all = all.clone();
+        all.name_all(Moment::at(6), &[part([place, 10.0, 30.0], pixels)], 1.0, Some(&limits));
+        assert_eq!(all.live[2].as_ref().unwrap().id, id, "{pixels} pixels at {place}");
+    }
+}
+
+#[test]
 fn nobody_waits_for_ever_nor_without_a_history() {
     let limits = Recognition::default();
     let mut all = identities();
