@@ -9,7 +9,7 @@ pub(super) struct Identity {
     pub id: u64,
     /// When it began, ordinary steps.
     pub born: f64,
-    /// Last good motion, cells along x, y and disparity per ordinary step.
+    /// Last good motion, cells along x, y and disparity per ordinary step: measured ones as far as the component was seen where they lead.
     pub velocity: Option<[f64; 3]>,
     /// Steps of like motion.
     pub steady: usize,
@@ -108,7 +108,8 @@ impl Identities {
         cell: [f64; 3],
         limits: Option<&Recognition>,
     ) -> Option<Carried> {
-        let sure = measured.is_some_and(|measured| measured.support >= SEEN_THERE);
+        let trust = measured.map_or(0.0, |measured| (measured.support / SEEN_THERE).min(1.0));
+        let sure = trust >= 1.0;
         let measured = measured.map(|measured| measured.motion);
         let Some(identity) = self.live.get_mut(k).and_then(Option::as_mut) else {
             return measured.map(|motion| Carried { motion, coasting: false });
@@ -131,7 +132,11 @@ impl Identities {
         }
         identity.coasted = 0.0;
         identity.steady = if like { identity.steady + 1 } else { usize::from(measured.is_some()) };
-        identity.velocity = measured.or(identity.velocity);
+        // Of who is nearly hidden little is left to measure, and where it is waited for depends on it.
+        identity.velocity = match (identity.velocity, measured) {
+            (Some(last), Some(now)) if like => Some(std::array::from_fn(|i| last[i] + trust * (now[i] - last[i]))),
+            (last, now) => now.or(last),
+        };
         measured.map(|motion| Carried { motion, coasting: false })
     }
 

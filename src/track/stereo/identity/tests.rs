@@ -122,6 +122,21 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
 }
 
 #[test]
+fn what_is_measured_of_little_changes_the_velocity_little() {
+    let limits = Recognition::default();
+    for (support, depth_motion) in [(0.9, 1.0), (0.6, 1.0), (0.15, 0.25), (0.0, 0.0)] {
+        let mut all = identities();
+        let mut carry = |motion, support| {
+            all.carry(0, (Some(Measured { motion, support }), 1.0), CELL, Some(&limits)).unwrap().motion
+        };
+        carry([2.0, 0.0, 0.0], 1.0);
+        // It is carried by what was measured all the same.
+        assert_eq!(carry([2.0, 0.0, 1.0], support), [2.0, 0.0, 1.0]);
+        assert_eq!(all.live[0].as_ref().unwrap().velocity, Some([2.0, 0.0, depth_motion]));
+    }
+}
+
+#[test]
 fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     let limits = Recognition::default();
     let mut all = identities();
