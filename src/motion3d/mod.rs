@@ -34,6 +34,7 @@ mod camera;
 mod contact;
 mod covariance;
 mod departure;
+mod displaced;
 mod efficient;
 mod estimate;
 mod field;
@@ -59,6 +60,7 @@ mod special;
 mod tests;
 mod together;
 mod trial;
+mod turned;
 mod verdict;
 
 pub use bound::{MotionBound, motion_bound};

@@ -8,13 +8,14 @@ mod system;
 mod verdict;
 
 use super::bound::{MotionBound, check_truth, not_determined};
-use super::camera::Intrinsics;
+use super::camera::{Intrinsics, affine_map};
 use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::{RotationOnly, by_chance};
+use super::turned::HalfTurn;
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -47,6 +48,10 @@ const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
 
+/// Times that a rotation is taken out of displacements, and the change of it, rad, that is rounding.
+const TURNS: usize = 6;
+const ROUNDING: f64 = 1e-13;
+
 impl AffinePatches<'_> {
     fn check(&self) -> Result<()> {
         let n = self.points.len();
@@ -65,11 +70,15 @@ impl AffinePatches<'_> {
         Ok(())
     }
 
-    /// The usable patches, whitened.
-    fn system(&self, placement: Placement) -> System {
+    /// The usable patches, whitened; with a `turn`, as displacements with that rotation taken out of them.
+    fn system(&self, placement: Placement, turn: Option<&HalfTurn>) -> System {
         let (mut patches, mut source) = (Vec::new(), Vec::new());
         for k in 0..self.points.len() {
-            if let Some(patch) = self.patch(k, placement) {
+            let patch = match turn {
+                Some(turn) => self.turned_patch(k, turn),
+                None => self.patch(k, placement),
+            };
+            if let Some(patch) = patch {
                 patches.push(patch);
                 source.push(k as u32);
             }
@@ -94,7 +103,30 @@ impl AffinePatches<'_> {
             m = map * m;
             covariance = map * covariance * map.transpose();
         }
-        Patch::new(at, &m, &covariance)
+        Patch::new(at, &m, &covariance, None)
+    }
+
+    /// The map from one view to the other is `I + M` to first order: with the slopes `D_1`, `D_2` of what turns both views it is `D_2 (I + M) D_1^-1`.
+    fn turned_patch(&self, k: usize, turn: &HalfTurn) -> Option<Patch> {
+        let (mut m, at) = (nalgebra::Vector6::from(self.motion[k]), self.points[k]);
+        let mut covariance = nalgebra::Matrix6::from_row_slice(&self.covariances[36 * k..36 * (k + 1)]);
+        let mut ends = [at, [at[0] + m[0], at[1] + m[1]]];
+        if let Some(camera) = self.camera {
+            let map = camera.affine_scale();
+            m = map * m;
+            covariance = map * covariance * map.transpose();
+            ends = ends.map(|at| camera.to_plane(at));
+        }
+        let turned = turn.out_of(ends[0], ends[1])?;
+        let back = turned.first.try_inverse()?;
+        let one = nalgebra::Matrix2::identity();
+        let slopes = turned.spread * (one + nalgebra::Matrix2::new(m[2], m[4], m[3], m[5])) * back - one;
+        let map = affine_map(&turned.spread, &turned.first);
+        covariance = map * covariance * map.transpose();
+        let slopes = slopes * (one + 0.5 * slopes).try_inverse()?;
+        m.fixed_rows_mut::<2>(0).copy_from(&turned.left);
+        m.fixed_rows_mut::<4>(2).copy_from_slice(slopes.as_slice());
+        Patch::new(turned.middle, &m, &covariance, Some(turn))
     }
 }
 
@@ -118,23 +150,53 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
-    let system = patches.system(options.placement);
-    Ok(options.threads.check()?.install(|| estimate(&system, patches.points, options)))
+    Ok(options.threads.check()?.install(|| estimate(patches, options)))
 }
 
-fn estimate(system: &System, points: &[[f64; 2]], options: &MotionOptions) -> MotionEstimate {
+/// Patches with a rotation taken out that explains their flow as far as it can by itself.
+fn beforehand(patches: &AffinePatches<'_>, options: &MotionOptions) -> System {
+    let mut system = patches.system(options.placement, None);
+    if options.placement == Placement::Midpoint {
+        for _ in 0..TURNS {
+            let Some(rotation) = least_squares(&system) else { break };
+            system = patches.system(options.placement, Some(&HalfTurn::new(&rotation.rotation)));
+        }
+    }
+    system
+}
+
+/// Takes the rotation of the likeliest minimum out of displacements, and refines all again, until it stays.
+fn settle(patches: &AffinePatches<'_>, options: &MotionOptions, system: &mut System, minima: &mut Vec<Motion>) {
+    if options.placement != Placement::Midpoint {
+        return;
+    }
+    for _ in 0..TURNS {
+        let Some(w) = minima.first().map(Motion::w) else { break };
+        *system = patches.system(options.placement, Some(&HalfTurn::new(&w)));
+        *minima = cheapest(system, minima.iter().map(|motion| system.refine(motion)));
+        if minima.first().is_some_and(|motion| (motion.w() - w).norm() < ROUNDING) {
+            break;
+        }
+    }
+}
+
+fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstimate {
+    let points = patches.points;
+    let mut system = beforehand(patches, options);
     let (used, n) = (system.patches.len(), points.len());
     if used < LEAST {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
-    if let Some(rotation) = turning(system) {
-        return turning_report(system, n, &rotation);
+    if let Some(rotation) = turning(&system) {
+        return turning_report(&system, n, &rotation);
     }
     let rng = CounterRng::new(options.seed);
-    let minima = match options.initial {
+    let mut minima = match options.initial {
         Some(initial) => vec![system.refine(&Motion::new(initial.translation, initial.rotation))],
-        None => minima(system, rng),
+        None => minima(&system, rng),
     };
+    settle(patches, options, &mut system, &mut minima);
+    let system = &system;
     let Some(&best) = minima.first() else {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     };
@@ -182,11 +244,16 @@ fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     let refined = apart(found, APART, STARTS).into_iter().map(|(start, _)| system.refine(&start));
+    cheapest(system, refined.flat_map(|motion| [motion, motion.reversed()]))
+}
+
+/// Sorted by what residuals and patches behind the camera cost.
+fn cheapest(system: &System, motions: impl Iterator<Item = Motion>) -> Vec<Motion> {
     let cost = |motion: Motion| {
         let here = system.equations(&motion, &tangents(&motion.u()), None);
         (motion, here.cost + here.behind)
     };
-    let mut minima: Vec<(Motion, f64)> = refined.flat_map(|motion| [motion, motion.reversed()]).map(cost).collect();
+    let mut minima: Vec<(Motion, f64)> = motions.map(cost).collect();
     minima.retain(|(_, cost)| cost.is_finite());
     minima.sort_by(|a, b| a.1.total_cmp(&b.1));
     minima.into_iter().map(|(motion, _)| motion).collect()
@@ -194,6 +261,11 @@ fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
 
 /// The rotation alone, where chance explains what it leaves.
 fn turning(system: &System) -> Option<RotationOnly> {
+    let found = least_squares(system)?;
+    by_chance(found.chi2, (6 * system.patches.len() - 3) as f64).then_some(found)
+}
+
+fn least_squares(system: &System) -> Option<RotationOnly> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for patch in &system.patches {
         normal += patch.r.transpose() * patch.r;
@@ -202,8 +274,7 @@ fn turning(system: &System) -> Option<RotationOnly> {
     let factor = normal.cholesky()?;
     let rotation = factor.solve(&right);
     let chi2: f64 = system.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
-    let found = || RotationOnly { rotation, covariance: factor.inverse(), chi2 };
-    by_chance(chi2, (6 * system.patches.len() - 3) as f64).then(found)
+    Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
 /// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given; their flow is not looked at.
@@ -217,7 +288,7 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
         let expected = format!("{} surfaces, one for each point", patches.points.len());
         return Err(Error::argument("inv_depth", expected, surfaces.len()));
     }
-    let system = patches.system(Placement::Start);
+    let system = patches.system(Placement::Start, None);
     let known: Vec<u32> = (0..system.patches.len() as u32)
         .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
         .collect();
