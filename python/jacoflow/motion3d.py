@@ -18,6 +18,7 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -220,7 +221,7 @@ def estimate_motion(
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
         "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": None if shared == 1 else float(shared), "correlation_length": None if correlation_length == 0 else float(correlation_length), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": _besides(1, _number("shared", shared)), "correlation_length": _besides(0, _number("correlation_length", correlation_length)), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
@@ -244,7 +245,24 @@ def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLi
     return parts[0], parts[1]
 
 
+def _number(name: str, value: float) -> float:
+    """A real number that is none of the things that Python turns into one."""
+    if not isinstance(value, str | bytes | bool | np.bool_ | complex):
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise TypeError(f"{name}: expected a number, got {value!r}")
+
+
+def _besides(usual: float, value: float) -> float | None:
+    """None for the usual value, which needs nothing of the other options."""
+    return None if value == usual else value
+
+
 def _whole(name: str, value: int) -> int:
+    if isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name}: expected an integer, got {value!r}")
     try:
         return operator.index(value)
     except TypeError:
@@ -253,20 +271,13 @@ def _whole(name: str, value: int) -> int:
 
 def _count(name: str, value: int) -> int:
     count = _whole(name, value)
-    if count < 1:
+    if not 1 <= count <= sys.maxsize:
         raise ValueError(f"{name}: expected a positive integer, got {count}")
     return count
 
 
 def _sigma(sigma: float | None) -> float | None:
-    if sigma is None:
-        return None
-    if isinstance(sigma, str | bytes | bool | np.bool_):
-        raise TypeError(f"sigma: expected a number, got {sigma!r}")
-    try:
-        return float(sigma)
-    except (TypeError, ValueError):
-        raise TypeError(f"sigma: expected a number, got {sigma!r}") from None
+    return None if sigma is None else _number("sigma", sigma)
 
 
 def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
@@ -431,7 +442,7 @@ def estimate_field_motion(
     """
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
+    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else _number("spacing", spacing), None if max_points is None else _count("max_points", max_points), region)
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, **options}), points
@@ -467,7 +478,7 @@ def time_to_contact_map(
 
 def _turned(scene: MotionEstimate, turning: float) -> tuple[Array, Array]:
     """What the scene's rotation says about that of a thing in it."""
-    if not turning > 0:
+    if not _number("turning", turning) > 0:
         raise ValueError(f"turning: expected a positive number, got {turning!r}")
     spread = scene.covariance[2:, 2:] + turning**2 * np.eye(3)
     if not np.isfinite(spread).all():

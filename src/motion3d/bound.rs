@@ -59,7 +59,7 @@ pub fn motion_bound(
         let expected = format!("{} values, one for each point", points.len());
         return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
     }
-    let observations = Intake { flow: points, noise, placement: Placement::Start }.whitened();
+    let observations = Intake::new(points, noise, Placement::Start).whitened();
     let known: Vec<u32> = (0..observations.n as u32)
         .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
         .collect();

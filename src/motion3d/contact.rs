@@ -11,7 +11,7 @@ use super::turned::{HalfTurn, HalfWay};
 use crate::error::Result;
 use crate::math::Real;
 use crate::types::{FlowField, Status};
-use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
@@ -132,7 +132,7 @@ fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Ha
     let [[uu, uv, ..], [_, vv, ..], ..] = field.covariance_at(site)?;
     let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
     let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-    let (at, covariance) = ([x as f64, y as f64], [uu, uv, uv, vv]);
+    let (at, covariance) = ([x as f64, y as f64], Matrix2::new(uu, uv, uv, vv));
     let row = match turn {
         Some(turn) => turned_row(at, [u, v], &covariance, Some(camera), turn),
         None => plane_row(at, [u, v], &covariance, Some(camera), Placement::Start),

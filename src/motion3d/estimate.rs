@@ -2,7 +2,7 @@
 
 use super::covariance::{Plugged, direction_deviation, plugged};
 use super::departure::beyond_theory;
-use super::displaced::{NEGLIGIBLE, beforehand, rest, settle};
+use super::displaced::{beforehand, decides, matters, settle};
 use super::efficient::{Efficient, WeightDepths, unsolved};
 use super::intake::Intake;
 use super::likelihood::{Candidate, choose, different, minima};
@@ -70,7 +70,7 @@ impl Scaled {
 
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
     let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
-    let intake = Intake { flow, noise, placement: options.placement };
+    let intake = Intake::new(flow, noise, options.placement);
     let mut scaled = Scaled { observations: intake.whitened(), sigma, unknown: matches!(noise, Noise::Unknown) };
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
@@ -86,9 +86,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     scaled.observations.shared = options.shared.unwrap_or(1.0);
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
-    // Of unknown noise everything may be more.
-    let negligible = if scaled.unknown { 0.0 } else { NEGLIGIBLE };
-    if let Some(turned) = beforehand(&intake, &scaled.observations, negligible, rng.stream(5)) {
+    if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {
         scaled.observations = turned;
     }
     if scaled.unknown
@@ -135,7 +133,7 @@ fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) ->
     let mut kept = consensus(scaled, rng)?;
     for _ in 0..TURNS {
         let obeying = scaled.observations.subset(&kept.inliers);
-        if rest(intake, &obeying, &kept.motion) <= NEGLIGIBLE * obeying.n as f64 {
+        if !decides(intake, &obeying, &kept.motion) {
             break;
         }
         scaled.observations = intake.turned(&scaled.observations, &kept.motion.w());
@@ -237,7 +235,7 @@ fn on(
         choose(inliers, found, || DepthSmoother::new(inliers, options.smoother, rng.stream(3)))
     };
     let (mut candidates, mut made) = preferred_of(&inliers, &found);
-    if rest(intake, &inliers, candidates[0].motion()) > NEGLIGIBLE {
+    if matters(intake, &inliers, candidates[0].motion()) {
         // Chosen for its depths, with the rotation of another one taken out.
         settle(intake, &mut scaled.observations, &mut inliers, &mut found, candidates[0].minimum, false);
         (candidates, made) = preferred_of(&inliers, &found);

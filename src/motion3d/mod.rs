@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod belief;
 mod bend;
 mod bound;
 mod camera;

@@ -78,8 +78,7 @@ impl Known {
 impl Row {
     /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None` unless all is finite and `S` positive definite.
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
-        let l = covariance.cholesky()?.l();
-        let whiten = l.try_inverse()?;
+        let whiten = unit(covariance)?;
         let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
         row.values().iter().all(|value| value.is_finite()).then_some(row)
     }
@@ -201,6 +200,15 @@ impl Observations {
         let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
         median(&mut lengths)
     }
+}
+
+/// `L^-1` of `S = L L^t`; `None` unless `S` is positive definite.
+fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let first = covariance[(0, 0)].sqrt();
+    let below = covariance[(1, 0)] / first;
+    let second = (covariance[(1, 1)] - below * below).sqrt();
+    let positive = first > 0.0 && second > 0.0;
+    positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
 }
 
 /// The median (the upper one of two), 0 of nothing; reorders the values.

@@ -7,6 +7,7 @@ mod shrink;
 mod system;
 mod verdict;
 
+use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined};
 use super::camera::{Intrinsics, affine_map};
 use super::covariance::{determined, inverse, plugged_in};
@@ -150,7 +151,9 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
-    Ok(options.threads.check()?.install(|| estimate(patches, options)))
+    let covariances = believed(patches.covariances, 6);
+    let patches = AffinePatches { covariances: &covariances, ..*patches };
+    Ok(options.threads.check()?.install(|| estimate(&patches, options)))
 }
 
 /// Patches with a rotation taken out that explains their flow as far as it can by itself.

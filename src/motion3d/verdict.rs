@@ -4,6 +4,7 @@ use super::covariance::direction_deviation;
 use super::grid::SEARCHED;
 use super::intake::Intake;
 use super::kernels::equations;
+use super::likelihood::SAME;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::plausible::{Farther, plausible_beyond};
@@ -113,7 +114,9 @@ fn planar(intake: &Intake<'_>, inliers: &Observations, solution: &mut Solution, 
     if excess >= EXCLUDED {
         return false;
     }
-    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
+    // Found again with the rotation of the first taken out it is the same to some digits only.
+    let same = distinct.max(SAME.to_radians());
+    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > same);
     solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
     true
 }

@@ -44,6 +44,6 @@ impl Scene {
     }
 
     pub fn observations(&self) -> Observations {
-        Intake { flow: &self.flow(), noise: &Noise::Sigma(self.sigma), placement: Placement::Start }.whitened()
+        Intake::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
     }
 }
