@@ -98,7 +98,7 @@ class MotionEstimate:
     rotation_std: Array
     """Standard deviations (3,) of `rotation`, rad/frame."""
     inv_depth: Array
-    """Inverse depths (N,) by least squares for this motion, in units of `|u|` per frame; NaN for points that are not finite."""
+    """Inverse depths (N,) by least squares for this motion, in units of `|u|` per frame; of displacements half way in time; NaN for points that are not finite."""
     inv_depth_std: Array
     """Standard deviations (N,) of `inv_depth` from the noise of the point's own flow; infinite at the epipole."""
     inv_depth_smooth: Array
@@ -183,7 +183,7 @@ def estimate_motion(
     sigma : float, units of flow
         Standard deviation of each component. None, and no `cov`: estimated from the residuals.
     cov : array (N, 2, 2), units of flow squared; (N, 3, 3) on the sphere; (N, 6, 6) with `jacobian`
-        Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y).
+        Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y). A point with a variance below a millionth of the lower quartile of all has that quartile added, as no measurement is so much better than the others.
     jacobian : array (N, 2, 2), 1/frame
         [[u_x, u_y], [v_x, v_y]] at the points: six numbers a patch, which pays for few (2 to 10), large patches (windows of 30 px and more) that do not overlap. Needs `cov`.
     projection : "plane" or "sphere"
@@ -193,7 +193,8 @@ def estimate_motion(
     robust : bool
         Find the points that obey one motion among up to 60 % that do not. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
     placement : "midpoint" or "start"
-        Where on its path a displacement is taken to be the instantaneous flow: half way, exact to second order, or at the start, for flow that is instantaneous. Bearings and their flow are taken as given.
+        What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
+        negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
     smoother : "auto", "prior" or "neighbours"
         What depths in the weights are drawn to: one normal distribution, regressions on 8 to 64 neighbours, or the better of them.
     weight_inv_depth : array (N,), units of |u| per frame
@@ -377,8 +378,11 @@ def predict_flow(
     K: ArrayLike | None = None,
     *,
     projection: Literal["plane", "sphere"] = "plane",
+    whole_frame: bool = False,
 ) -> Array:
-    """Instantaneous flow of points under a motion (1): (N, 2), px/frame with K, else per frame; on the sphere (N, 3).
+    """Flow of points under a motion: (N, 2), px/frame with K, else per frame; on the sphere (N, 3).
+
+    Instantaneous flow (1) where the points are, or (`whole_frame`) the exact displacement of points of the first view to the second as the motion is steady over the frame, `X_2 = exp([w]x) X_1 + V(w) u`: what a result of `estimate_motion` with placement "midpoint" says that the flow was.
 
     Parameters
     ----------
@@ -387,15 +391,24 @@ def predict_flow(
     translation, rotation : arrays (3,), the latter in rad/frame
         The motion. The translation need not have length 1: inverse depths are in units of its length.
     inv_depth : array (N,)
-        Inverse depths.
+        Inverse depths; with `whole_frame` half way in time, as `estimate_motion` tells them.
     K : array (3, 3) or None
         Camera matrix, px.
     projection : "plane" or "sphere"
         The screen.
+    whole_frame : bool
+        Displacements over the whole frame, on the plane only; NaN where a point would be behind the camera.
+
+    Raises
+    ------
+    ValueError
+        For shapes and values that do not fit.
     """
     if projection not in ("plane", "sphere"):
         raise ValueError(f'projection: expected "plane" or "sphere", got {projection!r}')
-    return _motion3d_predict(points, inv_depth, translation, rotation, K, projection == "sphere")
+    if whole_frame and projection == "sphere":
+        raise ValueError("whole_frame: expected False on the sphere, whose flow is instantaneous; got True")
+    return _motion3d_predict(points, inv_depth, translation, rotation, K, (projection == "sphere", bool(whole_frame)))
 
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:

@@ -133,7 +133,7 @@ pub(super) fn settle(
     unknown: bool,
 ) {
     let mut negligible = if inliers.turn.is_some() { SETTLED } else { NEGLIGIBLE };
-    let mut turned = false;
+    let (began, mut turned) = (lead.motion, false);
     for _ in 0..ROUNDS {
         let w = lead.motion.w();
         let noise = if unknown { lead.equations.cost / inliers.n.saturating_sub(5).max(1) as f64 } else { 1.0 };
@@ -147,8 +147,9 @@ pub(super) fn settle(
     }
     if let Some(turn) = inliers.turn.filter(|_| turned) {
         *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, &turn.rotation) };
-        let again = |minimum: &Minimum| refine(inliers, minimum.motion, None, Effort::FULL);
-        *found = different(found.par_iter().map(again).chain([lead]).collect());
+        let other = |minimum: &&Minimum| minimum.motion != began;
+        let again = |minimum: &Minimum| refine(inliers, minimum.motion, None, Effort::ROUGH);
+        *found = different(found.par_iter().filter(other).map(again).chain([lead]).collect());
     }
 }
 

@@ -104,7 +104,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let inner = scaled.observations.subset(&kept.inner);
         let found = on(&intake, options, &mut scaled, inner, Some(&kept), rng);
         let found = with_all_inliers(found, &scaled.observations, &kept);
-        doubted(found, &scaled.observations, kept.doubtful)
+        doubted(found, &scaled.observations, &kept)
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -157,10 +157,14 @@ fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
 
 /// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful choice of points and no surer; what
 /// else is told says more.
-fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionEstimate {
+///
+/// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of them.
+fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    let doubtful = kept.doubtful;
     let few = match found.status {
         Status::Ok => doubtful || robust::hangs_on_few(all, &found),
-        Status::RotationOnly | Status::LowSnr => doubtful,
+        Status::RotationOnly => doubtful && !(kept.whole && robust::one_noise(&found.residuals)),
+        Status::LowSnr => doubtful,
         _ => false,
     };
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
@@ -273,6 +277,10 @@ fn on(
         let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
         solution.covariance = solution.covariance.map(|covariance| covariance * strays);
     }
+    if scaled.unknown {
+        let widened = of_estimated_noise(inliers.n, known.is_some());
+        solution.covariance = solution.covariance.map(|covariance| covariance * widened);
+    }
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
@@ -283,6 +291,18 @@ fn on(
     judge(intake, &inliers, &mut solution, &evidence, rng.stream(4));
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
+
+/// What a covariance that is a multiple of an estimated variance is to be multiplied with: of errors in units of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W. Gosset 1908).
+///
+/// Residuals cut off as those of outliers tell less of the variance than all would.
+fn of_estimated_noise(points: usize, cut: bool) -> f64 {
+    let free = points.saturating_sub(5) as f64 * if cut { TOLD_BY_CUT } else { 1.0 };
+    let free = free.max(2.0 * 2.0);
+    free / (free - 2.0)
+}
+
+/// The information about a variance that is left where residuals beyond 2.5 deviations are cut off and the points chosen by it: 0.69 by the cut alone.
+const TOLD_BY_CUT: f64 = 0.6;
 
 /// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may be true.
 fn preferred(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {

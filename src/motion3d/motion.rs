@@ -1,6 +1,7 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
 use super::camera::Intrinsics;
+use super::turned::HalfTurn;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 /// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.
@@ -102,6 +103,13 @@ impl Motion {
         let Some(camera) = camera else { return self.plane_flow(point, inverse_depth) };
         let flow = self.plane_flow(camera.to_plane(point), inverse_depth);
         (camera.unscale() * Vector2::from(flow)).into()
+    }
+
+    /// Displacement over the whole frame of a place of the first view, px with a camera, else on the plane at distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the point is behind the camera.
+    pub fn picture_displacement(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
+        let turn = HalfTurn::new(&self.w());
+        let Some(camera) = camera else { return turn.displacement(&self.u(), point, inverse_depth).into() };
+        (camera.unscale() * turn.displacement(&self.u(), camera.to_plane(point), inverse_depth)).into()
     }
 
     /// Flow of a unit bearing on the sphere, a 3-vector perpendicular to it: equation (1).

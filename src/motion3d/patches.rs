@@ -2,6 +2,7 @@
 //!
 //! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum likelihood worse than flow alone, so that they are shrunk.
 
+mod replicas;
 mod report;
 mod shrink;
 mod system;
@@ -20,6 +21,7 @@ use super::turned::HalfTurn;
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use replicas::wider;
 use report::{tell, turning_report};
 use shrink::shrunk;
 use std::collections::HashSet;
@@ -48,6 +50,9 @@ const SMOOTHED: usize = 5;
 const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
+
+/// By how much a covariance may have to be widened for it to tell the shape of what is not known.
+const NONLINEAR: f64 = 4.0;
 
 /// Times that a rotation is taken out of displacements, and the change of it, rad, that is rounding.
 const TURNS: usize = 6;
@@ -223,7 +228,13 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         }
     }
     out.efficient = surfaces.is_some();
-    let low = plugged.is_none();
+    let told: Vec<Vector3<f64>> = match &surfaces {
+        Some(surfaces) => surfaces.clone(),
+        None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
+    };
+    let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
+    covariance = covariance.map(|covariance| covariance * wider);
+    let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {
         motion: best,

@@ -96,6 +96,22 @@ impl HalfTurn {
         Some(Turned { middle, rows, left, flow, spread, first: at_first })
     }
 
+    /// The displacement over the whole frame of a point of the first view, on the plane at distance 1, whose inverse depth half way in time is `nu`, under the translation `u`; NaN behind the camera.
+    ///
+    /// With `c = int exp(s [w]x) u ds` from 0 to 1/2 the depth half way is `Z (exp([w]x / 2) eta)_z + c_z`.
+    pub fn displacement(&self, u: &Vector3<f64>, [x, y]: [f64; 2], nu: f64) -> Vector2<f64> {
+        let turned = self.half * Vector3::new(x, y, 1.0);
+        let (t, reached) = (self.mean * u, 0.5 * self.mean * u + self.lag * self.rotation.cross(u));
+        let first = nu * turned.z / (1.0 - nu * reached.z);
+        // From the orientation half way on to that of the second view.
+        let after = self.half * (turned + first * t);
+        if after.z > 0.0 && turned.z > 0.0 {
+            after.xy() / after.z - Vector2::new(x, y)
+        } else {
+            Vector2::repeat(f64::NAN)
+        }
+    }
+
     /// Inverse depths half way in time from those in the rows, for the translation `u`.
     pub fn half_way(&self, u: &Vector3<f64>) -> HalfWay {
         HalfWay { ahead: self.lag * self.rotation.cross(u).z }
@@ -150,6 +166,8 @@ mod tests {
                 assert!(across.abs() < 1e-15, "{rotation:?}: {across}");
                 let told = turn.half_way(&motion.u()).depth(t.dot(&d) / t.norm_squared());
                 assert!((told * depth - 1.0).abs() < 1e-6, "{rotation:?}: {told} {depth}");
+                let moved = turn.displacement(&motion.u(), first, 1.0 / depth);
+                assert!((moved - (Vector2::from(second) - Vector2::from(first))).norm() < 1e-14, "{rotation:?}");
             }
         }
     }

@@ -78,6 +78,11 @@ impl Patch {
         self.whiten * self.rows.depth(&(self.mean * u))
     }
 
+    /// What a surface shows under a motion, in units of noise.
+    pub fn predicted(&self, motion: &Motion, surface: &Vector3<f64>) -> Vector6<f64> {
+        self.depth(&motion.u()) * surface + self.r * motion.w()
+    }
+
     pub fn seen(&self, motion: &Motion) -> SeenPatch {
         self.explained(motion, self.depth(&motion.u()))
     }
