@@ -408,7 +408,7 @@ def predict_flow(
         raise ValueError(f'projection: expected "plane" or "sphere", got {projection!r}')
     if whole_frame and projection == "sphere":
         raise ValueError("whole_frame: expected False on the sphere, whose flow is instantaneous; got True")
-    return _motion3d_predict(points, inv_depth, translation, rotation, K, (projection == "sphere", bool(whole_frame)))
+    return _motion3d_predict(points, inv_depth, translation, rotation, K, projection == "sphere", bool(whole_frame))
 
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:

@@ -54,6 +54,7 @@ mod regression;
 mod report;
 mod result;
 mod robust;
+mod selected;
 mod signs;
 mod smoothing;
 mod special;

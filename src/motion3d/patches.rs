@@ -6,11 +6,12 @@ mod replicas;
 mod report;
 mod shrink;
 mod system;
+mod turned;
 mod verdict;
 
 use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined};
-use super::camera::{Intrinsics, affine_map};
+use super::camera::Intrinsics;
 use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
@@ -26,6 +27,7 @@ use report::{tell, turning_report};
 use shrink::shrunk;
 use std::collections::HashSet;
 use system::{Patch, System};
+use turned::{beforehand, settle, turned_patch};
 use verdict::{Evidence, judge};
 
 /// Patches with their affine flow, N of each.
@@ -54,10 +56,6 @@ const APART: f64 = 12.0;
 /// By how much a covariance may have to be widened for it to tell the shape of what is not known.
 const NONLINEAR: f64 = 4.0;
 
-/// Times that a rotation is taken out of displacements, and the change of it, rad, that is rounding.
-const TURNS: usize = 6;
-const ROUNDING: f64 = 1e-13;
-
 impl AffinePatches<'_> {
     fn check(&self) -> Result<()> {
         let n = self.points.len();
@@ -81,7 +79,7 @@ impl AffinePatches<'_> {
         let (mut patches, mut source) = (Vec::new(), Vec::new());
         for k in 0..self.points.len() {
             let patch = match turn {
-                Some(turn) => self.turned_patch(k, turn),
+                Some(turn) => turned_patch(self, k, turn),
                 None => self.patch(k, placement),
             };
             if let Some(patch) = patch {
@@ -111,29 +109,6 @@ impl AffinePatches<'_> {
         }
         Patch::new(at, &m, &covariance, None)
     }
-
-    /// The map from one view to the other is `I + M` to first order: with the slopes `D_1`, `D_2` of what turns both views it is `D_2 (I + M) D_1^-1`.
-    fn turned_patch(&self, k: usize, turn: &HalfTurn) -> Option<Patch> {
-        let (mut m, at) = (nalgebra::Vector6::from(self.motion[k]), self.points[k]);
-        let mut covariance = nalgebra::Matrix6::from_row_slice(&self.covariances[36 * k..36 * (k + 1)]);
-        let mut ends = [at, [at[0] + m[0], at[1] + m[1]]];
-        if let Some(camera) = self.camera {
-            let map = camera.affine_scale();
-            m = map * m;
-            covariance = map * covariance * map.transpose();
-            ends = ends.map(|at| camera.to_plane(at));
-        }
-        let turned = turn.out_of(ends[0], ends[1])?;
-        let back = turned.first.try_inverse()?;
-        let one = nalgebra::Matrix2::identity();
-        let slopes = turned.spread * (one + nalgebra::Matrix2::new(m[2], m[4], m[3], m[5])) * back - one;
-        let map = affine_map(&turned.spread, &turned.first);
-        covariance = map * covariance * map.transpose();
-        let slopes = slopes * (one + 0.5 * slopes).try_inverse()?;
-        m.fixed_rows_mut::<2>(0).copy_from(&turned.left);
-        m.fixed_rows_mut::<4>(2).copy_from_slice(slopes.as_slice());
-        Patch::new(turned.middle, &m, &covariance, Some(turn))
-    }
 }
 
 /// The rigid motion that explains the affine flow of patches.
@@ -159,33 +134,6 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
     let covariances = believed(patches.covariances, 6);
     let patches = AffinePatches { covariances: &covariances, ..*patches };
     Ok(options.threads.check()?.install(|| estimate(&patches, options)))
-}
-
-/// Patches with a rotation taken out that explains their flow as far as it can by itself.
-fn beforehand(patches: &AffinePatches<'_>, options: &MotionOptions) -> System {
-    let mut system = patches.system(options.placement, None);
-    if options.placement == Placement::Midpoint {
-        for _ in 0..TURNS {
-            let Some(rotation) = least_squares(&system) else { break };
-            system = patches.system(options.placement, Some(&HalfTurn::new(&rotation.rotation)));
-        }
-    }
-    system
-}
-
-/// Takes the rotation of the likeliest minimum out of displacements, and refines all again, until it stays.
-fn settle(patches: &AffinePatches<'_>, options: &MotionOptions, system: &mut System, minima: &mut Vec<Motion>) {
-    if options.placement != Placement::Midpoint {
-        return;
-    }
-    for _ in 0..TURNS {
-        let Some(w) = minima.first().map(Motion::w) else { break };
-        *system = patches.system(options.placement, Some(&HalfTurn::new(&w)));
-        *minima = cheapest(system, minima.iter().map(|motion| system.refine(motion)));
-        if minima.first().is_some_and(|motion| (motion.w() - w).norm() < ROUNDING) {
-            break;
-        }
-    }
 }
 
 fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstimate {

@@ -158,8 +158,8 @@ mod tests {
         for rotation in [[0.0; 3], [1e-4, -2e-4, 1e-4], [0.1, -0.2, 0.15], [0.4, 0.3, -0.2]] {
             let motion = Motion::new([0.6, 0.2, 0.75], rotation);
             let turn = HalfTurn::new(&motion.w());
-            for (first, nu) in [([0.4, -0.3], 0.2), ([-0.5, 0.1], 0.05), ([0.0, 0.0], 0.0)] {
-                let (first, second, depth) = seen(&motion, first, nu.max(1e-9));
+            for (first, nu) in [([0.4, -0.3], 0.2), ([-0.5, 0.1], 0.05), ([0.0, 0.0], 1e-9)] {
+                let (first, second, depth) = seen(&motion, first, nu);
                 let turned = turn.out_of(first, second).unwrap();
                 let (t, d) = (turned.rows.g * motion.u(), turned.flow - turned.rows.r * motion.w());
                 let across = (t.y * d.x - t.x * d.y) / t.norm();

@@ -62,7 +62,8 @@ pub fn motion3d_predict<'py>(
     translation: &Any<'py>,
     rotation: &Any<'py>,
     intrinsics: Option<&Any<'py>>,
-    (spherical, whole): (bool, bool),
+    spherical: bool,
+    whole_frame: bool,
 ) -> PyResult<Any<'py>> {
     let camera = camera(intrinsics)?;
     let motion = motion(translation, rotation)?;
@@ -79,7 +80,7 @@ pub fn motion3d_predict<'py>(
     }
     let pixels: Vec<[f64; 2]> = rows("points", &shape, &values)?;
     let moved = |(&at, &nu): (&[f64; 2], &f64)| {
-        if whole {
+        if whole_frame {
             motion.picture_displacement(at, nu, camera.as_ref())
         } else {
             motion.picture_flow(at, nu, camera.as_ref())
