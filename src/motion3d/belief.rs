@@ -26,7 +26,7 @@ impl Belief {
     }
 
     /// The covariance that a point counts with.
-    pub fn of(&self, given: Matrix2<f64>) -> Matrix2<f64> {
+    pub fn of(self, given: Matrix2<f64>) -> Matrix2<f64> {
         if smallest(&given) < LEAST * self.usual { given + Matrix2::identity() * self.usual } else { given }
     }
 }

@@ -61,7 +61,7 @@ impl Rates {
     }
 
     /// The same from a point's own flow, and its residual across the epipolar line in units of noise.
-    fn own(&self, row: &Row, half_way: &HalfWay) -> [f64; 3] {
+    fn own(&self, row: &Row, half_way: HalfWay) -> [f64; 3] {
         let (t, d) = (row.g * self.u, row.f - row.r * self.w);
         let s2 = t.norm_squared();
         let nu = t.dot(&d) / s2;
@@ -111,7 +111,7 @@ pub fn contact_map<T: Real>(
         if turning {
             return [f64::INFINITY, f64::INFINITY, (row.f - row.r * motion.w()).norm()];
         }
-        rates.own(&row, &half_way)
+        rates.own(&row, half_way)
     };
     let values: Vec<[f64; 3]> = (0..field.width * field.height).into_par_iter().map(at).collect();
     let plane = |k: usize| values.iter().map(|value| value[k]).collect();

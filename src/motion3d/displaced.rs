@@ -23,8 +23,10 @@ const FIRST: usize = 200;
 /// Squared shift of an estimate, in its deviations, that is negligible.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// The same once rows are turned anyway, and the change of the rotation, rad, that is rounding.
-const SETTLED: f64 = 1e-6;
+/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the change of the rotation, rad, that is rounding.
+const SETTLED: f64 = 1e-14;
+const ROUGHLY: f64 = 1e-6;
+const MANY: usize = 10_000;
 const ROUNDING: f64 = 1e-13;
 
 /// What a rest may add to squared residuals, in deviations of their sum by chance, before anything is known of the motion.
@@ -100,7 +102,8 @@ pub(super) fn beforehand(
         return None;
     }
     let few = &*at_most(points, FIRST, rng.stream(0));
-    let again = |points: &Observations, w| if robust { reweighted(points, w) } else { least_squares(points, |_| 1.0) };
+    let again =
+        |points: &Observations, w| if robust { Some(reweighted(points, w)) } else { least_squares(points, |_| 1.0) };
     let mut w = again(few, if robust { likeliest(few, rng.stream(1))? } else { Vector3::zeros() })?;
     let mut turned = intake.turned(few, &w);
     let hidden = if unknown { 0.0 } else { HIDDEN * 2.0 * (points.n as f64).sqrt() };
@@ -132,7 +135,8 @@ pub(super) fn settle(
     mut lead: Minimum,
     unknown: bool,
 ) {
-    let mut negligible = if inliers.turn.is_some() { SETTLED } else { NEGLIGIBLE };
+    let settled = if inliers.n < MANY { SETTLED } else { ROUGHLY };
+    let mut negligible = if inliers.turn.is_some() { settled } else { NEGLIGIBLE };
     let (began, mut turned) = (lead.motion, false);
     for _ in 0..ROUNDS {
         let w = lead.motion.w();
@@ -143,7 +147,7 @@ pub(super) fn settle(
         }
         *inliers = intake.turned(inliers, &w);
         lead = refine(inliers, lead.motion, None, Effort::FULL);
-        (negligible, turned) = (SETTLED, true);
+        (negligible, turned) = (settled, true);
     }
     if let Some(turn) = inliers.turn.filter(|_| turned) {
         *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, &turn.rotation) };
@@ -186,7 +190,7 @@ fn least_squares(points: &Observations, weight: impl Fn(usize) -> f64) -> Option
 }
 
 /// The same with Tukey's weights about `start`.
-fn reweighted(points: &Observations, start: Vector3<f64>) -> Option<Vector3<f64>> {
+fn reweighted(points: &Observations, start: Vector3<f64>) -> Vector3<f64> {
     let mut w = start;
     for _ in 0..STEPS {
         let cut = CUT * CUT * deciding(points, &w).max(f64::MIN_POSITIVE);
@@ -198,5 +202,5 @@ fn reweighted(points: &Observations, start: Vector3<f64>) -> Option<Vector3<f64>
             break;
         }
     }
-    Some(w)
+    w
 }

@@ -59,6 +59,9 @@ const WORTH: f64 = 4.0;
 const SURE: f64 = 10.0;
 const APART_NOISE: f64 = 1.5;
 
+/// By how much, in nats, outliers must lengthen that for there to be none.
+const LONGER: f64 = 1.0;
+
 /// Inliers below which a selection of them, whose noise is not known either, is not believed in.
 const FEWEST: usize = 20;
 
@@ -109,7 +112,7 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     if shorter < WORTH {
         scaled.take(sigma);
         let found = in_known_noise(&scaled.observations, rng)?;
-        return Some(Consensus { doubtful, whole: shorter < 0.0, ..found });
+        return Some(Consensus { doubtful, whole: shorter < -LONGER, ..found });
     }
     Some(Consensus { doubtful, ..found })
 }

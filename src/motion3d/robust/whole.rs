@@ -14,7 +14,7 @@ pub(super) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64>
 }
 
 /// By how much the mean square may exceed what the median says of it.
-const TAILS: f64 = 2.0;
+const TAILS: f64 = 1.5;
 
 /// Whether the lengths of two-dimensional residuals, NaN where there is none, are those of one normal distribution: few of points that are many times as large as most would make their mean square larger than their median has it, which is `2 ln 2` variances where the mean is two.
 pub(in super::super) fn one_noise(residuals: &[f64]) -> bool {

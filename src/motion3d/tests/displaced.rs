@@ -149,7 +149,7 @@ fn a_plane_has_two_exact_motions() {
     for (turn, scale) in [(0.02, 0.02), (0.25, 0.02), (0.25, 0.15)] {
         let truth = turning(0, turn);
         let seen = views(&truth, 300, 3, |[x, y], _| scale * (0.9 + 0.3 * x - 0.2 * y));
-        let found = seen.run(&Noise::Sigma(1e-6), &MotionOptions::default());
+        let found = seen.run(&Noise::Sigma(1e-7), &MotionOptions::default());
         assert_eq!(found.status, Status::Ambiguous);
         let both = [found.motion, found.alternatives[0].motion];
         assert!(both.iter().any(|motion| off(motion, &truth) < 1e-8), "{turn} {scale}");
