@@ -142,7 +142,8 @@ impl Motion {
         let (first, second) = if a < 1e-4 {
             (0.5 - a * a / 24.0, 1.0 / 6.0 - a * a / 120.0)
         } else {
-            ((1.0 - a.cos()) / (a * a), (a - a.sin()) / (a * a * a))
+            // 1 - cos a = 2 sin^2 (a / 2), which does not cancel.
+            (2.0 * ((0.5 * a).sin() / a).powi(2), (a - a.sin()) / (a * a * a))
         };
         let once = w.cross(&u);
         (u + once * first + w.cross(&once) * second).into()

@@ -73,7 +73,7 @@ impl HalfTurn {
             (1.0 / 24.0 - square / 1920.0, 0.125 - square / 384.0)
         } else {
             let half = 0.5 * a;
-            ((1.0 - half.sin() / half) / square, (1.0 - half.cos()) / square)
+            ((1.0 - half.sin() / half) / square, 2.0 * ((0.5 * half).sin() / a).powi(2))
         };
         let cross = cross_matrix(rotation);
         Self {
