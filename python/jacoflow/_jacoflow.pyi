@@ -989,7 +989,7 @@ def _motion3d_focus(
     translation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, intrinsics: ArrayLike | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
 def _motion3d_predict(
-    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool
+    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool, whole_frame: bool
 ) -> NDArray[np.float64]: ...
 def _motion3d_two_views(
     translation: ArrayLike, rotation: ArrayLike

@@ -18,6 +18,7 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -97,7 +98,7 @@ class MotionEstimate:
     rotation_std: Array
     """Standard deviations (3,) of `rotation`, rad/frame."""
     inv_depth: Array
-    """Inverse depths (N,) by least squares for this motion, in units of `|u|` per frame; NaN for points that are not finite."""
+    """Inverse depths (N,) by least squares for this motion, in units of `|u|` per frame; of displacements half way in time; NaN for points that are not finite."""
     inv_depth_std: Array
     """Standard deviations (N,) of `inv_depth` from the noise of the point's own flow; infinite at the epipole."""
     inv_depth_smooth: Array
@@ -182,7 +183,7 @@ def estimate_motion(
     sigma : float, units of flow
         Standard deviation of each component. None, and no `cov`: estimated from the residuals.
     cov : array (N, 2, 2), units of flow squared; (N, 3, 3) on the sphere; (N, 6, 6) with `jacobian`
-        Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y).
+        Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y). A point with a variance below a millionth of the lower quartile of all has that quartile added, as no measurement is so much better than the others.
     jacobian : array (N, 2, 2), 1/frame
         [[u_x, u_y], [v_x, v_y]] at the points: six numbers a patch, which pays for few (2 to 10), large patches (windows of 30 px and more) that do not overlap. Needs `cov`.
     projection : "plane" or "sphere"
@@ -192,7 +193,8 @@ def estimate_motion(
     robust : bool
         Find the points that obey one motion among up to 60 % that do not. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
     placement : "midpoint" or "start"
-        Where on its path a displacement is taken to be the instantaneous flow: half way, exact to second order, or at the start, for flow that is instantaneous. Bearings and their flow are taken as given.
+        What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
+        negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
     smoother : "auto", "prior" or "neighbours"
         What depths in the weights are drawn to: one normal distribution, regressions on 8 to 64 neighbours, or the better of them.
     weight_inv_depth : array (N,), units of |u| per frame
@@ -220,7 +222,7 @@ def estimate_motion(
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
         "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": None if shared == 1 else float(shared), "correlation_length": None if correlation_length == 0 else float(correlation_length), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
+        "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": _besides(1, _number("shared", shared)), "correlation_length": _besides(0, _number("correlation_length", correlation_length)), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = _six(flow, jacobian, sigma)
@@ -244,7 +246,24 @@ def _pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLi
     return parts[0], parts[1]
 
 
+def _number(name: str, value: float) -> float:
+    """A real number that is none of the things that Python turns into one."""
+    if not isinstance(value, str | bytes | bool | np.bool_ | complex):
+        try:
+            return float(value)
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise TypeError(f"{name}: expected a number, got {value!r}")
+
+
+def _besides(usual: float, value: float) -> float | None:
+    """None for the usual value, which needs nothing of the other options."""
+    return None if value == usual else value
+
+
 def _whole(name: str, value: int) -> int:
+    if isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name}: expected an integer, got {value!r}")
     try:
         return operator.index(value)
     except TypeError:
@@ -253,20 +272,13 @@ def _whole(name: str, value: int) -> int:
 
 def _count(name: str, value: int) -> int:
     count = _whole(name, value)
-    if count < 1:
+    if not 1 <= count <= sys.maxsize:
         raise ValueError(f"{name}: expected a positive integer, got {count}")
     return count
 
 
 def _sigma(sigma: float | None) -> float | None:
-    if sigma is None:
-        return None
-    if isinstance(sigma, str | bytes | bool | np.bool_):
-        raise TypeError(f"sigma: expected a number, got {sigma!r}")
-    try:
-        return float(sigma)
-    except (TypeError, ValueError):
-        raise TypeError(f"sigma: expected a number, got {sigma!r}") from None
+    return None if sigma is None else _number("sigma", sigma)
 
 
 def _six(flow: ArrayLike, jacobian: ArrayLike, sigma: float | None) -> Array:
@@ -366,8 +378,11 @@ def predict_flow(
     K: ArrayLike | None = None,
     *,
     projection: Literal["plane", "sphere"] = "plane",
+    whole_frame: bool = False,
 ) -> Array:
-    """Instantaneous flow of points under a motion (1): (N, 2), px/frame with K, else per frame; on the sphere (N, 3).
+    """Flow of points under a motion: (N, 2), px/frame with K, else per frame; on the sphere (N, 3).
+
+    Instantaneous flow (1) where the points are, or (`whole_frame`) the exact displacement of points of the first view to the second as the motion is steady over the frame, `X_2 = exp([w]x) X_1 + V(w) u`: what a result of `estimate_motion` with placement "midpoint" says that the flow was.
 
     Parameters
     ----------
@@ -376,15 +391,24 @@ def predict_flow(
     translation, rotation : arrays (3,), the latter in rad/frame
         The motion. The translation need not have length 1: inverse depths are in units of its length.
     inv_depth : array (N,)
-        Inverse depths.
+        Inverse depths; with `whole_frame` half way in time, as `estimate_motion` tells them.
     K : array (3, 3) or None
         Camera matrix, px.
     projection : "plane" or "sphere"
         The screen.
+    whole_frame : bool
+        Displacements over the whole frame, on the plane only; NaN where a point would be behind the camera.
+
+    Raises
+    ------
+    ValueError
+        For shapes and values that do not fit.
     """
     if projection not in ("plane", "sphere"):
         raise ValueError(f'projection: expected "plane" or "sphere", got {projection!r}')
-    return _motion3d_predict(points, inv_depth, translation, rotation, K, projection == "sphere")
+    if whole_frame and projection == "sphere":
+        raise ValueError("whole_frame: expected False on the sphere, whose flow is instantaneous; got True")
+    return _motion3d_predict(points, inv_depth, translation, rotation, K, projection == "sphere", bool(whole_frame))
 
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:
@@ -431,7 +455,7 @@ def estimate_field_motion(
     """
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else float(spacing), max_points, region)
+    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else _number("spacing", spacing), None if max_points is None else _count("max_points", max_points), region)
     if scene is not None:
         options["rotation_prior"] = _turned(scene, turning)
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, **options}), points
@@ -467,7 +491,7 @@ def time_to_contact_map(
 
 def _turned(scene: MotionEstimate, turning: float) -> tuple[Array, Array]:
     """What the scene's rotation says about that of a thing in it."""
-    if not turning > 0:
+    if not _number("turning", turning) > 0:
         raise ValueError(f"turning: expected a positive number, got {turning!r}")
     spread = scene.covariance[2:, 2:] + turning**2 * np.eye(3)
     if not np.isfinite(spread).all():

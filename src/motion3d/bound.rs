@@ -1,7 +1,7 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
 use super::covariance::{Matrix5, determined, direction_deviation};
-use super::intake::whiten;
+use super::intake::Intake;
 use super::kernels::{equations, information};
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
@@ -59,7 +59,7 @@ pub fn motion_bound(
         let expected = format!("{} values, one for each point", points.len());
         return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
     }
-    let observations = whiten(points, noise, Placement::Start);
+    let observations = Intake::new(points, noise, Placement::Start).whitened();
     let known: Vec<u32> = (0..observations.n as u32)
         .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
         .collect();

@@ -74,17 +74,26 @@ impl Intrinsics {
 
     /// `B = blockdiag(A, kron(A^-T, A))`, which maps `(u, v, u_x, v_x, u_y, v_y)`; covariances map as `B C B^t`.
     pub(super) fn affine_scale(&self) -> Matrix6<f64> {
-        let (a, inverse) = (self.scale(), self.unscale());
-        let mut map = Matrix6::zeros();
-        map.fixed_view_mut::<2, 2>(0, 0).copy_from(&a);
-        // vec(A M A^-1) = kron(A^-T, A) vec(M), columns first: (u_x, v_x), (u_y, v_y).
-        for i in 0..2 {
-            for j in 0..2 {
-                map.fixed_view_mut::<2, 2>(2 + 2 * i, 2 + 2 * j).copy_from(&(a * inverse[(j, i)]));
-            }
-        }
-        map
+        kronecker(&self.scale(), &self.unscale())
     }
+}
+
+/// `blockdiag(D_2, kron(D_1^-T, D_2))`, which maps `(u, v, u_x, v_x, u_y, v_y)` where flow is mapped by `D_2` and its place by `D_1`, that is invertible: what noise of the six numbers is multiplied with.
+pub(super) fn affine_map(flow: &Matrix2<f64>, place: &Matrix2<f64>) -> Matrix6<f64> {
+    kronecker(flow, &place.try_inverse().unwrap_or_else(Matrix2::zeros))
+}
+
+/// `blockdiag(A, kron(B^T, A))`.
+fn kronecker(a: &Matrix2<f64>, b: &Matrix2<f64>) -> Matrix6<f64> {
+    let mut map = Matrix6::zeros();
+    map.fixed_view_mut::<2, 2>(0, 0).copy_from(a);
+    // vec(A M B) = kron(B^T, A) vec(M), columns first: (u_x, v_x), (u_y, v_y).
+    for i in 0..2 {
+        for j in 0..2 {
+            map.fixed_view_mut::<2, 2>(2 + 2 * i, 2 + 2 * j).copy_from(&(a * b[(j, i)]));
+        }
+    }
+    map
 }
 
 #[cfg(test)]

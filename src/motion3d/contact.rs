@@ -3,14 +3,15 @@
 use super::camera::Intrinsics;
 use super::covariance::Matrix5;
 use super::field::measured;
-use super::intake::plane_row;
+use super::intake::{plane_row, turned_row};
 use super::motion::Motion;
 use super::observations::Row;
 use super::options::Placement;
+use super::turned::{HalfTurn, HalfWay};
 use crate::error::Result;
 use crate::math::Real;
 use crate::types::{FlowField, Status};
-use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
@@ -60,10 +61,11 @@ impl Rates {
     }
 
     /// The same from a point's own flow, and its residual across the epipolar line in units of noise.
-    fn own(&self, row: &Row) -> [f64; 3] {
+    fn own(&self, row: &Row, half_way: HalfWay) -> [f64; 3] {
         let (t, d) = (row.g * self.u, row.f - row.r * self.w);
         let s2 = t.norm_squared();
-        let (contact, deviation) = self.contact(row, t.dot(&d) / s2, 1.0 / s2);
+        let nu = t.dot(&d) / s2;
+        let (contact, deviation) = self.contact(row, half_way.depth(nu), half_way.slope(nu).powi(2) / s2);
         [contact, deviation, (t.y * d.x - t.x * d.y) / s2.sqrt()]
     }
 }
@@ -102,12 +104,14 @@ pub fn contact_map<T: Real>(
     let covariance = Matrix5::from_fn(|i, j| covariance[i][j]);
     let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance));
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
+    let turn = (placement == Placement::Midpoint).then(|| HalfTurn::new(&motion.w()));
+    let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
     let at = |site: usize| -> [f64; 3] {
-        let Some(row) = site_row(field, camera, placement, site) else { return [f64::NAN; 3] };
+        let Some(row) = site_row(field, camera, turn.as_ref(), site) else { return [f64::NAN; 3] };
         if turning {
             return [f64::INFINITY, f64::INFINITY, (row.f - row.r * motion.w()).norm()];
         }
-        rates.own(&row)
+        rates.own(&row, half_way)
     };
     let values: Vec<[f64; 3]> = (0..field.width * field.height).into_par_iter().map(at).collect();
     let plane = |k: usize| values.iter().map(|value| value[k]).collect();
@@ -120,15 +124,20 @@ pub fn contact_map<T: Real>(
     })
 }
 
-/// A site's whitened flow; `None` where it is not valid.
-fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, placement: Placement, site: usize) -> Option<Row> {
+/// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None` where it is not valid.
+fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&HalfTurn>, site: usize) -> Option<Row> {
     if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
         return None;
     }
     let [[uu, uv, ..], [_, vv, ..], ..] = field.covariance_at(site)?;
     let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
     let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-    plane_row([x as f64, y as f64], [u, v], &[uu, uv, uv, vv], Some(camera), placement).map(|(row, _)| row)
+    let (at, covariance) = ([x as f64, y as f64], Matrix2::new(uu, uv, uv, vv));
+    let row = match turn {
+        Some(turn) => turned_row(at, [u, v], &covariance, Some(camera), turn),
+        None => plane_row(at, [u, v], &covariance, Some(camera), Placement::Start),
+    };
+    row.map(|(row, _)| row)
 }
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use super::covariance::{Plugged, direction_deviation, plugged};
 use super::departure::beyond_theory;
+use super::displaced::{beforehand, decides, matters, settle};
 use super::efficient::{Efficient, WeightDepths, unsolved};
-use super::intake::whiten;
+use super::intake::Intake;
 use super::likelihood::{Candidate, choose, different, minima};
 use super::motion::Motion;
 use super::observations::{Known, Observations};
@@ -12,6 +13,7 @@ use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
 use super::robust::{self, Consensus, Rival};
+use super::selected::{doubted, of_estimated_noise, with_all_inliers};
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
 use super::trial::{DISTINCT, Trial, close, smoothed};
@@ -28,6 +30,9 @@ const SMOOTHED: usize = 30;
 
 /// Noise of flow that is exactly zero, in its unit.
 const LEAST_NOISE: f64 = 1e-100;
+
+/// Times that a rotation is taken out of displacements and points that obey are looked for again.
+const TURNS: usize = 2;
 
 /// Residuals below this share of the flow are rounding.
 const ROUNDING: f64 = 1e-11;
@@ -66,11 +71,8 @@ impl Scaled {
 
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
     let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
-    let mut scaled = Scaled {
-        observations: whiten(flow, noise, options.placement),
-        sigma,
-        unknown: matches!(noise, Noise::Unknown),
-    };
+    let intake = Intake::new(flow, noise, options.placement);
+    let mut scaled = Scaled { observations: intake.whitened(), sigma, unknown: matches!(noise, Noise::Unknown) };
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
@@ -85,6 +87,9 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     scaled.observations.shared = options.shared.unwrap_or(1.0);
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
+    if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {
+        scaled.observations = turned;
+    }
     if scaled.unknown
         && options.robust
         && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
@@ -94,13 +99,13 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         return rotation_report(flow, all, all, &rotation, 0.0);
     }
     if options.robust {
-        let Some(kept) = consensus(&mut scaled, rng.stream(1)) else {
+        let Some(kept) = exact_consensus(&intake, &mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inner = scaled.observations.subset(&kept.inner);
-        let found = on(flow, options, &mut scaled, inner, Some(&kept), rng);
+        let found = on(&intake, options, &mut scaled, inner, Some(&kept), rng);
         let found = with_all_inliers(found, &scaled.observations, &kept);
-        doubted(found, &scaled.observations, kept.doubtful)
+        doubted(found, &scaled.observations, &kept)
     } else {
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
@@ -108,20 +113,22 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma);
         }
         let inliers = scaled.observations.clone();
-        on(flow, options, &mut scaled, inliers, None, rng)
+        on(&intake, options, &mut scaled, inliers, None, rng)
     }
 }
 
-/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their own.
-fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
-    for &k in &kept.inliers {
-        let source = all.source[k as usize] as usize;
-        if !found.inliers[source] {
-            found.inliers[source] = true;
-            found.inverse_depth_smooth[source] = found.inverse_depth[source];
+/// The points that obey one motion, with its rotation taken out of their displacements where that makes a difference to who obeys.
+fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let mut kept = consensus(scaled, rng)?;
+    for _ in 0..TURNS {
+        let obeying = scaled.observations.subset(&kept.inliers);
+        if !decides(intake, &obeying, &kept.motion) {
+            break;
         }
+        scaled.observations = intake.turned(&scaled.observations, &kept.motion.w());
+        kept = consensus(scaled, rng)?;
     }
-    found
+    Some(kept)
 }
 
 /// The points that obey one motion, judged by their own errors.
@@ -135,17 +142,6 @@ fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
         rival.excess *= own * own;
     }
     Some(found)
-}
-
-/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful choice of points and no surer; what
-/// else is told says more.
-fn doubted(found: MotionEstimate, all: &Observations, doubtful: bool) -> MotionEstimate {
-    let few = match found.status {
-        Status::Ok => doubtful || robust::hangs_on_few(all, &found),
-        Status::RotationOnly | Status::LowSnr => doubtful,
-        _ => false,
-    };
-    if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 
 /// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.
@@ -173,13 +169,14 @@ const FEW_POINTS: f64 = 12.0;
 
 /// Estimates on the points that obey one motion.
 fn on(
-    flow: &Flow<'_>,
+    intake: &Intake<'_>,
     options: &MotionOptions,
     scaled: &mut Scaled,
     mut inliers: Observations,
     known: Option<&Consensus>,
     rng: CounterRng,
 ) -> MotionEstimate {
+    let flow = intake.flow;
     let mut found = match (&options.initial, known) {
         (Some(initial), _) => {
             let initial = Motion::new(initial.translation, initial.rotation);
@@ -188,10 +185,12 @@ fn on(
         (None, None) => minima(&inliers, rng.stream(2)),
         (None, Some(known)) => again(&inliers, known),
     };
-    let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
-    let Some(best) = found.first().map(|minimum| minimum.equations.cost) else {
+    let Some(&first) = found.first() else {
         return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
     };
+    settle(intake, &mut scaled.observations, &mut inliers, &mut found, first, scaled.unknown);
+    let best = found[0].equations.cost;
+    let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
     if scaled.unknown {
         if let Some(rotation) = turning_in_unknown_noise(&inliers, best) {
             let sigma = (rotation.chi2 / (2 * inliers.n - 3) as f64).sqrt();
@@ -206,13 +205,21 @@ fn on(
     {
         return rotation_report(flow, &scaled.observations, &inliers, &rotation, scaled.sigma);
     }
-    let smoother = || DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
-    let (candidates, made) = if options.initial.is_some() {
-        (found.into_iter().map(|minimum| Candidate { cost: minimum.equations.cost, minimum }).collect(), None)
-    } else {
-        choose(&inliers, &found, smoother)
+    let preferred_of = |inliers: &Observations, found: &[Minimum]| {
+        if options.initial.is_some() {
+            let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
+            return (found.iter().map(given).collect(), None);
+        }
+        choose(inliers, found, || DepthSmoother::new(inliers, options.smoother, rng.stream(3)))
     };
+    let (mut candidates, mut made) = preferred_of(&inliers, &found);
+    if matters(intake, &inliers, candidates[0].motion()) {
+        // Chosen for its depths, with the rotation of another one taken out.
+        settle(intake, &mut scaled.observations, &mut inliers, &mut found, candidates[0].minimum, false);
+        (candidates, made) = preferred_of(&inliers, &found);
+    }
     let chosen = candidates[0];
+    let smoother = || DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
     let wanted = match options.method {
         Method::Auto => inliers.n >= SMOOTHED,
         Method::Efficient => true,
@@ -244,6 +251,10 @@ fn on(
         let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
         solution.covariance = solution.covariance.map(|covariance| covariance * strays);
     }
+    if scaled.unknown {
+        let widened = of_estimated_noise(inliers.n, known.is_some());
+        solution.covariance = solution.covariance.map(|covariance| covariance * widened);
+    }
     solution.alternatives = close(&candidates, inliers.n)[1..]
         .iter()
         .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
@@ -251,7 +262,7 @@ fn on(
     let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
     let likelihood = (*chosen.motion(), chosen.minimum.equations.behind);
     let evidence = Evidence { likelihood, deviation, low, rivals, undecided };
-    judge(&inliers, &mut solution, &evidence, rng.stream(4));
+    judge(intake, &inliers, &mut solution, &evidence, rng.stream(4));
     report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
 }
 

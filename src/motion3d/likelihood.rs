@@ -17,7 +17,7 @@ const FEWER: usize = 2000;
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.
-const SAME: f64 = 0.5;
+pub(super) const SAME: f64 = 0.5;
 
 /// A minimum of the likelihood with what speaks against it.
 #[derive(Debug, Clone, Copy)]

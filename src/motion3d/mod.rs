@@ -28,12 +28,14 @@
 //! # }
 //! ```
 
+mod belief;
 mod bend;
 mod bound;
 mod camera;
 mod contact;
 mod covariance;
 mod departure;
+mod displaced;
 mod efficient;
 mod estimate;
 mod field;
@@ -52,6 +54,7 @@ mod regression;
 mod report;
 mod result;
 mod robust;
+mod selected;
 mod signs;
 mod smoothing;
 mod special;
@@ -59,6 +62,7 @@ mod special;
 mod tests;
 mod together;
 mod trial;
+mod turned;
 mod verdict;
 
 pub use bound::{MotionBound, motion_bound};

@@ -1,6 +1,7 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
 use super::camera::Intrinsics;
+use super::turned::HalfTurn;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 /// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.
@@ -104,6 +105,13 @@ impl Motion {
         (camera.unscale() * Vector2::from(flow)).into()
     }
 
+    /// Displacement over the whole frame of a place of the first view, px with a camera, else on the plane at distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the point is behind the camera.
+    pub fn picture_displacement(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
+        let turn = HalfTurn::new(&self.w());
+        let Some(camera) = camera else { return turn.displacement(&self.u(), point, inverse_depth).into() };
+        (camera.unscale() * turn.displacement(&self.u(), camera.to_plane(point), inverse_depth)).into()
+    }
+
     /// Flow of a unit bearing on the sphere, a 3-vector perpendicular to it: equation (1).
     pub fn sphere_flow(&self, bearing: [f64; 3], inverse_range: f64) -> [f64; 3] {
         let eta = Vector3::from(bearing);
@@ -134,7 +142,8 @@ impl Motion {
         let (first, second) = if a < 1e-4 {
             (0.5 - a * a / 24.0, 1.0 / 6.0 - a * a / 120.0)
         } else {
-            ((1.0 - a.cos()) / (a * a), (a - a.sin()) / (a * a * a))
+            // 1 - cos a = 2 sin^2 (a / 2), which does not cancel.
+            (2.0 * ((0.5 * a).sin() / a).powi(2), (a - a.sin()) / (a * a * a))
         };
         let once = w.cross(&u);
         (u + once * first + w.cross(&once) * second).into()

@@ -3,6 +3,7 @@
 use super::kernels::PLANES;
 use super::motion::Rows;
 use super::options::RotationPrior;
+use super::turned::HalfTurn;
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
@@ -43,6 +44,12 @@ pub(super) struct Observations {
     pub prior: Option<Known>,
     /// How many points share one error: their own has the variance `1 / shared`.
     pub shared: f64,
+    /// Whether flow is a displacement over a whole frame.
+    pub displaced: bool,
+    /// The rotation that was taken out of displacements.
+    pub turn: Option<HalfTurn>,
+    /// What everything was multiplied with since it was whitened.
+    units: f64,
 }
 
 /// A rotation known beforehand, with the inverse of its covariance.
@@ -71,8 +78,7 @@ impl Known {
 impl Row {
     /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None` unless all is finite and `S` positive definite.
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
-        let l = covariance.cholesky()?.l();
-        let whiten = l.try_inverse()?;
+        let whiten = unit(covariance)?;
         let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
         row.values().iter().all(|value| value.is_finite()).then_some(row)
     }
@@ -100,7 +106,27 @@ impl Observations {
             size += row.g.norm_squared();
         }
         let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
-        Self { n, stride, planes, position, spherical, source, floor, level: Level::detect(), prior: None, shared: 1.0 }
+        Self {
+            n,
+            stride,
+            planes,
+            position,
+            spherical,
+            source,
+            floor,
+            level: Level::detect(),
+            prior: None,
+            shared: 1.0,
+            displaced: false,
+            turn: None,
+            units: 1.0,
+        }
+    }
+
+    /// Takes units and what is known beforehand from other observations; these have just been whitened.
+    pub fn like(&mut self, other: &Self) {
+        (self.prior, self.shared, self.displaced) = (other.prior, other.shared, other.displaced);
+        self.rescale(other.units);
     }
 
     /// The points `chosen`, by index among these.
@@ -125,6 +151,9 @@ impl Observations {
             level: self.level,
             prior: self.prior,
             shared: self.shared,
+            displaced: self.displaced,
+            turn: self.turn,
+            units: self.units,
         }
     }
 
@@ -132,6 +161,7 @@ impl Observations {
     pub fn rescale(&mut self, factor: f64) {
         self.planes.iter_mut().for_each(|value| *value *= factor);
         self.floor *= factor * factor;
+        self.units *= factor;
     }
 
     /// The deviation of a point's own error, in units of noise.
@@ -170,6 +200,15 @@ impl Observations {
         let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
         median(&mut lengths)
     }
+}
+
+/// `L^-1` of `S = L L^t`; `None` unless `S` is positive definite.
+fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let first = covariance[(0, 0)].sqrt();
+    let below = covariance[(1, 0)] / first;
+    let second = (covariance[(1, 1)] - below * below).sqrt();
+    let positive = first > 0.0 && second > 0.0;
+    positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
 }
 
 /// The median (the upper one of two), 0 of nothing; reorders the values.

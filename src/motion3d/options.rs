@@ -38,7 +38,7 @@ pub enum Noise<'a> {
     Unknown,
     /// Standard deviation of each component, in the unit of the flow.
     Sigma(f64),
-    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not finite are left out; others must be symmetric and positive definite, on the sphere across the bearing.
+    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not finite are left out; others must be symmetric and positive definite, on the sphere across the bearing. A point whose smaller variance is below a millionth of the lower quartile of all has that quartile added: no measurement is so much better than others, and one that says so would decide alone.
     Covariances(&'a [f64]),
 }
 

@@ -2,11 +2,14 @@
 //!
 //! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum likelihood worse than flow alone, so that they are shrunk.
 
+mod replicas;
 mod report;
 mod shrink;
 mod system;
+mod turned;
 mod verdict;
 
+use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined};
 use super::camera::Intrinsics;
 use super::covariance::{determined, inverse, plugged_in};
@@ -15,13 +18,16 @@ use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::{RotationOnly, by_chance};
+use super::turned::HalfTurn;
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use replicas::wider;
 use report::{tell, turning_report};
 use shrink::shrunk;
 use std::collections::HashSet;
 use system::{Patch, System};
+use turned::{beforehand, settle, turned_patch};
 use verdict::{Evidence, judge};
 
 /// Patches with their affine flow, N of each.
@@ -47,6 +53,9 @@ const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
 
+/// By how much a covariance may have to be widened for it to tell the shape of what is not known.
+const NONLINEAR: f64 = 4.0;
+
 impl AffinePatches<'_> {
     fn check(&self) -> Result<()> {
         let n = self.points.len();
@@ -65,11 +74,15 @@ impl AffinePatches<'_> {
         Ok(())
     }
 
-    /// The usable patches, whitened.
-    fn system(&self, placement: Placement) -> System {
+    /// The usable patches, whitened; with a `turn`, as displacements with that rotation taken out of them.
+    fn system(&self, placement: Placement, turn: Option<&HalfTurn>) -> System {
         let (mut patches, mut source) = (Vec::new(), Vec::new());
         for k in 0..self.points.len() {
-            if let Some(patch) = self.patch(k, placement) {
+            let patch = match turn {
+                Some(turn) => turned_patch(self, k, turn),
+                None => self.patch(k, placement),
+            };
+            if let Some(patch) = patch {
                 patches.push(patch);
                 source.push(k as u32);
             }
@@ -94,7 +107,7 @@ impl AffinePatches<'_> {
             m = map * m;
             covariance = map * covariance * map.transpose();
         }
-        Patch::new(at, &m, &covariance)
+        Patch::new(at, &m, &covariance, None)
     }
 }
 
@@ -118,23 +131,28 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
-    let system = patches.system(options.placement);
-    Ok(options.threads.check()?.install(|| estimate(&system, patches.points, options)))
+    let covariances = believed(patches.covariances, 6);
+    let patches = AffinePatches { covariances: &covariances, ..*patches };
+    Ok(options.threads.check()?.install(|| estimate(&patches, options)))
 }
 
-fn estimate(system: &System, points: &[[f64; 2]], options: &MotionOptions) -> MotionEstimate {
+fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstimate {
+    let points = patches.points;
+    let mut system = beforehand(patches, options);
     let (used, n) = (system.patches.len(), points.len());
     if used < LEAST {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
-    if let Some(rotation) = turning(system) {
-        return turning_report(system, n, &rotation);
+    if let Some(rotation) = turning(&system) {
+        return turning_report(&system, n, &rotation);
     }
     let rng = CounterRng::new(options.seed);
-    let minima = match options.initial {
+    let mut minima = match options.initial {
         Some(initial) => vec![system.refine(&Motion::new(initial.translation, initial.rotation))],
-        None => minima(system, rng),
+        None => minima(&system, rng),
     };
+    settle(patches, options, &mut system, &mut minima);
+    let system = &system;
     let Some(&best) = minima.first() else {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     };
@@ -158,7 +176,13 @@ fn estimate(system: &System, points: &[[f64; 2]], options: &MotionOptions) -> Mo
         }
     }
     out.efficient = surfaces.is_some();
-    let low = plugged.is_none();
+    let told: Vec<Vector3<f64>> = match &surfaces {
+        Some(surfaces) => surfaces.clone(),
+        None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
+    };
+    let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
+    covariance = covariance.map(|covariance| covariance * wider);
+    let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {
         motion: best,
@@ -182,11 +206,16 @@ fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     let refined = apart(found, APART, STARTS).into_iter().map(|(start, _)| system.refine(&start));
+    cheapest(system, refined.flat_map(|motion| [motion, motion.reversed()]))
+}
+
+/// Sorted by what residuals and patches behind the camera cost.
+fn cheapest(system: &System, motions: impl Iterator<Item = Motion>) -> Vec<Motion> {
     let cost = |motion: Motion| {
         let here = system.equations(&motion, &tangents(&motion.u()), None);
         (motion, here.cost + here.behind)
     };
-    let mut minima: Vec<(Motion, f64)> = refined.flat_map(|motion| [motion, motion.reversed()]).map(cost).collect();
+    let mut minima: Vec<(Motion, f64)> = motions.map(cost).collect();
     minima.retain(|(_, cost)| cost.is_finite());
     minima.sort_by(|a, b| a.1.total_cmp(&b.1));
     minima.into_iter().map(|(motion, _)| motion).collect()
@@ -194,6 +223,11 @@ fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
 
 /// The rotation alone, where chance explains what it leaves.
 fn turning(system: &System) -> Option<RotationOnly> {
+    let found = least_squares(system)?;
+    by_chance(found.chi2, (6 * system.patches.len() - 3) as f64).then_some(found)
+}
+
+fn least_squares(system: &System) -> Option<RotationOnly> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for patch in &system.patches {
         normal += patch.r.transpose() * patch.r;
@@ -202,8 +236,7 @@ fn turning(system: &System) -> Option<RotationOnly> {
     let factor = normal.cholesky()?;
     let rotation = factor.solve(&right);
     let chi2: f64 = system.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
-    let found = || RotationOnly { rotation, covariance: factor.inverse(), chi2 };
-    by_chance(chi2, (6 * system.patches.len() - 3) as f64).then(found)
+    Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
 /// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given; their flow is not looked at.
@@ -217,7 +250,7 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
         let expected = format!("{} surfaces, one for each point", patches.points.len());
         return Err(Error::argument("inv_depth", expected, surfaces.len()));
     }
-    let system = patches.system(Placement::Start);
+    let system = patches.system(Placement::Start, None);
     let known: Vec<u32> = (0..system.patches.len() as u32)
         .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
         .collect();

@@ -13,6 +13,7 @@ use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::RotationOnly;
 use super::together::{Weighted, together};
+use super::turned::HalfWay;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 
 /// A motion found on the inliers.
@@ -88,6 +89,11 @@ impl Solution {
     }
 }
 
+/// From inverse depths in the rows to those half way in time.
+fn half_way(points: &Observations, motion: &Motion) -> HalfWay {
+    points.turn.map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()))
+}
+
 /// Puts the results of usable points where they came from; others stay as they are.
 fn scatter(to: &mut [f64], observations: &Observations, from: impl Fn(usize) -> f64) {
     for (k, &source) in observations.source.iter().enumerate() {
@@ -119,12 +125,16 @@ pub(super) fn report(
     if let Some(plugged) = plugged(&equations(inliers, motion, &solution.tangent, None)) {
         out.bound = nested(&plugged.bound);
     }
-    let seen = depths(all, motion);
+    let mut seen = depths(all, motion);
+    scatter(&mut out.residuals, all, |k| seen.e[k]);
+    let half_way = half_way(all, motion);
+    for k in 0..all.n {
+        (seen.nu[k], seen.s2[k]) = (half_way.depth(seen.nu[k]), seen.s2[k] / half_way.slope(seen.nu[k]).powi(2));
+    }
     scatter(&mut out.inverse_depth, all, |k| seen.nu[k]);
     scatter(&mut out.inverse_depth_std, all, |k| 1.0 / seen.s2[k].sqrt());
-    scatter(&mut out.residuals, all, |k| seen.e[k]);
     if let Some(smooth) = &solution.smooth {
-        scatter(&mut out.inverse_depth_smooth, inliers, |k| smooth[k]);
+        scatter(&mut out.inverse_depth_smooth, inliers, |k| half_way.depth(smooth[k]));
     } else {
         let own = &out.inverse_depth;
         scatter(&mut out.inverse_depth_smooth, inliers, |k| own[inliers.source[k] as usize]);
@@ -138,11 +148,12 @@ pub(super) fn report(
 
 /// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any, else the point's own.
 fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) -> Vec<(f64, f64)> {
+    let half_way = half_way(inliers, &solution.motion);
     let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
     let mut depths: Vec<(f64, f64)> = own.map(|(nu, deviation)| (*nu, deviation * deviation)).collect();
     if let (Some(nu), Some(variance)) = (&solution.smooth, &solution.variance) {
         for (k, &source) in inliers.source.iter().enumerate() {
-            depths[source as usize] = (nu[k], variance[k]);
+            depths[source as usize] = (half_way.depth(nu[k]), variance[k] * half_way.slope(nu[k]).powi(2));
         }
     }
     depths

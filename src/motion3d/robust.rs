@@ -4,6 +4,7 @@ mod coherence;
 mod gate;
 mod hanging;
 mod search;
+mod unknown;
 mod whole;
 
 use super::estimate::Scaled;
@@ -16,6 +17,7 @@ use crate::math::random::CounterRng;
 use gate::Gate;
 pub(super) use hanging::{hangs_on_few, with_strays};
 use rayon::prelude::*;
+pub(super) use whole::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
 const INLIER: f64 = 3.0;
@@ -46,14 +48,6 @@ const LEAST: usize = 5;
 /// Two motions of different points of which neither has a tenth of all points more than the other: which is the scene's cannot be told.
 const MAJORITY: f64 = 0.1;
 
-/// Unknown noise: the first guess, in shares of the median flow; residuals that estimate it, in units of it; their mean square
-/// relative to the variance, for a normal distribution cut there; most rounds.
-const FIRST_SHARE: f64 = 0.05;
-const CUT: f64 = 2.5;
-const CUT_VARIANCE: f64 = 0.911;
-const SIGMA_ROUNDS: usize = 4;
-const SIGMA_STEPS: usize = 50;
-
 /// What residuals that estimate noise are fewer by: the unknowns of a motion.
 const UNKNOWNS: usize = 5;
 
@@ -65,8 +59,11 @@ const WORTH: f64 = 4.0;
 const SURE: f64 = 10.0;
 const APART_NOISE: f64 = 1.5;
 
+/// By how much, in nats, outliers must lengthen that for there to be none.
+const LONGER: f64 = 1.0;
+
 /// Inliers below which a selection of them, whose noise is not known either, is not believed in.
-const FEWEST: usize = 15;
+const FEWEST: usize = 20;
 
 /// A motion and the points that obey it.
 #[derive(Debug, Clone)]
@@ -80,11 +77,13 @@ pub(super) struct Consensus {
     pub rivals: Vec<Rival>,
     /// Whether the points are too few to tell outliers from large noise.
     pub doubtful: bool,
+    /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
+    pub whole: bool,
 }
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self { motion, inliers, inner: Vec::new(), rivals: Vec::new(), doubtful: false }
+        Self { motion, inliers, inner: Vec::new(), rivals: Vec::new(), doubtful: false, whole: false }
     }
 }
 
@@ -104,7 +103,7 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     }
     let whole = (scaled.observations.n < SELECTED).then(|| whole::sigma(&scaled.observations, rng)).flatten();
     let whole = whole.map(|sigma| sigma * scaled.sigma);
-    let found = in_unknown_noise(scaled, rng)?;
+    let found = unknown::consensus(scaled, rng)?;
     let Some(sigma) = whole.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
     let shorter = whole::shortening(&scaled.observations, &found, sigma);
     // Whatever is the case, one noise that hardly differs from the other does no harm.
@@ -113,46 +112,9 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     if shorter < WORTH {
         scaled.take(sigma);
         let found = in_known_noise(&scaled.observations, rng)?;
-        return Some(Consensus { doubtful, ..found });
+        return Some(Consensus { doubtful, whole: shorter < -LONGER, ..found });
     }
     Some(Consensus { doubtful, ..found })
-}
-
-/// From a small share of the flow on, the noise that the inliers leave.
-fn in_unknown_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    scaled.take(FIRST_SHARE * scaled.observations.median_flow());
-    let mut found = in_known_noise(&scaled.observations, rng)?;
-    for _ in 0..SIGMA_ROUNDS {
-        let sigma = noise(&depths(&scaled.observations, &found.motion).e[..scaled.observations.n]);
-        scaled.take(sigma);
-        found = in_known_noise(&scaled.observations, rng)?;
-        if (sigma - 1.0).abs() < 0.02 {
-            break;
-        }
-    }
-    Some(found)
-}
-
-/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution"; the five unknowns take their share away.
-fn noise(residuals: &[f64]) -> f64 {
-    let mut sigma = 1.0;
-    for _ in 0..SIGMA_STEPS {
-        let (mut sum, mut count) = (0.0, 0usize);
-        for e in residuals.iter().filter(|e| e.abs() < CUT * sigma) {
-            sum += e * e;
-            count += 1;
-        }
-        if count <= UNKNOWNS || sum <= 0.0 {
-            break;
-        }
-        let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
-        let settled = (next - sigma).abs() < 1e-6 * sigma;
-        sigma = next;
-        if settled {
-            break;
-        }
-    }
-    sigma
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {

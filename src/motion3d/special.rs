@@ -1,9 +1,12 @@
 //! Scenes that do not determine a motion: no translation, one plane.
 
+use super::intake::Intake;
 use super::kernels::{Depths, depths};
-use super::motion::Motion;
+use super::motion::{Motion, Rows};
 use super::observations::Observations;
+use super::refine::{Effort, refine};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use std::borrow::Cow;
 
 /// Least squares for the rotation alone.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +28,9 @@ impl RotationOnly {
 
 /// Least share of the information that is not rounding.
 const DETERMINED: f64 = 1e-12;
+
+/// Times that a plane's other rotation is taken out of displacements.
+const TURNS: usize = 5;
 
 /// Deviations of a standard normal that a share of 0.001 lies beyond.
 const RARE: f64 = 3.0902;
@@ -94,13 +100,10 @@ pub(super) struct Twin {
 /// The other motion where the depths at `motion` are one plane as far as their noise lets tell; `None` where they are not, or where both motions are the same.
 ///
 /// `distinct`: least angle between both directions, rad, that is no mere error of the estimate.
-pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
+pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
     let Depths { nu, s2, .. } = depths(observations, motion);
     let (mut normal, mut right, mut used) = (Matrix3::zeros(), Vector3::zeros(), 0usize);
-    let eta = |k: usize| {
-        let [x, y, z] = observations.position[k];
-        Vector3::new(x, y, if observations.spherical { z } else { 1.0 })
-    };
+    let eta = |k: usize| place(observations, motion, k, nu[k]);
     for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
         let eta = eta(k);
         normal += s2[k] * eta * eta.transpose();
@@ -117,16 +120,51 @@ pub(super) fn twin(observations: &Observations, motion: &Motion, distinct: f64) 
         return None;
     }
     let u = motion.u();
-    let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&u)));
+    let (other, seen) = other_motion(intake, observations, motion, &n)?;
     let behind = |motion: &Motion| -> f64 {
-        let at = depths(observations, motion);
-        let behind: f64 = (0..observations.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
-        behind + observations.prior.map_or(0.0, |known| known.pull(&motion.w()).1)
+        let at = depths(&seen, motion);
+        let behind: f64 = (0..seen.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
+        behind + seen.prior.map_or(0.0, |known| known.pull(&motion.w()).1)
     };
     let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
     let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });
     let better = if signs[1].behind < signs[0].behind { signs[1] } else { signs[0] };
     (angle > distinct).then_some(better)
+}
+
+/// A point's `eta`, where `nu = n . eta` holds for a plane. Half way along a displacement it is the picture of the point half way, which a displacement that changes the depth has at `m + nu^2 t_z / 4 G(m) t`.
+fn place(observations: &Observations, motion: &Motion, k: usize, nu: f64) -> Vector3<f64> {
+    let [x, y, z] = observations.position[k];
+    if observations.spherical {
+        return Vector3::new(x, y, z);
+    }
+    let Some(turn) = observations.turn else { return Vector3::new(x, y, 1.0) };
+    let t = turn.mean * motion.u();
+    let along = Rows::plane([x, y]).g * t * (0.25 * nu * nu * t.z);
+    Vector3::new(x + along.x, y + along.y, 1.0)
+}
+
+/// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken out, where another one was.
+fn other_motion<'a>(
+    intake: &Intake<'_>,
+    observations: &'a Observations,
+    motion: &Motion,
+    n: &Vector3<f64>,
+) -> Option<(Motion, Cow<'a, Observations>)> {
+    let Some(turn) = observations.turn else {
+        let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
+        return Some((other, Cow::Borrowed(observations)));
+    };
+    // In the axes half way the translation is V' u and rotations are V' w.
+    let back = turn.mean.try_inverse()?;
+    let w = motion.w() + back * n.cross(&(turn.mean * motion.u()));
+    let mut other = Motion::of(&(back * n).normalize(), &w);
+    let mut seen = observations.clone();
+    for _ in 0..TURNS {
+        seen = intake.turned(&seen, &other.w());
+        other = refine(&seen, other, None, Effort::FULL).motion;
+    }
+    Some((other, Cow::Owned(seen)))
 }
 
 /// Whether a curved surface explains the depths better than a plane by more than chance and the error of the motion would have it: all depths together tell that with less certainty.

@@ -3,6 +3,7 @@
 mod confidence;
 mod degenerate;
 mod dense;
+mod displaced;
 mod estimators;
 mod patches;
 mod published;

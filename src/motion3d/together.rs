@@ -63,8 +63,9 @@ pub(super) fn together(
 
 /// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told has too much for each point's own where several share one error.
 fn excess(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f64) -> Matrix5 {
-    let mut points: Vec<(Vector3<f64>, Vector5)> =
-        (0..inliers.n).map(|k| (flow.place(inliers.source[k] as usize) / length, row(inliers, at, k))).collect();
+    let mut points: Vec<(Vector3<f64>, Vector5)> = (0..inliers.n)
+        .map(|k| (flow.place(inliers.source[k] as usize) / length, slopes(inliers, at.motion, at.tangent, at.nu[k], k)))
+        .collect();
     // From top to bottom, so that only a band of them is near.
     points.sort_by(|a, b| a.0.y.total_cmp(&b.0.y));
     let own = inliers.own() * inliers.own();
@@ -82,16 +83,16 @@ fn excess(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f6
     parts.iter().sum()
 }
 
-/// The row `W_k = D(nu)`, 0 at the epipole.
-fn row(inliers: &Observations, at: &Weighted<'_>, k: usize) -> Vector5 {
-    let point = inliers.row(k);
-    let t = point.g * at.motion.u();
+/// The row `D(nu)` of point `k`, 0 at the epipole.
+pub(super) fn slopes(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: f64, k: usize) -> Vector5 {
+    let point = points.row(k);
+    let t = point.g * motion.u();
     let s = t.norm();
-    if s * s <= inliers.floor {
+    if s * s <= points.floor {
         return Vector5::zeros();
     }
     let across = nalgebra::RowVector2::new(t.y, -t.x) / s;
-    let psi = across * point.g * at.tangent.transpose() * at.nu[k];
+    let psi = across * point.g * tangent.transpose() * nu;
     let turn = across * point.r;
     Vector5::new(psi.x, psi.y, turn.x, turn.y, turn.z)
 }

@@ -2,7 +2,9 @@
 
 use super::covariance::direction_deviation;
 use super::grid::SEARCHED;
+use super::intake::Intake;
 use super::kernels::equations;
+use super::likelihood::SAME;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::plausible::{Farther, plausible_beyond};
@@ -60,11 +62,17 @@ pub(super) struct Evidence<'a> {
 }
 
 /// Finds what else could be true: the status, and the other motions among the alternatives.
-pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &Evidence<'_>, rng: CounterRng) {
+pub(super) fn judge(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &mut Solution,
+    evidence: &Evidence<'_>,
+    rng: CounterRng,
+) {
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
     // Where even that is not finite, no other motion is distinct.
     let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
-    let planar = planar(inliers, solution, evidence.likelihood.1, distinct);
+    let planar = planar(intake, inliers, solution, evidence.likelihood.1, distinct);
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
@@ -100,13 +108,15 @@ pub(super) fn judge(inliers: &Observations, solution: &mut Solution, evidence: &
 }
 
 /// Whether the points are one plane that has another motion, too; that is then the first alternative.
-fn planar(inliers: &Observations, solution: &mut Solution, behind: f64, distinct: f64) -> bool {
-    let Some(twin) = twin(inliers, &solution.motion, distinct) else { return false };
+fn planar(intake: &Intake<'_>, inliers: &Observations, solution: &mut Solution, behind: f64, distinct: f64) -> bool {
+    let Some(twin) = twin(intake, inliers, &solution.motion, distinct) else { return false };
     let excess = twin.behind - behind;
     if excess >= EXCLUDED {
         return false;
     }
-    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > distinct);
+    // Found again with the rotation of the first taken out it is the same to some digits only.
+    let same = distinct.max(SAME.to_radians());
+    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > same);
     solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
     true
 }

@@ -14,6 +14,7 @@ from jacoflow import motion3d
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import motion3d_claims as claims
+import motion3d_coverage as coverage
 import motion3d_fixed as fixed
 import motion3d_honesty as honesty
 import motion3d_rivals as rivals
@@ -357,7 +358,7 @@ def test_arguments_of_another_kind_are_refused():
         motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
     with pytest.raises(TypeError, match=r"^sigma\b"):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
-    for wrong in ({"sigma": "0.3"}, {"sigma": True}, {"seed": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
+    for wrong in ({"shared": "2"}, {"shared": None}, {"shared": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"seed": True}, {"sigma": "0.3"}, {"sigma": True}, {"seed": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
         with pytest.raises(TypeError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
     for name in ("method", "placement", "projection", "smoother"):
@@ -365,7 +366,7 @@ def test_arguments_of_another_kind_are_refused():
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **{name: None})
     with pytest.raises(TypeError, match="^jacobian: "):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), jacobian=np.zeros((5, 2, 2), complex), cov=np.tile(np.eye(6), (5, 1, 1)))
-    for wrong in ({"threads": -1}, {"seed": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
+    for wrong in ({"threads": 2**70}, {"shared": 0.5, "sigma": 1.0}, {"shared": float("nan"), "sigma": 1.0}, {"correlation_length": float("inf")}, {"threads": -1}, {"seed": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
         with pytest.raises(ValueError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(**{"points": np.zeros((5, 2)), "flow": np.zeros((5, 2)), **wrong})
     with pytest.raises(ValueError, match="^inv_depth: "):
@@ -434,6 +435,99 @@ def test_displacements_over_a_whole_frame_are_placed_half_way():
         for what in ("start, mrad", "midpoint, deg", "midpoint, mrad"):
             assert row[what] == pytest.approx(row[f"{what} asked"], rel=0.55), row
         assert row["start, deg"] > 10 * row["midpoint, deg"] and row["start, mrad"] > 20 * row["midpoint, mrad"], row
+        assert row["exact, deg"] < 1e-6 and row["exact, mrad"] < 1e-6, row
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "ml"}, {"sigma": 1e-6}, {"robust": True}, {"robust": True, "sigma": 1e-6}])
+def test_two_exact_views_give_the_exact_motion(options):
+    """However fast they turn; the depths are those half way, and predict the displacement."""
+    for ratio, turn in ((0.02, 0.02), (0.02, 0.3), (0.2, 0.1), (0.2, 0.3)):
+        make = claims.displaced(ratio, turn, 1, 300)
+        found = motion3d.estimate_motion(make.points, make.flow, **options)
+        assert np.radians(scores.angle(found.translation, make.u)) < 1e-8, (ratio, turn)
+        assert_allclose(found.rotation, make.w, atol=1e-8)
+        half, mean = scenes.exponential(make.w / 2)
+        middle = np.column_stack([make.points, np.ones(300)]) @ half.T / make.depths[:, None] + mean @ make.u / 2
+        assert_allclose(found.inv_depth, 1 / middle[:, 2], rtol=1e-5)
+        moved = motion3d.predict_flow(make.points, found.translation, found.rotation, found.inv_depth, whole_frame=True)
+        assert_allclose(moved, make.flow, atol=1e-7)
+
+
+def test_displacements_are_predicted_in_pixels():
+    make = scenes.two_views("smooth", "oblique", 0.0, 6, 3)
+    half, mean = scenes.exponential(make.w / 2)
+    eta = np.column_stack([make.points, np.ones(1000)]) @ np.linalg.inv(scenes.K).T
+    nu = 1 / (eta @ half.T / make.depths[:, None] + mean @ make.u / 2)[:, 2]
+    moved = motion3d.predict_flow(make.points, make.u, make.w, nu, scenes.K, whole_frame=True)
+    assert_allclose(moved, make.flow, atol=1e-9)
+    instant = motion3d.predict_flow(make.points, make.u, make.w, nu, scenes.K)
+    assert 0.01 < np.abs(instant - make.flow).max() < 3
+    with pytest.raises(ValueError, match="^whole_frame: "):
+        motion3d.predict_flow([[0, 0, 1]], make.u, make.w, [1], projection="sphere", whole_frame=True)
+
+
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("turn", [0.12, 0.17, 0.25])
+def test_covariances_hold_in_fast_turns(turn, robust):
+    """The flow placed half way has ellipsoids of which none or hardly any hold (`claims.turning`)."""
+    row = coverage.row("", (coverage.turns(seed, turn, robust) for seed in range(150)))
+    assert row["ok"] > 120 and 0.88 <= row["ellipsoid"] <= 0.985 and row["median, deg"] < 0.9, row
+
+
+@pytest.mark.parametrize("noise", [0.05, None])
+def test_a_camera_that_only_turns_fast_is_told(noise):
+    axis = W / np.linalg.norm(W)
+    for turn in (0.15, 0.25):
+        for robust in (False, True):
+            rng = np.random.default_rng(3)
+            pixels = rng.uniform([0, 0], [640, 480], (300, 2))
+            flow = scenes.displaced(pixels, np.zeros(300), U, turn * axis) - pixels + rng.normal(0, 0.05, (300, 2))
+            if robust:
+                flow = np.where(rng.uniform(size=(300, 1)) < 0.3, rng.uniform(-90, 90, (300, 2)), flow)
+            found = motion3d.estimate_motion(pixels, flow, scenes.K, sigma=noise, robust=robust)
+            assert found.status == "rotation_only", (turn, robust)
+            assert np.abs(found.rotation - turn * axis).max() < 5 * found.rotation_std.max()
+
+
+def test_a_variance_of_nothing_does_not_decide_alone():
+    make = scene(300, 0.01, 4)
+    covariance = np.tile(make.sigma**2 * np.eye(2), (300, 1, 1))
+    usual = motion3d.estimate_motion(make.points, make.flow, cov=covariance, placement="start")
+    for robust in (False, True):
+        covariance[17] = 1e-20 * np.eye(2)
+        found = motion3d.estimate_motion(make.points, make.flow, cov=covariance, placement="start", robust=robust)
+        assert found.status == "ok" and scores.angle(found.translation, usual.translation) < usual.direction_std
+        assert found.direction_std == pytest.approx(usual.direction_std, rel=0.1)
+    make, jacobian, covariance = scenes.patches("oblique", 60, 60, 0.05, 1, 0.3)
+    covariance = covariance.copy()
+    covariance[5] *= 1e-18
+    found = motion3d.estimate_motion(make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, placement="start")
+    assert found.status == "ok" and scores.angle(found.translation, make.u) < 4 * found.direction_std < 20
+
+
+@pytest.mark.parametrize("turn", [0, 1])
+def test_few_points_that_stand_still_are_told(turn):
+    """Noise alone, or a rotation, in noise that is not told: no outliers are made of it."""
+    for n in (12, 20, 40):
+        told, held = 0, 0
+        for seed in range(30):
+            rng = np.random.default_rng((seed, n))
+            points = rng.uniform(-0.6, 0.6, (n, 2))
+            flow = turn * scenes.rows(points)[1] @ W + 0.001 * rng.normal(size=(n, 2))
+            found = motion3d.estimate_motion(points, flow, robust=True)
+            if found.status == "rotation_only":
+                told += 1
+                off = found.rotation - turn * W
+                held += off @ np.linalg.solve(found.covariance[2:, 2:], off) < 11.34
+        assert told >= 24 and held >= 0.8 * told, (n, told, held)
+    points = np.random.default_rng(1).uniform(-0.6, 0.6, (12, 2))
+    assert motion3d.estimate_motion(points, np.zeros((12, 2)), robust=True).status == "rotation_only"
+
+
+@pytest.mark.parametrize("part", ["long", "mover", "few", "patches"])
+def test_covariances_hold_where_they_are_hard_to_state(part):
+    for row in coverage.table(200, [part]):
+        assert row["ok"] >= 60 and 0.87 <= row["ellipsoid"] <= 0.98, row
 
 
 def test_what_the_text_says_besides_its_tables():

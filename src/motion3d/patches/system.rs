@@ -3,6 +3,7 @@
 use super::super::covariance::Matrix5;
 use super::super::motion::{AffineRows, Motion, tangents};
 use super::super::special::by_chance;
+use super::super::turned::HalfTurn;
 use nalgebra::{Matrix2x3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
@@ -19,6 +20,8 @@ const STEP: f64 = 1e-10;
 pub(super) struct Patch {
     point: [f64; 2],
     rows: AffineRows,
+    /// `V'` of the rotation that was taken out of displacements, else the identity.
+    mean: Matrix3<f64>,
     whiten: Matrix6<f64>,
     pub r: Matrix6x3,
     pub f: Vector6<f64>,
@@ -57,18 +60,27 @@ pub(super) struct PatchEquations {
 
 impl Patch {
     /// From `(u, v, u_x, v_x, u_y, v_y)` at a place on the plane at distance 1; `None` unless all is finite and the covariance positive definite.
-    pub fn new(point: [f64; 2], m: &Vector6<f64>, covariance: &Matrix6<f64>) -> Option<Self> {
+    ///
+    /// With a `turn`, that rotation was taken out of them: its part is put back as the rows have it.
+    pub fn new(point: [f64; 2], m: &Vector6<f64>, covariance: &Matrix6<f64>, turn: Option<&HalfTurn>) -> Option<Self> {
         let symmetric = 0.5 * (covariance + covariance.transpose());
         let whiten = symmetric.cholesky()?.l().try_inverse()?;
         let rows = AffineRows::new(point);
-        let patch = Self { point, rows, whiten, r: whiten * rows.rotation, f: whiten * m };
+        let mean = turn.map_or_else(Matrix3::identity, |turn| turn.mean);
+        let m = turn.map_or(*m, |turn| m + rows.rotation * turn.rotation);
+        let patch = Self { point, rows, mean, whiten, r: whiten * rows.rotation * mean, f: whiten * m };
         let finite = patch.r.iter().chain(patch.f.iter()).chain(whiten.iter()).all(|value| value.is_finite());
         finite.then_some(patch)
     }
 
     /// `A(u)`, whitened.
     fn depth(&self, u: &Vector3<f64>) -> Matrix6x3 {
-        self.whiten * self.rows.depth(u)
+        self.whiten * self.rows.depth(&(self.mean * u))
+    }
+
+    /// What a surface shows under a motion, in units of noise.
+    pub fn predicted(&self, motion: &Motion, surface: &Vector3<f64>) -> Vector6<f64> {
+        self.depth(&motion.u()) * surface + self.r * motion.w()
     }
 
     pub fn seen(&self, motion: &Motion) -> SeenPatch {
@@ -257,7 +269,10 @@ impl System {
         if self.patches.len() < 2 || !by_chance(chi2, (3 * self.patches.len() - 3) as f64) || n.norm() <= 0.0 {
             return None;
         }
-        let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
+        // In the axes half way the translation is V' u and rotations are V' w.
+        let mean = self.patches.first()?.mean;
+        let back = mean.try_inverse()?;
+        let other = Motion::of(&(back * n).normalize(), &(motion.w() + back * n.cross(&(mean * motion.u()))));
         let behind = |motion: &Motion| self.equations(motion, &tangents(&motion.u()), None).behind;
         let own = behind(motion);
         let (one, two) = (behind(&other), behind(&other.reversed()));

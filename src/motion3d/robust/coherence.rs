@@ -23,6 +23,9 @@ const ROUNDS: usize = 5;
 const RARE: f64 = 13.8;
 const BESIDES: f64 = 0.1;
 
+/// A difference of directions, rad, that refining leaves.
+const ROUNDING: f64 = 1e-7;
+
 /// The neighbourhoods of all points: the nearest, or the cells of the tree where there are many.
 enum Around {
     Nearest(Tree, Neighbours),
@@ -129,6 +132,9 @@ fn differ(observations: &Observations, found: &Consensus, inner: &Motion, fewer:
     };
     let (all, some) = (spread(&found.inliers)?, spread(fewer)?);
     let off = tangent * inner.u();
+    if off.norm() < ROUNDING {
+        return Some(false);
+    }
     let own = (some - all) + all * BESIDES;
     // Here points are in units of their own errors, of which there are fewer than points.
     Some(off.dot(&(own.try_inverse()? * off)) > RARE * observations.shared)

@@ -2,7 +2,7 @@
 
 use super::super::kernels::depths;
 use super::super::likelihood::minima;
-use super::super::observations::Observations;
+use super::super::observations::{Observations, median};
 use super::{Consensus, UNKNOWNS};
 use crate::math::random::CounterRng;
 
@@ -11,6 +11,16 @@ pub(super) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64>
     let best = minima(observations, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0)
+}
+
+/// By how much the mean square may exceed what the median says of it.
+const TAILS: f64 = 1.5;
+
+/// Whether the lengths of two-dimensional residuals, NaN where there is none, are those of one normal distribution: few of points that are many times as large as most would make their mean square larger than their median has it, which is `2 ln 2` variances where the mean is two.
+pub(in super::super) fn one_noise(residuals: &[f64]) -> bool {
+    let mut squares: Vec<f64> = residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    mean <= TAILS * median(&mut squares) / std::f64::consts::LN_2
 }
 
 /// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present units of noise, for all points, less that with the noise of the inliers and the others anywhere.

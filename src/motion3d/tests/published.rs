@@ -75,11 +75,8 @@ fn one_unknown_has_its_closed_forms() {
     near((m2 * (m2 - m1 * m1)).sqrt() / m1, 0.30369, "crossover");
     // The same from the general forms, whose psi lies in the image plane once the other unknowns are taken out.
     let at = vec![[0.0; 2]; 101];
-    let observations = super::super::intake::whiten(
-        &Flow::Plane { points: &at, flow: &at, camera: None },
-        &Noise::Sigma(0.3),
-        Placement::Start,
-    );
+    let flow = Flow::Plane { points: &at, flow: &at, camera: None };
+    let observations = super::super::intake::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let tangent = super::super::motion::tangents(&motion.u());
     let mut nu = depths.clone();

@@ -1,6 +1,6 @@
 //! Random scenes with exact truth.
 
-use super::super::intake::whiten;
+use super::super::intake::Intake;
 use super::super::observations::Observations;
 use super::super::{Flow, Motion, Noise, Placement};
 use crate::math::random::CounterRng;
@@ -44,6 +44,6 @@ impl Scene {
     }
 
     pub fn observations(&self) -> Observations {
-        whiten(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start)
+        Intake::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
     }
 }

@@ -63,6 +63,7 @@ pub fn motion3d_predict<'py>(
     rotation: &Any<'py>,
     intrinsics: Option<&Any<'py>>,
     spherical: bool,
+    whole_frame: bool,
 ) -> PyResult<Any<'py>> {
     let camera = camera(intrinsics)?;
     let motion = motion(translation, rotation)?;
@@ -78,7 +79,13 @@ pub fn motion3d_predict<'py>(
         return Ok(matrix(py, &flow)?.into_any());
     }
     let pixels: Vec<[f64; 2]> = rows("points", &shape, &values)?;
-    let flow: Vec<[f64; 2]> =
-        pixels.iter().zip(&depths).map(|(&at, &nu)| motion.picture_flow(at, nu, camera.as_ref())).collect();
+    let moved = |(&at, &nu): (&[f64; 2], &f64)| {
+        if whole_frame {
+            motion.picture_displacement(at, nu, camera.as_ref())
+        } else {
+            motion.picture_flow(at, nu, camera.as_ref())
+        }
+    };
+    let flow: Vec<[f64; 2]> = pixels.iter().zip(&depths).map(moved).collect();
     Ok(matrix(py, &flow)?.into_any())
 }

@@ -1,0 +1,108 @@
+//! The noise that the inliers leave, where it is not told.
+//!
+//! It is a fixed point of its own estimate, and there may be several: with a thing that moves by itself, one at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the same sign as their neighbours', which those of noise do not.
+
+use super::super::estimate::Scaled;
+use super::super::kernels::depths;
+use super::super::neighbours::Tree;
+use super::super::observations::Observations;
+use super::{Consensus, UNKNOWNS, in_known_noise};
+use crate::math::random::CounterRng;
+
+/// First guesses, in shares of the median flow: the next one where residuals go together.
+const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];
+
+/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal distribution cut there; most rounds.
+const CUT: f64 = 2.5;
+const CUT_VARIANCE: f64 = 0.911;
+const ROUNDS: usize = 4;
+const STEPS: usize = 50;
+
+/// Neighbours whose residuals are looked at, points from which on there are enough of them, and deviations by which they go together.
+const NEAREST: usize = 4;
+const ENOUGH: usize = 100;
+const TOGETHER: f64 = 5.0;
+
+/// The share of the inliers in larger noise that those in smaller noise must be.
+const MOST: f64 = 0.5;
+
+/// The motion that most points obey in the noise that they leave; points are measured in that afterwards.
+pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let flow = scaled.observations.median_flow() * scaled.sigma;
+    let mut larger: Option<(Consensus, f64)> = None;
+    for share in FIRST_SHARES {
+        scaled.take(share * flow / scaled.sigma);
+        let Some(found) = fixed_point(scaled, rng) else { break };
+        let enough =
+            larger.as_ref().is_none_or(|(one, _)| found.inliers.len() as f64 > MOST * one.inliers.len() as f64);
+        if enough && !together(&scaled.observations, &found) {
+            return Some(found);
+        }
+        if larger.is_none() {
+            larger = Some((found, scaled.sigma));
+        }
+    }
+    // Nothing tells a thing from errors of flow that go together.
+    let (found, sigma) = larger?;
+    scaled.take(sigma / scaled.sigma);
+    Some(found)
+}
+
+/// From the present units on, the noise that the inliers leave.
+fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let mut found = in_known_noise(&scaled.observations, rng)?;
+    for _ in 0..ROUNDS {
+        let sigma = noise(&depths(&scaled.observations, &found.motion).e[..scaled.observations.n]);
+        scaled.take(sigma);
+        found = in_known_noise(&scaled.observations, rng)?;
+        if (sigma - 1.0).abs() < 0.02 {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution"; the five unknowns take their share away.
+fn noise(residuals: &[f64]) -> f64 {
+    let mut sigma = 1.0;
+    for _ in 0..STEPS {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for e in residuals.iter().filter(|e| e.abs() < CUT * sigma) {
+            sum += e * e;
+            count += 1;
+        }
+        if count <= UNKNOWNS || sum <= 0.0 {
+            break;
+        }
+        let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
+        let settled = (next - sigma).abs() < 1e-6 * sigma;
+        sigma = next;
+        if settled {
+            break;
+        }
+    }
+    sigma
+}
+
+/// Whether the residuals of neighbours among the inliers have the same sign more often than noise does.
+fn together(observations: &Observations, found: &Consensus) -> bool {
+    let inliers = &found.inliers;
+    if inliers.len() < ENOUGH {
+        return false;
+    }
+    let seen = depths(observations, &found.motion).e;
+    let positions: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.position[k as usize]).collect();
+    let tree = Tree::new(&positions);
+    let places: Vec<u32> = (0..inliers.len() as u32).collect();
+    let lists = tree.nearest(&places, NEAREST);
+    let residual = |place: usize| seen[inliers[tree.order()[place] as usize] as usize];
+    let (mut products, mut squares) = (0.0, 0.0);
+    for place in 0..inliers.len() {
+        let own = residual(place);
+        squares += own * own;
+        products += lists.of(place).iter().map(|&near| own * residual(near as usize)).sum::<f64>();
+    }
+    // Each of these pairs may come twice.
+    let pairs = (NEAREST * inliers.len()) as f64;
+    products / (squares / inliers.len() as f64) > TOGETHER * (2.0 * pairs).sqrt()
+}
