@@ -54,17 +54,18 @@ impl FineMotion {
     }
 }
 
-/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew. Counting in whole voxels moves it by up to half of one more or less than
-/// the pixels, all of a flat cluster's alike in depth. `None` for a cluster without pixels.
+/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew. Counting in whole cells of the picture moves it by up to half of one more or less than
+/// the pixels; in depth their means count. `None` for a cluster without pixels.
 pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -> Option<[f64; 3]> {
     let (lattice, pixels) = (clusters.lattice(), &clusters.pixels[k]);
-    let mut sum = [0.0; 3];
+    let mut sum = [0.0; 2];
     for &i in pixels {
         let place = clusters.points.at(i as usize);
         let (now, then) = (lattice.cell_at(place), lattice.cell_at(motion.moved(place)));
-        (0..3).for_each(|axis| sum[axis] += then[axis] - now[axis]);
+        (0..2).for_each(|axis| sum[axis] += then[axis] - now[axis]);
     }
-    (!pixels.is_empty()).then(|| sum.map(|sum| sum / pixels.len() as f64))
+    let count = pixels.len() as f64;
+    (!pixels.is_empty()).then(|| [sum[0] / count, sum[1] / count, motion.depth])
 }
 
 /// Places `(x, y)` of a cluster's pixels, px.
@@ -87,8 +88,8 @@ mod tests {
         let clusters = made_up(&[([10, 5, 30], 0), ([11, 5, 30], 0)], 2);
         let moved = |motion| voxel_motion(&clusters, 0, &FineMotion::translation(motion, [88.0, 44.0]));
         assert_eq!(moved([8.0, -8.0, 2.0]), Some([1.0, -1.0, 2.0]));
-        assert_eq!(moved([3.0, 4.0, 0.4]), Some([0.0, 1.0, 0.0]));
-        assert_eq!(moved([3.6, 0.0, 0.6]), Some([1.0, 0.0, 1.0]));
+        assert_eq!(moved([3.0, 4.0, 0.4]), Some([0.0, 1.0, 0.4]));
+        assert_eq!(moved([3.6, 0.0, 0.6]), Some([1.0, 0.0, 0.6]));
         assert_eq!(voxel_motion(&clusters, 1, &FineMotion::translation([1.0; 3], [0.0; 2])), None);
     }
 }

@@ -164,6 +164,8 @@ pub(super) struct Voxels {
     pub lattice: Lattice,
     /// `(ix, iy, iz)` of each, in the order in which the points meet them.
     pub cells: Vec<[u16; 3]>,
+    /// Mean depth of the points in each, layers from the first one's middle.
+    pub depths: Vec<f64>,
     /// Points in each: its frequency.
     pub counts: Vec<u32>,
     /// The voxel of each point.
@@ -175,7 +177,8 @@ impl Voxels {
     pub fn count(points: &EdgePoints, lattice: Lattice) -> Self {
         let (columns, rows) = (lattice.cell_columns(), lattice.cell_rows());
         let mut dense = vec![EMPTY; lattice.volume()];
-        let mut out = Self { lattice, cells: vec![], counts: vec![], of_point: Vec::with_capacity(points.len()) };
+        let of_point = Vec::with_capacity(points.len());
+        let mut out = Self { lattice, cells: vec![], depths: vec![], counts: vec![], of_point };
         for i in 0..points.len() {
             let cell = [
                 columns[points.columns[i] as usize],
@@ -186,11 +189,14 @@ impl Voxels {
             if *slot == EMPTY {
                 *slot = out.cells.len() as u32;
                 out.cells.push(cell);
+                out.depths.push(0.0);
                 out.counts.push(0);
             }
+            out.depths[*slot as usize] += lattice.cells_of(points.at(i))[2];
             out.counts[*slot as usize] += 1;
             out.of_point.push(*slot);
         }
+        out.depths.iter_mut().zip(&out.counts).for_each(|(depth, &count)| *depth /= f64::from(count));
         out
     }
 
@@ -202,6 +208,17 @@ impl Voxels {
     /// Centres in cells, row-major (N, 3), as the mixture takes them.
     pub fn centres(&self) -> Vec<f64> {
         self.cells.iter().flatten().map(|&i| f64::from(i)).collect()
+    }
+
+    /// Where voxel `n` is, cells: its centre along x and y, the mean of its points in depth.
+    pub fn place(&self, n: usize) -> [f64; 3] {
+        let [x, y, _] = self.cells[n];
+        [f64::from(x), f64::from(y), self.depths[n]]
+    }
+
+    /// Places in cells, row-major (N, 3). Layers cut flat things where nothing is: a component of centres is as thin as its layer, and knows nothing of those of its own points whose noise rounds to the next one.
+    pub fn places(&self) -> Vec<f64> {
+        (0..self.cells.len()).flat_map(|n| self.place(n)).collect()
     }
 
     /// Frequencies as weights.
@@ -232,6 +249,9 @@ pub(super) mod tests {
             let cell = voxels.cells[voxels.of_point[i] as usize];
             assert_eq!(lattice().cell_at(points.at(i)), cell.map(f64::from));
         }
+        let place = voxels.place(0);
+        assert!(place[..2] == [0.0, 0.0] && (place[2] + 0.15).abs() < 1e-6);
+        assert_eq!(voxels.places()[6..], [79.0, 59.0, 64.0]);
         assert_eq!((voxels.counts, voxels.of_point), (vec![2, 1, 1], vec![0, 0, 1, 2]));
     }
 

@@ -186,7 +186,7 @@ mod tests {
         let cells: Vec<_> =
             block([10, 10, 30], 90).chain(block([40, 20, 20], 45)).chain(block([5, 50, 60], 1)).collect();
         let voxels = made_up(&cells, 1).voxels;
-        let (values, weights) = (voxels.centres(), voxels.weights());
+        let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();
@@ -210,7 +210,7 @@ mod tests {
             .chain(block([70, 5, 60], 2, 2))
             .collect();
         let voxels = made_up(&cells, 1).voxels;
-        let (values, weights) = (voxels.centres(), voxels.weights());
+        let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut three = posterior();
         for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
@@ -235,7 +235,7 @@ mod tests {
         let told = |second: [u16; 3]| {
             let cells: Vec<_> = block([10, 10, 30], 45).chain(block(second, 45)).collect();
             let voxels = made_up(&cells, 1).voxels;
-            let (values, weights) = (voxels.centres(), voxels.weights());
+            let (values, weights) = (voxels.places(), voxels.weights());
             let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
             let mut both = posterior();
             both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
@@ -255,7 +255,7 @@ mod tests {
         let block = |z: u16, n: u16| (0..n).map(move |i| ([10 + i % 3, 10 + i / 3 % 3, z], 0));
         let cells: Vec<_> = block(30, 90).chain(block(31, 9)).collect();
         let voxels = made_up(&cells, 1).voxels;
-        let (values, weights) = (voxels.centres(), voxels.weights());
+        let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
         let options = StereoTrackerOptions::default();

@@ -45,7 +45,7 @@ impl StereoTracker {
         if voxels.is_empty() {
             return Ok((Clustered::nothing(points, voxels), vec![]));
         }
-        let (values, weights) = (voxels.centres(), voxels.weights());
+        let (values, weights) = (voxels.places(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let carried = self.options.mixture_options(true, self.time);
         // What is not to be fitted has no weight; it is given to a component all the same.

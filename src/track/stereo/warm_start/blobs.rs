@@ -41,13 +41,13 @@ pub(super) struct Blob {
 }
 
 impl Blob {
-    fn add(&mut self, voxel: usize, cell: [u16; D], count: f64) {
+    fn add(&mut self, voxel: usize, place: [f64; D], count: f64) {
         self.members.push(voxel);
         self.pixels += count;
         for i in 0..D {
-            self.sums[i] += count * f64::from(cell[i]);
+            self.sums[i] += count * place[i];
             for j in 0..D {
-                self.squares[i * D + j] += count * f64::from(cell[i]) * f64::from(cell[j]);
+                self.squares[i * D + j] += count * place[i] * place[j];
             }
         }
     }
@@ -107,7 +107,7 @@ pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
         let Some(first) = take(voxels.cells[first]) else { continue };
         let (mut blob, mut front) = (Blob::default(), vec![first]);
         while let Some(n) = front.pop() {
-            blob.add(n, voxels.cells[n], f64::from(voxels.counts[n]));
+            blob.add(n, voxels.place(n), f64::from(voxels.counts[n]));
             let beside = neighbours().filter_map(|by| lattice.shifted(voxels.cells[n], by));
             front.extend(beside.filter_map(&mut take));
         }
