@@ -160,7 +160,9 @@ class TrackGraph:
 
     @classmethod
     def from_json(cls, text: str) -> TrackGraph:
-        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text, and for a cluster or an arc that is there twice."""
+        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text, and for a cluster or an arc that is there twice; `TypeError` for what is no text."""
+        if not isinstance(text, str):
+            raise TypeError(f"json: expected a text (str), got {type(text).__name__}")
         return cls(_TrackGraph.from_json(text))
 
     def __eq__(self, other: object) -> bool:

@@ -542,3 +542,16 @@ def test_a_step_that_failed_changes_nothing():
 def test_a_tracker_says_what_to_keep_of_it():
     with pytest.raises(TypeError, match="StereoTracker: "):
         pickle.dumps(StereoTracker())
+
+
+def test_options_are_checked_in_either_mode():
+    for mode in ("improved", "paper"):
+        for name, value in {"tolerance": (-1, 1, 1), "group_limits": (float("nan"), 0, 0), "least_overlap": 2}.items():
+            with pytest.raises(ValueError, match=name.split("_")[0]):
+                StereoTracker(mode, **{name: value})
+
+
+@pytest.mark.parametrize("text", [3, b"{}", None])
+def test_what_is_no_text_is_no_graph(text):
+    with pytest.raises(TypeError, match="^json: expected a text"):
+        TrackGraph.from_json(text)

@@ -11,7 +11,7 @@ import pytest
 from jacoflow.track import StereoTracker
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from stereo_scenes import cart, crossing, curved, passing, pillar, small, tiny
+from stereo_scenes import Layer, Scene, cart, crossing, curved, passing, pillar, small, tiny, wall
 from stereo_tracking import follow
 from stereo_tracking_chance import comings_back, crossing_by_chance, labels, passing_by_chance
 from stereo_tracking_chance import scored as chance
@@ -116,9 +116,23 @@ def test_another_exposure_is_no_motion(exposure):
 
     film = [replace(shown, left=exposed(t, shown.left), right=exposed(t, shown.right)) for t, shown in enumerate(small().film())]
     scores = scored(small(), "improved", film)
-    assert [scores.id_kept(label) for label in (1, 2)] == [6, 6]
-    for errors in scores.motion_errors().values():
-        assert (np.median(errors, axis=0) <= 0.02).all()
+    # Two components of a box may become one at the second step, and either name be the one that stays.
+    assert all(scores.id_share(label) >= 0.8 for label in (1, 2))
+    # The wall is in pieces, some of which have just come to light.
+    for label, errors in scores.motion_errors().items():
+        assert (np.median(errors, axis=0) <= (0.02 if label else 0.05)).all()
+
+
+@pytest.mark.parametrize(("disparity", "approach", "speed"), [(2.0, -0.1, 0.0), (3.0, 0.12, 2.6), (2.5, 0.0, 2.6), (2.3, 0.05, 6.0)])
+def test_what_drifts_through_layers_of_depth_keeps_its_track(disparity, approach, speed):
+    layers = (wall(160, 120, 0, -14, 0, 28), Layer("box", 1, (100, 120), (speed, 0.2), disparity, approach, (36, 50), 14))
+    drifting = Scene("drifting", layers, 12, 0.0, 21, (320, 240), (-20, 12))
+    film = drifting.film()
+    for start in range(4):
+        tracker = StereoTracker(disparity_range=drifting.disparity_range, random_state=start)
+        scores = follow(drifting, film, tracker, False)[0]
+        assert scores.id_share(1) == 1.0 and scores.recall(1) > 0.98
+        assert (np.median(scores.motion_errors("velocity")[1], axis=0) <= (0.02, 0.02, 0.03)).all()
 
 
 def test_who_was_hidden_is_recognised():

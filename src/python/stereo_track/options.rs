@@ -95,7 +95,11 @@ impl Given {
         options.luminance_levels = self.luminance_levels;
         options.arc_threshold = self.arc_threshold;
         options.reseed_below = self.reseed_below;
-        options.recognition = self.recognition.unwrap_or(options.recognition.is_some()).then_some(Recognition {
+        let wanted = (
+            self.recognition.unwrap_or(options.recognition.is_some()),
+            self.grouping.unwrap_or(options.grouping.is_some()),
+        );
+        let limits = Recognition {
             least_overlap: self.least_overlap,
             patience: self.patience,
             tolerance: self.tolerance,
@@ -104,10 +108,13 @@ impl Given {
             jump: self.jump.0,
             jump_disparity: self.jump.1,
             ..Recognition::default()
-        });
+        };
         let (reach, motion, depth_motion) = self.group_limits;
-        options.grouping =
-            self.grouping.unwrap_or(options.grouping.is_some()).then_some(Grouping { reach, motion, depth_motion });
+        let grouping = Grouping { reach, motion, depth_motion };
+        // What is given is checked, be it used or not.
+        (options.recognition, options.grouping) = (Some(limits), Some(grouping));
+        options.check()?;
+        (options.recognition, options.grouping) = (wanted.0.then_some(limits), wanted.1.then_some(grouping));
         options.camera = camera;
         options.step_time = self.step_time;
         options.threads = Threads::new(self.threads)?;
