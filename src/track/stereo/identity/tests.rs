@@ -9,8 +9,8 @@ fn at(component: usize, position: [f64; 3]) -> Sighting {
 }
 
 /// A motion behind which two fifths of it are seen.
-fn measured(motion: [f64; 3]) -> Option<Measured> {
-    Some(Measured { motion, support: 0.4 })
+fn measured(motion: [f64; 3]) -> Measured {
+    Measured { motion, support: 0.4 }
 }
 
 fn identities() -> Identities {
@@ -28,8 +28,8 @@ fn identities() -> Identities {
 fn a_hidden_track_is_recognised_where_it_is_expected() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, (measured([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
-    all.carry(0, (measured([2.0, 0.0, 0.5]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (Some(measured([2.0, 0.0, 0.5])), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (Some(measured([2.0, 0.0, 0.5])), 1.0), CELL, Some(&limits)).unwrap();
     all.name_all(Moment::at(1), &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
     // Gone at steps 2 to 4.
     all.rest(1.0, |k| k == 0);
@@ -58,7 +58,7 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
     all.rest(0.0, |k| k == 0);
     let there = at(2, [16.0, 10.0, 30.0]);
@@ -80,7 +80,7 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
     all.rest(0.0, |k| k == 0);
     // At step 2 two parts of it, at step 3 another one that is larger; at last it is whole.
@@ -141,7 +141,7 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     let limits = Recognition::default();
     let mut all = identities();
     for _ in 0..2 {
-        all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
     all.rest(0.0, |k| k == 0);
     // A glimpse too small to be named after it, which gets a track of its own.
@@ -149,7 +149,7 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     all.name_all(Moment::at(2), &[part([14.0, 10.0, 30.0], 12)], LEAST, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
     for _ in 0..2 {
-        all.carry(2, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+        all.carry(2, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
     // Where it is a little more, it is a part still; where it is far more, and the whole is expected there, it is that.
     for (pixels, place, id) in [(17, 22.0, 2), (90, 22.0, 0), (90, 32.0, 2)] {
@@ -166,7 +166,7 @@ fn nobody_waits_for_ever_nor_without_a_history() {
     all.rest(0.0, |k| k == 1);
     all.name_all(Moment::at(3), &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-    all.carry(0, (measured([0.0; 3]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (Some(measured([0.0; 3])), 1.0), CELL, Some(&limits)).unwrap();
     all.rest(3.0, |k| k == 0);
     all.name_all(Moment::at(14), &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
     assert_eq!(all.live[1].as_ref().unwrap().id, 3);
@@ -179,12 +179,12 @@ fn steady_tracks_coast_through_jumps_for_three_steps() {
     let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
     let mut carry = |motion| all.carry(0, (motion, 1.0), CELL, Some(&limits));
     for _ in 0..3 {
-        assert_eq!(carry(measured(good)), Some(Carried { motion: good, coasting: false }));
+        assert_eq!(carry(Some(measured(good))), Some(Carried { motion: good, coasting: false }));
     }
-    for told in [measured(jump), None, measured(jump)] {
+    for told in [Some(measured(jump)), None, Some(measured(jump))] {
         assert_eq!(carry(told), Some(Carried { motion: good, coasting: true }));
     }
-    assert_eq!(carry(measured(jump)), Some(Carried { motion: jump, coasting: false }));
+    assert_eq!(carry(Some(measured(jump))), Some(Carried { motion: jump, coasting: false }));
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn a_jump_behind_which_most_of_it_is_seen_is_believed() {
     for (support, believed) in [(0.4, false), (0.8, true)] {
         let mut all = identities();
         for _ in 0..3 {
-            all.carry(0, (measured(good), 1.0), CELL, Some(&limits)).unwrap();
+            all.carry(0, (Some(measured(good)), 1.0), CELL, Some(&limits)).unwrap();
         }
         let told = all.carry(0, (Some(Measured { motion: twice, support }), 1.0), CELL, Some(&limits));
         let expected = if believed { twice } else { good };
@@ -206,7 +206,7 @@ fn a_jump_behind_which_most_of_it_is_seen_is_believed() {
 fn what_is_mostly_covered_goes_on_where_it_went() {
     let limits = Recognition::default();
     let mut all = identities();
-    all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits)).unwrap();
+    all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits)).unwrap();
     all.name_all(Moment::at(1), &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
     all.name_all(Moment::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
@@ -216,7 +216,7 @@ fn what_is_mostly_covered_goes_on_where_it_went() {
 #[test]
 fn without_recognition_what_is_measured_counts() {
     let mut all = identities();
-    all.carry(0, (measured([1.0; 3]), 1.0), CELL, None);
+    all.carry(0, (Some(measured([1.0; 3])), 1.0), CELL, None);
     assert_eq!(all.carry(0, (None, 1.0), CELL, None), None);
     all.rest(1.0, |k| k == 0);
     all.name_all(Moment::at(4), &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
@@ -230,7 +230,7 @@ fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
     let steady = || {
         let mut all = identities();
         for _ in 0..2 {
-            all.carry(0, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+            all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
         }
         all
     };
@@ -263,8 +263,9 @@ fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
 fn what_is_covered_little_by_little_comes_to_light_on_the_other_side_as_itself() {
     let limits = Recognition::default();
     let mut all = identities();
-    let moved =
-        |all: &mut Identities, component| all.carry(component, (measured([2.0, 0.0, 0.0]), 1.0), CELL, Some(&limits));
+    let moved = |all: &mut Identities, component| {
+        all.carry(component, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits))
+    };
     // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole being at 20.
     for (time, x, pixels) in [(1, 12.0, 100), (2, 13.5, 85), (3, 14.0, 70), (4, 13.5, 35)] {
         moved(&mut all, 0);
