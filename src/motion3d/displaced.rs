@@ -25,7 +25,7 @@ const NEGLIGIBLE: f64 = 0.01;
 
 /// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the change of the rotation, rad, that is rounding.
 const SETTLED: f64 = 1e-14;
-const ROUGHLY: f64 = 1e-6;
+const ROUGHLY: f64 = 1e-4;
 const MANY: usize = 10_000;
 const ROUNDING: f64 = 1e-13;
 

@@ -49,7 +49,7 @@ impl Intake<'_> {
     /// The usable points in the order given; rows that are not finite or whose covariance is no covariance are left out. Unknown noise is taken to be 1 of the flow's unit.
     pub fn whitened(&self) -> Observations {
         let sources: Vec<u32> = (0..self.flow.len() as u32).collect();
-        let rows = self.rows(&sources, None);
+        let rows = self.rows(&sources);
         let usable = |(row, at): &(Option<Row>, [f64; 3])| row.is_some() && at.iter().all(|value| value.is_finite());
         let kept = || rows.iter().zip(&sources).filter(|(row, _)| usable(row));
         let whitened: Vec<Row> = kept().filter_map(|((row, _), _)| *row).collect();
@@ -68,12 +68,14 @@ impl Intake<'_> {
     /// The same points in the same units, with the rotation `w` taken out of their displacements; a point that this leads behind the camera gets weight 0.
     pub fn turned(&self, points: &Observations, w: &Vector3<f64>) -> Observations {
         let turn = HalfTurn::new(w);
-        let rows = self.rows(&points.source, Some(&turn));
         let nothing = Row { g: nalgebra::Matrix2x3::zeros(), r: nalgebra::Matrix2x3::zeros(), f: Vector2::zeros() };
-        let whitened: Vec<Row> = rows.iter().map(|(row, _)| row.unwrap_or(nothing)).collect();
-        let place =
-            |((row, at), before): (&(Option<Row>, [f64; 3]), &[f64; 3])| if row.is_some() { *at } else { *before };
-        let position = rows.iter().zip(&points.position).map(place).collect();
+        let one = |(&k, &before): (&u32, &[f64; 3])| match self.row(k as usize, Some(&turn)) {
+            (Some(row), at) => (row, at),
+            (None, _) => (nothing, before),
+        };
+        let (mut whitened, mut position) = (Vec::new(), Vec::new());
+        let given = points.source.par_iter().zip(&points.position).with_min_len(TOGETHER);
+        given.map(one).unzip_into_vecs(&mut whitened, &mut position);
         let mut out = Observations::new(&whitened, position, false, points.source.clone());
         out.like(points);
         out.turn = Some(turn);
@@ -81,12 +83,8 @@ impl Intake<'_> {
     }
 
     /// Whitened points with their places; without a row where they are not usable.
-    fn rows(&self, sources: &[u32], turn: Option<&HalfTurn>) -> Vec<(Option<Row>, [f64; 3])> {
-        let one = |&k: &u32| self.row(k as usize, turn);
-        if sources.len() < 2 * TOGETHER {
-            return sources.iter().map(one).collect();
-        }
-        sources.par_iter().with_min_len(TOGETHER).map(one).collect()
+    fn rows(&self, sources: &[u32]) -> Vec<(Option<Row>, [f64; 3])> {
+        sources.par_iter().with_min_len(TOGETHER).map(|&k| self.row(k as usize, None)).collect()
     }
 
     fn row(&self, k: usize, turn: Option<&HalfTurn>) -> (Option<Row>, [f64; 3]) {

@@ -6,6 +6,7 @@ use super::options::RotationPrior;
 use super::turned::HalfTurn;
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+use rayon::prelude::*;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
 pub(super) const CHUNK: usize = 4096;
@@ -98,13 +99,22 @@ impl Observations {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
         let mut planes = vec![0.0; PLANES * stride];
-        let mut size = 0.0;
-        for (k, row) in rows.iter().enumerate() {
-            for (p, value) in row.values().into_iter().enumerate() {
-                planes[p * stride + k] = value;
-            }
-            size += row.g.norm_squared();
+        let mut parts: Vec<_> = planes.chunks_exact_mut(stride.max(1)).map(|plane| plane.chunks_mut(CHUNK)).collect();
+        let mut chunks: Vec<Vec<&mut [f64]>> = Vec::with_capacity(n.div_ceil(CHUNK));
+        for _ in 0..n.div_ceil(CHUNK) {
+            chunks.push(parts.iter_mut().filter_map(Iterator::next).collect());
         }
+        // One sum a chunk, added up in their order: the same on any number of threads.
+        let sum = |(rows, part): (&[Row], &mut Vec<&mut [f64]>)| {
+            let mut size = 0.0;
+            for (k, row) in rows.iter().enumerate() {
+                part.iter_mut().zip(row.values()).for_each(|(plane, value)| plane[k] = value);
+                size += row.g.norm_squared();
+            }
+            size
+        };
+        let sizes: Vec<f64> = rows.par_chunks(CHUNK).zip(&mut chunks).map(sum).collect();
+        let size: f64 = sizes.iter().sum();
         let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
         Self {
             n,
