@@ -49,7 +49,7 @@ const FORGET: f64 = 0.95;
 /// Times differ by more than this, ordinary steps, unless they are the same one summed up otherwise.
 const SAME_TIME: f64 = 1e-6;
 
-/// Share of a component's pixels that must be seen where a measured motion leads for it to be believed although it is a jump. What is being hidden jumps onto what hides it: there hardly ever more than two fifths meet
+/// Share of a component's pixels that must be seen where a measured motion leads for it to be believed although it is a jump. What is being hidden jumps onto what hides it, where few of them meet
 /// anything. What stops, or moves twice as far because a frame is missing, is seen nearly whole.
 const SEEN_THERE: f64 = 0.6;
 

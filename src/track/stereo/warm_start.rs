@@ -16,12 +16,12 @@ const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
 /// Share of the pixels above which what is not explained is another scene.
 const ANOTHER_SCENE: f64 = 0.5;
 
-/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole voxels alone moves a flat one.
+/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole cells of the picture alone moves one.
 const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
 
 /// The components with their means moved, cells, and as much wider as the motion is uncertain; those without a motion stay.
 ///
-/// A flat component may be thinner than a hundredth of a layer. Moved by a fraction of a layer it would explain none of its own voxels; its shape is found again in the first round.
+/// A flat component is as thin as what its pixels' disparities are told with. Moved by more than that, wrongly, it would explain few of its own voxels; its shape is found again in the first round.
 pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Posterior {
     let mut out = posterior.clone();
     for (matrix, nu) in out.scale_inverses.chunks_exact_mut(D * D).zip(&out.degrees_of_freedom) {
