@@ -1,8 +1,10 @@
 //! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the stereo tracker's design.
 
 mod blobs;
+mod part;
 
-use self::blobs::{Blob, blobs, gain_of_parting, log_density};
+use self::blobs::{Blob, blobs, log_density};
+pub(super) use self::part::part;
 use super::options::StereoTrackerOptions;
 use super::voxels::Voxels;
 use crate::error::Result;
@@ -79,49 +81,6 @@ pub(super) fn reseed(
     Ok(Some(Seeded { seeds, strays }))
 }
 
-/// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better components.
-const WORTH_PARTING: f64 = 1.0;
-
-/// Seeds components that fewer than `reseed_below` pixels belong to at the parts of others whose voxels lie far from one another: seeds of a whole scene may put two small things into one component, from which rounds
-/// do not find out. The parts that gain most come first. Tells whether there were any.
-///
-/// # Errors
-/// Those of the mixture.
-pub(super) fn part(
-    posterior: &mut Posterior,
-    voxels: &Voxels,
-    points: &Points,
-    options: &StereoTrackerOptions,
-) -> Result<bool> {
-    let labels = posterior.labels(points)?;
-    let mut members = vec![vec![]; posterior.components()];
-    labels.iter().enumerate().for_each(|(n, &k)| members[k as usize].push(n));
-    let pixels = |some: &[usize]| some.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>();
-    let mut idle =
-        (0..members.len()).filter(|&k| pixels(&members[k]) < options.reseed_below).collect::<Vec<_>>().into_iter();
-    let mut worth: Vec<(f64, usize, Vec<Blob>)> = members
-        .iter()
-        .enumerate()
-        .filter_map(|(k, own)| {
-            let parts: Vec<Blob> =
-                blobs(voxels, own).into_iter().filter(|part| part.pixels >= options.reseed_below.max(1.0)).collect();
-            let gain = gain_of_parting(&parts);
-            (gain >= WORTH_PARTING).then_some((gain, k, parts))
-        })
-        .collect();
-    worth.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut parted = false;
-    for (_, k, mut parts) in worth {
-        parts.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
-        for (i, part) in parts.iter().enumerate() {
-            let Some(at) = (if i == 0 { Some(k) } else { idle.next() }) else { return Ok(parted) };
-            part.place(posterior, at, options);
-            parted |= i > 0;
-        }
-    }
-    Ok(parted)
-}
-
 /// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains none: what others left over.
 pub(super) fn is_left_over(
     posterior: &Posterior,
@@ -153,12 +112,12 @@ pub(super) struct Seeded {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::clusters::tests::made_up;
     use super::*;
 
     /// Two components, one of them where nothing is.
-    fn posterior() -> Posterior {
+    pub fn posterior() -> Posterior {
         let mut scale_inverses = vec![0.0; 18];
         (0..6).for_each(|i| scale_inverses[i / 3 * 9 + i % 3 * 4] = 50.0);
         Posterior {
@@ -227,26 +186,6 @@ mod tests {
         let mut lost = posterior();
         lost.means[0] = 30.0;
         assert_eq!(reseed(&mut lost, &voxels, &points, &options).unwrap(), None);
-    }
-
-    #[test]
-    fn two_small_things_in_one_component_are_parted() {
-        let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
-        let told = |second: [u16; 3]| {
-            let cells: Vec<_> = block([10, 10, 30], 45).chain(block(second, 45)).collect();
-            let voxels = made_up(&cells, 1).voxels;
-            let (values, weights) = (voxels.places(), voxels.weights());
-            let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-            let mut both = posterior();
-            both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
-            (0..3).for_each(|i| both.scale_inverses[4 * i] = 60.0 * 40.0);
-            (part(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
-        };
-        let (parted, means) = told([30, 20, 40]);
-        assert!(parted);
-        assert_eq!(means, [11.0, 11.0, 30.0, 31.0, 21.0, 40.0]);
-        // Beside one another they are one thing.
-        assert!(!told([14, 10, 30]).0);
     }
 
     #[test]

@@ -5,21 +5,23 @@ use super::super::voxels::Voxels;
 use super::D;
 use crate::mixture::Posterior;
 use nalgebra::Matrix3;
+use std::borrow::Borrow;
 
 /// Voxels no farther apart, along x, y and disparity, are of one blob.
 const SEED_REACH: [i32; D] = [2, 2, 1];
 
 /// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean logarithm of the density, with their shares.
-pub(super) fn gain_of_parting(parts: &[Blob]) -> f64 {
+pub(super) fn gain_of_parting<B: Borrow<Blob>>(parts: &[B]) -> f64 {
     if parts.len() < 2 {
         return 0.0;
     }
     let mut whole = Blob::default();
-    for part in parts {
+    let parts = || parts.iter().map(Borrow::borrow);
+    for part in parts() {
         whole.join(part);
     }
     let apart: f64 =
-        parts.iter().map(|part| part.pixels * log_density(part.pixels / whole.pixels, &part.covariance())).sum();
+        parts().map(|part| part.pixels * log_density(part.pixels / whole.pixels, &part.covariance())).sum();
     apart / whole.pixels - log_density(1.0, &whole.covariance())
 }
 
@@ -41,6 +43,13 @@ pub(super) struct Blob {
 }
 
 impl Blob {
+    /// Some of the voxels, wherever they are.
+    pub fn of(voxels: &Voxels, some: &[usize]) -> Self {
+        let mut out = Self::default();
+        some.iter().for_each(|&n| out.add(n, voxels.place(n), f64::from(voxels.counts[n])));
+        out
+    }
+
     fn add(&mut self, voxel: usize, place: [f64; D], count: f64) {
         self.members.push(voxel);
         self.pixels += count;
@@ -52,7 +61,8 @@ impl Blob {
         }
     }
 
-    fn join(&mut self, other: &Self) {
+    /// Takes the voxels of another in.
+    pub fn join(&mut self, other: &Self) {
         self.members.extend(&other.members);
         self.pixels += other.pixels;
         (0..D).for_each(|i| self.sums[i] += other.sums[i]);
