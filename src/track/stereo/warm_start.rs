@@ -1,10 +1,10 @@
 //! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the stereo tracker's design.
 
 mod blobs;
-mod part;
+mod rearranged;
 
 use self::blobs::{Blob, blobs, log_density};
-pub(super) use self::part::part;
+pub(super) use self::rearranged::rearrange;
 use super::options::StereoTrackerOptions;
 use super::voxels::Voxels;
 use crate::error::Result;

@@ -2,7 +2,7 @@
 
 use super::super::clusters::Clusters;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::{Seeded, part, reseed};
+use super::super::warm_start::{Seeded, rearrange, reseed};
 use super::StereoTracker;
 use crate::error::Result;
 use crate::mixture::{Fit, Points, Posterior, Start, fit};
@@ -62,13 +62,13 @@ impl StereoTracker {
             let fitted = without(&start, &strays)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
-        // Seeds of the whole scene miss what is small, or put two such things into one; components that explain little are better used there.
+        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one; components that explain little are better used there.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
         let mut start = fitted.posterior.clone();
-        let parted = part(&mut start, &voxels, &weighted, &self.options)?;
+        let rearranged = rearrange(&mut start, &voxels, &weighted, &self.options)?;
         match reseed(&mut start, &voxels, &weighted, &self.options)? {
-            Some(Seeded { seeds, strays }) if parted || seeds.contains(&true) => fitted = without(&start, &strays)?,
-            _ if parted => fitted = without(&start, &[])?,
+            Some(Seeded { seeds, strays }) if rearranged || seeds.contains(&true) => fitted = without(&start, &strays)?,
+            _ if rearranged => fitted = without(&start, &[])?,
             _ => {}
         }
         let seeds = vec![true; fitted.posterior.components()];

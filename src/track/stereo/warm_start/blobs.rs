@@ -82,17 +82,19 @@ impl Blob {
         log_density(self.pixels / all, &self.covariance()) >= explained
     }
 
-    /// Makes component `k` what these pixels alone would make it.
+    /// Makes component `k` what these pixels alone would make it; of none, the prior where it was.
     pub fn place(&self, posterior: &mut Posterior, k: usize, options: &StereoTrackerOptions) {
         posterior.weight_concentration[k] = options.weight_concentration_prior + self.pixels;
         posterior.mean_precision[k] = options.mean_precision_prior + self.pixels;
         posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + self.pixels;
-        let covariance = self.covariance();
+        let scatter = if self.pixels > 0.0 { self.pixels * self.covariance() } else { Matrix3::zeros() };
         for i in 0..D {
-            posterior.means[k * D + i] = self.sums[i] / self.pixels;
+            if self.pixels > 0.0 {
+                posterior.means[k * D + i] = self.sums[i] / self.pixels;
+            }
             for j in 0..D {
                 let prior = if i == j { options.covariance_prior } else { 0.0 };
-                posterior.scale_inverses[(k * D + i) * D + j] = prior + self.pixels * covariance[(i, j)];
+                posterior.scale_inverses[(k * D + i) * D + j] = prior + scatter[(i, j)];
             }
         }
     }

@@ -1,20 +1,24 @@
-//! Components that hold several things, and where the components to part them with come from.
+//! From components that seeds of a whole scene ended in to those of things.
 
 use super::super::options::StereoTrackerOptions;
 use super::super::voxels::Voxels;
 use super::blobs::{Blob, blobs, gain_of_parting};
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
+use std::collections::BTreeSet;
 
 /// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better components.
 const WORTH_PARTING: f64 = 1.0;
+/// Most that each pixel of the smaller of two components may lose, logarithm of the density, for them to be pieces of one surface: of what is spread evenly, pieces are no better than the whole.
+const PIECES: f64 = 0.25;
 
-/// Seeds components at the parts of others whose voxels lie far from one another: seeds of a whole scene may put two small things into one component, from which rounds do not find out. The parts that gain most come
-/// first. What they are seeded with are those to which fewer than `reseed_below` pixels belong, and then one of two that lose less as one than is gained: pieces of a surface. Tells whether there were any.
+/// Makes one component of the pieces of a surface, and several of one that holds small things far from one another: rounds find out of neither. The things that gain most come first. Tells whether there was anything to do.
+///
+/// Left as they are, two pieces become one at some later step, which may have either's name; and they leave no component for what is small, or comes to light.
 ///
 /// # Errors
 /// Those of the mixture.
-pub(in super::super) fn part(
+pub(in super::super) fn rearrange(
     posterior: &mut Posterior,
     voxels: &Voxels,
     points: &Points,
@@ -24,26 +28,21 @@ pub(in super::super) fn part(
     let mut members = vec![vec![]; posterior.components()];
     labels.iter().enumerate().for_each(|(n, &k)| members[k as usize].push(n));
     let least = options.reseed_below.max(1.0);
-    let mut worth: Vec<(usize, Parts)> =
+    let mut several: Vec<(usize, Parts)> =
         members.iter().enumerate().filter_map(|(k, own)| Some((k, Parts::of(voxels, own, least)?))).collect();
-    worth.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
-    let mut wholes: Vec<Option<Blob>> = members.iter().map(|own| Some(Blob::of(voxels, own))).collect();
-    // Who is going to be parted is no piece of something else.
-    worth.iter().for_each(|(k, _)| wholes[*k] = None);
-    let mut parted = false;
-    for (k, Parts { blobs, gain }) in worth {
+    several.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+    let mut pool = Pool::new(members.iter().map(|own| Blob::of(voxels, own)).collect(), least);
+    several.iter().for_each(|(k, _)| pool.leave_alone(*k));
+    while pool.join(|a, b| PIECES * a.pixels.min(b.pixels)) {}
+    for (k, Parts { blobs, gain }) in several {
         let pixels: f64 = blobs.iter().map(|part| part.pixels).sum();
-        let mut at = k;
-        for (i, part) in blobs.iter().enumerate() {
-            if i > 0 {
-                let Some(free) = spare(&mut wholes, posterior, gain * pixels, options) else { break };
-                at = free;
-                parted = true;
-            }
-            part.place(posterior, at, options);
+        for (i, part) in blobs.into_iter().enumerate() {
+            let Some(at) = (if i == 0 { Some(k) } else { pool.take(gain * pixels) }) else { break };
+            pool.put(at, part);
         }
     }
-    Ok(parted)
+    pool.changed.iter().for_each(|&k| pool.wholes[k].place(posterior, k, options));
+    Ok(!pool.changed.is_empty())
 }
 
 /// A component's parts that are far from one another.
@@ -64,34 +63,60 @@ impl Parts {
     }
 }
 
-/// A component that can be had: one of few pixels, or one of the two that lose the least as one, less than `gain`; the other of them is made the two.
-fn spare(
-    wholes: &mut [Option<Blob>],
-    posterior: &mut Posterior,
-    gain: f64,
-    options: &StereoTrackerOptions,
-) -> Option<usize> {
-    let few = |whole: &Option<Blob>| whole.as_ref().is_some_and(|whole| whole.pixels < options.reseed_below);
-    if let Some(idle) = wholes.iter().position(few) {
-        wholes[idle] = None;
-        return Some(idle);
-    }
-    let [kept, freed] = cheapest_pair(wholes, gain)?;
-    let freed_whole = wholes[freed].take()?;
-    let joined = wholes[kept].as_mut()?;
-    joined.join(&freed_whole);
-    joined.place(posterior, kept, options);
-    Some(freed)
+/// What components hold, and which of them can be had.
+struct Pool {
+    wholes: Vec<Blob>,
+    /// Those that may be pieces of something.
+    pieces: Vec<usize>,
+    /// Those that hold nothing, or next to nothing.
+    idle: BTreeSet<usize>,
+    /// Those that hold something else than at first.
+    changed: BTreeSet<usize>,
 }
 
-/// The two that lose the least as one, where that is less than `gain` in all.
-fn cheapest_pair(wholes: &[Option<Blob>], gain: f64) -> Option<[usize; 2]> {
-    let known: Vec<(usize, &Blob)> =
-        wholes.iter().enumerate().filter_map(|(k, whole)| Some((k, whole.as_ref()?))).collect();
-    let pairs = known.iter().enumerate().flat_map(|(n, &a)| known[n + 1..].iter().map(move |&b| [a, b]));
-    let lost = |[(_, a), (_, b)]: [(usize, &Blob); 2]| gain_of_parting(&[a, b]) * (a.pixels + b.pixels);
-    let costs = pairs.map(|pair| (lost(pair), pair.map(|(k, _)| k)));
-    costs.filter(|(cost, _)| *cost < gain).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pair)| pair)
+impl Pool {
+    /// Those of fewer than `least` pixels are idle.
+    fn new(wholes: Vec<Blob>, least: f64) -> Self {
+        let (pieces, idle): (Vec<_>, Vec<_>) = (0..wholes.len()).partition(|&k| wholes[k].pixels >= least);
+        Self { wholes, pieces, idle: idle.into_iter().collect(), changed: BTreeSet::new() }
+    }
+
+    /// Takes a component for no piece of anything.
+    fn leave_alone(&mut self, k: usize) {
+        self.pieces.retain(|&piece| piece != k);
+    }
+
+    fn put(&mut self, k: usize, blob: Blob) {
+        self.wholes[k] = blob;
+        self.changed.insert(k);
+    }
+
+    /// An idle component, or one of two that lose less than `gain` as one.
+    fn take(&mut self, gain: f64) -> Option<usize> {
+        if self.idle.is_empty() {
+            self.join(|_, _| gain);
+        }
+        self.idle.pop_first()
+    }
+
+    /// Makes those two one whose pixels lose the least by it beside what they may, logarithm of the density in all. Tells whether there were such.
+    fn join(&mut self, may: impl Fn(&Blob, &Blob) -> f64) -> bool {
+        let pieces = &self.pieces;
+        let pairs = pieces.iter().enumerate().flat_map(|(n, &a)| pieces[n + 1..].iter().map(move |&b| [a, b]));
+        let cost = |pair: [usize; 2]| {
+            let [a, b] = pair.map(|k| &self.wholes[k]);
+            gain_of_parting(&[a, b]) * (a.pixels + b.pixels) / may(a, b)
+        };
+        let costs = pairs.map(|pair| (cost(pair), pair)).filter(|(cost, _)| *cost < 1.0);
+        let Some((_, [kept, freed])) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
+        let mut joined = std::mem::take(&mut self.wholes[freed]);
+        joined.join(&self.wholes[kept]);
+        self.put(kept, joined);
+        self.changed.insert(freed);
+        self.leave_alone(freed);
+        self.idle.insert(freed);
+        true
+    }
 }
 
 #[cfg(test)]
@@ -111,7 +136,7 @@ mod tests {
             let mut both = posterior();
             both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
             (0..3).for_each(|i| both.scale_inverses[4 * i] = 60.0 * 40.0);
-            (part(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
+            (rearrange(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
         };
         let (parted, means) = told([30, 20, 40]);
         assert!(parted);
@@ -139,7 +164,7 @@ mod tests {
             .flat_map(|&s| [s, 0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s / 12.0])
             .collect();
         three.scale_inverses[26] = 60.0 * 25.0;
-        assert!(part(&mut three, &voxels, &points, &StereoTrackerOptions::default()).unwrap());
+        assert!(rearrange(&mut three, &voxels, &points, &StereoTrackerOptions::default()).unwrap());
         let labels = three.labels(&points).unwrap();
         let of = |x: u16, y: u16| labels[voxels.cells.iter().position(|c| c[..2] == [x, y]).unwrap()];
         assert_eq!(of(10, 40), of(33, 44));
