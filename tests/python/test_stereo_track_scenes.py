@@ -86,7 +86,7 @@ def test_a_missing_pair_changes_no_name(scene):
     assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
 
 
-@pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 3)), (passing_by_chance, (0, 3, 7))])
+@pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 1, 2, 3)), (passing_by_chance, (0, 3, 7))])
 def test_who_was_hidden_is_recognised_in_films_by_chance(scene, seeds):
     back = []
     for seed in seeds:
@@ -95,7 +95,8 @@ def test_who_was_hidden_is_recognised_in_films_by_chance(scene, seeds):
         back += list(comings_back(scores, drawn).values())
         assert scores.purity() >= 0.96
         assert np.mean([scores.id_share(label) for label in labels(drawn)]) >= 0.9
-    assert len(back) >= 3 and all(back)
+    # Now and then a track goes to a part of who comes to light.
+    assert len(back) >= 3 and sum(map(bool, back)) >= 0.75 * len(back)
 
 
 EXPOSURES = {
@@ -116,11 +117,10 @@ def test_another_exposure_is_no_motion(exposure):
 
     film = [replace(shown, left=exposed(t, shown.left), right=exposed(t, shown.right)) for t, shown in enumerate(small().film())]
     scores = scored(small(), "improved", film)
-    # Two components of a box may become one at the second step, and either name be the one that stays.
-    assert all(scores.id_share(label) >= 0.8 for label in (1, 2))
-    # The wall is in pieces, some of which have just come to light.
+    assert [scores.id_kept(label) for label in (1, 2)] == [6, 6]
+    # Some pieces of the wall have just come to light.
     for label, errors in scores.motion_errors().items():
-        assert (np.median(errors, axis=0) <= (0.02 if label else 0.05)).all()
+        assert (np.median(errors, axis=0) <= (0.02 if label else 0.03)).all()
 
 
 @pytest.mark.parametrize(("disparity", "approach", "speed"), [(2.0, -0.1, 0.0), (3.0, 0.12, 2.6), (2.5, 0.0, 2.6), (2.3, 0.05, 6.0)])

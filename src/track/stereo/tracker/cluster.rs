@@ -62,14 +62,19 @@ impl StereoTracker {
             let fitted = without(&start, &strays)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
-        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one; components that explain little are better used there.
+        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one; components that explain little are better used there. Of those, too, some come to lie in others.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
-        let mut start = fitted.posterior.clone();
-        let rearranged = rearrange(&mut start, &voxels, &weighted, &self.options)?;
-        match reseed(&mut start, &voxels, &weighted, &self.options)? {
-            Some(Seeded { seeds, strays }) if rearranged || seeds.contains(&true) => fitted = without(&start, &strays)?,
-            _ if rearranged => fitted = without(&start, &[])?,
-            _ => {}
+        let mut left_out = vec![];
+        for seeding in [true, false] {
+            let mut start = fitted.posterior.clone();
+            let mut changed = rearrange(&mut start, &voxels, &weighted, &self.options)?;
+            if seeding && let Some(Seeded { seeds, strays }) = reseed(&mut start, &voxels, &weighted, &self.options)? {
+                changed |= seeds.contains(&true);
+                left_out = strays;
+            }
+            if changed {
+                fitted = without(&start, &left_out)?;
+            }
         }
         let seeds = vec![true; fitted.posterior.components()];
         Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds))
