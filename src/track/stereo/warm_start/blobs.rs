@@ -46,7 +46,9 @@ impl Blob {
     /// Some of the voxels, wherever they are.
     pub fn of(voxels: &Voxels, some: &[usize]) -> Self {
         let mut out = Self::default();
-        some.iter().for_each(|&n| out.add(n, voxels.place(n), f64::from(voxels.counts[n])));
+        for &n in some {
+            out.add(n, voxels.place(n), f64::from(voxels.counts[n]));
+        }
         out
     }
 

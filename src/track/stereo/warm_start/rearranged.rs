@@ -32,7 +32,9 @@ pub(in super::super) fn rearrange(
         members.iter().enumerate().filter_map(|(k, own)| Some((k, Parts::of(voxels, own, least)?))).collect();
     several.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
     let mut pool = Pool::new(members.iter().map(|own| Blob::of(voxels, own)).collect(), least);
-    several.iter().for_each(|(k, _)| pool.leave_alone(*k));
+    for (k, _) in &several {
+        pool.leave_alone(*k);
+    }
     while pool.join(|a, b| PIECES * a.pixels.min(b.pixels)) {}
     for (k, Parts { blobs, gain }) in several {
         let pixels: f64 = blobs.iter().map(|part| part.pixels).sum();
@@ -170,5 +172,29 @@ mod tests {
         assert_eq!(of(10, 40), of(33, 44));
         let three_things = [of(10, 40), of(11, 11), of(41, 21)];
         assert_eq!(three_things.iter().collect::<std::collections::BTreeSet<_>>().len(), 3);
+    }
+
+    #[test]
+    fn what_is_in_front_of_a_surface_is_no_piece_of_it() {
+        let strip = (0..480).map(|i| ([10 + i % 24, 40 + i / 24 % 5, 30], 0));
+        // As large a piece of the surface, or something two layers in front of it.
+        let told = |depth: u16| {
+            let beside = (0..240).map(move |i| ([34 + i % 12, 40 + i / 12 % 5, depth], 1));
+            let voxels = made_up(&strip.clone().chain(beside).collect::<Vec<_>>(), 2).voxels;
+            let (values, weights) = (voxels.places(), voxels.weights());
+            let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+            let mut two = posterior();
+            two.means = vec![21.5, 42.0, 30.0, 39.5, 42.0, f64::from(depth)];
+            two.scale_inverses = [48.0, 2.0, 0.1, 12.0, 2.0, 0.1]
+                .iter()
+                .enumerate()
+                .flat_map(|(i, s)| (0..3).map(move |j| if i % 3 == j { 60.0 * s } else { 0.0 }))
+                .collect();
+            let changed = rearrange(&mut two, &voxels, &points, &StereoTrackerOptions::default()).unwrap();
+            let labels = two.labels(&points).unwrap();
+            (changed, labels.iter().collect::<std::collections::BTreeSet<_>>().len())
+        };
+        assert_eq!(told(30), (true, 1));
+        assert_eq!(told(32), (false, 2));
     }
 }
