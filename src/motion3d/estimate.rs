@@ -17,6 +17,7 @@ use super::selected::{doubted, of_estimated_noise, with_all_inliers};
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
 use super::trial::{DISTINCT, Trial, close, smoothed};
+use super::turned::HalfTurn;
 use super::verdict::{Evidence, judge};
 use crate::error::Result;
 use crate::math::random::CounterRng;
@@ -125,7 +126,7 @@ fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) ->
         if !decides(intake, &obeying, &kept.motion) {
             break;
         }
-        scaled.observations = intake.turned(&scaled.observations, &kept.motion.w());
+        scaled.observations = intake.turned(&scaled.observations, HalfTurn::of(&kept.motion));
         kept = consensus(scaled, rng)?;
     }
     Some(kept)

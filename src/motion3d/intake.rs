@@ -77,9 +77,8 @@ impl Intake<'_> {
         self.placement == Placement::Midpoint && matches!(self.flow, Flow::Plane { .. })
     }
 
-    /// The same points in the same units, with the rotation `w` taken out of their displacements; a point that this leads behind the camera gets weight 0.
-    pub fn turned(&self, points: &Observations, w: &Vector3<f64>) -> Observations {
-        let turn = HalfTurn::new(w);
+    /// The same points in the same units, with the rotation of a motion taken out of their displacements; a point that this leads behind the camera gets weight 0.
+    pub fn turned(&self, points: &Observations, turn: HalfTurn) -> Observations {
         let nothing = Row { g: nalgebra::Matrix2x3::zeros(), r: nalgebra::Matrix2x3::zeros(), f: Vector2::zeros() };
         let one = |(&k, &before): (&u32, &[f64; 3])| match self.row(k as usize, Some(&turn)) {
             (Some(row), at) => (row, at),

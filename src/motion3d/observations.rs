@@ -209,6 +209,12 @@ impl Observations {
         }
     }
 
+    /// How many points count nothing, as another rotation leads them behind the camera.
+    pub fn unseen(&self) -> usize {
+        let along = |p: usize| &self.plane(p)[..self.n];
+        along(0).iter().zip(along(4)).filter(|(first, second)| **first == 0.0 && **second == 0.0).count()
+    }
+
     /// The median of `|f|`, in units of noise.
     pub fn median_flow(&self) -> f64 {
         let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();

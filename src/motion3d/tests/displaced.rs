@@ -137,6 +137,30 @@ fn covariances_of_fast_turns_hold() {
     }
 }
 
+/// Points on one line of the picture determine the motion; a turn of a radian past near points fits them nearly as well, with most of the noise hidden in depths that change by as much as they are.
+#[test]
+fn points_on_a_line_are_given_no_invented_turn() {
+    let turns = CounterRng::new(77);
+    for start in [false, true] {
+        let mut ok = 0;
+        for seed in 0..40 {
+            let axis = [0, 1, 2].map(|i| turns.normal(3 * seed + i));
+            let turn = Vector3::from(axis).normalize() * 0.15;
+            let truth = Motion::new([0.6, 0.2, 0.75], turn.into());
+            let line = |k: u64| [1.2 * CounterRng::new(400 + seed).uniform(k) - 0.6, 0.2];
+            let seen = views_at(&truth, 300, seed, line, |_, r| 0.1 * (0.5 + r)).noisy(5e-4, 100 + seed);
+            let options = MotionOptions { initial: start.then_some(truth), ..MotionOptions::default() };
+            let found = seen.run(&Noise::Sigma(5e-4), &options);
+            if found.status == Status::Ok {
+                ok += 1;
+                let error = found.motion.angle_to(&truth).to_degrees();
+                assert!(error < 12.0 && (found.motion.w() - truth.w()).norm() < 0.03, "{seed}: {error}");
+            }
+        }
+        assert!(ok >= 34, "{start}: {ok}");
+    }
+}
+
 /// Points on a curve, whose places half way hold the flow's noise across it: depths predicted from these would share it with the residuals, and pull the estimate.
 #[test]
 fn smoothed_weights_are_as_good_on_a_curve() {
