@@ -95,9 +95,11 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         && options.robust
         && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
     {
-        // Nothing is left that noise could be estimated from.
-        let all = &scaled.observations;
-        return rotation_report(flow, all, all, &rotation, 0.0);
+        // Nothing is left that noise could be estimated from, but for rounding.
+        let (before, left) = (scaled.sigma, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
+        scaled.take(left);
+        let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.sigma));
+        return rotation_report(flow, all, all, &rotation, scaled.sigma);
     }
     if options.robust {
         let Some(kept) = exact_consensus(&intake, &mut scaled, rng.stream(1)) else {
