@@ -148,12 +148,12 @@ pub(super) fn settle(
     all: &mut Observations,
     inliers: &mut Observations,
     found: &mut Vec<Minimum>,
-    lead: Minimum,
+    lead: &Minimum,
     unknown: bool,
 ) {
     let follow = |minimum: &Minimum| follow(intake, inliers, *minimum, unknown);
     let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
-    let own = follow(&lead);
+    let own = follow(lead);
     let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
     if others.is_empty() || own.cost <= limit(lead.equations.cost) {
         let Some(turned) = own.turned else { return };

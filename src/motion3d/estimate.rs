@@ -191,7 +191,7 @@ fn on(
     let Some(&first) = found.first() else {
         return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
     };
-    settle(intake, &mut scaled.observations, &mut inliers, &mut found, first, scaled.unknown);
+    settle(intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
     let best = found[0].equations.cost;
     let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
     if scaled.unknown {
@@ -218,7 +218,7 @@ fn on(
     let (mut candidates, mut made) = preferred_of(&inliers, &found);
     if matters(intake, &inliers, candidates[0].motion()) {
         // Chosen for its depths, with the rotation of another one taken out.
-        settle(intake, &mut scaled.observations, &mut inliers, &mut found, candidates[0].minimum, false);
+        settle(intake, &mut scaled.observations, &mut inliers, &mut found, &candidates[0].minimum, false);
         (candidates, made) = preferred_of(&inliers, &found);
     }
     let chosen = candidates[0];

@@ -105,7 +105,9 @@ pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Mo
     let Depths { mut nu, s2, .. } = depths(observations, motion);
     if let Some(turn) = &observations.turn {
         let middle = turn.middle(&motion.u());
-        nu.iter_mut().for_each(|nu| *nu = middle.depth(*nu));
+        for nu in &mut nu {
+            *nu = middle.depth(*nu);
+        }
     }
     let (mut normal, mut right, mut used) = (Matrix3::zeros(), Vector3::zeros(), 0usize);
     let eta = |k: usize| place(observations, motion, k, nu[k]);

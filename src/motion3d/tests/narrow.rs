@@ -32,7 +32,6 @@ fn ellipsoids_hold_the_truth_in_narrow_fields() {
         (lateral, (0.25, 200, 0.06)),
     ] {
         let (held, ok) = held(motion, layout, ground);
-        println!("{layout:?}: {held} of {ok}");
         (all, of) = (all + held, of + ok);
     }
     assert!(of >= 200 && f64::from(all) >= 0.88 * f64::from(of), "{all} of {of}");
