@@ -22,7 +22,7 @@ const STEPS: usize = 15;
 const STEP: f64 = 1e-9;
 
 /// What is added to the variance across the valley, in squares of the direction's deviation relative to the field, and the largest share that this was measured for: with it ellipsoids of fields of 17 to 90 degrees, of 30 to 400 points with 1 to 10 % of noise, hold the truth as often whatever the share.
-const ACROSS: f64 = 12.0;
+const ACROSS: f64 = 8.0;
 const LARGEST: f64 = 0.8;
 
 type Vector4 = SMatrix<f64, 4, 1>;
