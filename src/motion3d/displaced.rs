@@ -55,7 +55,12 @@ const TURNS: usize = 3;
 fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
     let few = at_most(points, SAMPLED, CounterRng::new(0));
     let (here, turned) = (depths(&few, motion), intake.turned(&few, HalfTurn::of(motion)));
-    let changes = (0..few.n).map(|k| half_way_residual(&turned, motion, k) - here.e[k]).collect();
+    let changes = if few.turn.is_some() {
+        let there = depths(&turned, motion);
+        there.e.iter().zip(&here.e).map(|(there, here)| there - here).take(few.n).collect()
+    } else {
+        (0..few.n).map(|k| half_way_residual(&turned, motion, k) - here.e[k]).collect()
+    };
     (few, changes)
 }
 
