@@ -221,7 +221,7 @@ def estimate_motion(
         _word(name, value)
     layout = {"K": K, "sigma": _sigma(sigma), "cov": cov, "projection": projection, "six": jacobian is not None}
     options = {
-        "method": method, "robust": bool(robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
+        "method": method, "robust": _switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
         "rotation_prior": _pair("rotation_prior", rotation_prior), "initial": _pair("initial", initial), "shared": _besides(1, _number("shared", shared)), "correlation_length": _besides(0, _number("correlation_length", correlation_length)), "seed": _whole("seed", seed), "threads": None if threads is None else _count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
@@ -275,6 +275,13 @@ def _count(name: str, value: int) -> int:
     if not 1 <= count <= sys.maxsize:
         raise ValueError(f"{name}: expected a positive integer, got {count}")
     return count
+
+
+def _switch(name: str, value: bool) -> bool:
+    """True or False, and none of the things that only have a truth: any text is true."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name}: expected True or False, got {value!r}")
+    return bool(value)
 
 
 def _sigma(sigma: float | None) -> float | None:

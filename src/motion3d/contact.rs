@@ -104,7 +104,7 @@ pub fn contact_map<T: Real>(
     let covariance = Matrix5::from_fn(|i, j| covariance[i][j]);
     let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance));
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
-    let turn = (placement == Placement::Midpoint).then(|| HalfTurn::new(&motion.w()));
+    let turn = (placement == Placement::Midpoint).then(|| HalfTurn::of(motion));
     let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
     let at = |site: usize| -> [f64; 3] {
         let Some(row) = site_row(field, camera, turn.as_ref(), site) else { return [f64::NAN; 3] };

@@ -6,11 +6,12 @@
 use super::grid::at_most;
 use super::intake::Intake;
 use super::kernels::depths;
-use super::likelihood::different;
+use super::likelihood::{close, different};
 use super::motion::{Motion, tangents};
 use super::observations::{Observations, quantile};
 use super::refine::{Effort, Minimum, refine};
 use super::together::slopes;
+use super::turned::HalfTurn;
 use crate::math::random::CounterRng;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
@@ -35,6 +36,9 @@ const HIDDEN: f64 = 0.1;
 /// Root mean square of the rest, in units of noise, that decides of hardly a point whether it obeys.
 const OBEYING: f64 = 0.1;
 
+/// The farthest, degrees, that a minimum may come from itself under another one's rotation.
+const APART: f64 = 12.0;
+
 /// Most times that rows are turned about what they gave.
 const ROUNDS: usize = 6;
 
@@ -50,9 +54,24 @@ const TURNS: usize = 3;
 /// By how much the residuals of `motion` would change if the points were turned about its rotation, at a sample of them.
 fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
     let few = at_most(points, SAMPLED, CounterRng::new(0));
-    let (here, exact) = (depths(&few, motion), depths(&intake.turned(&few, &motion.w()), motion));
-    let changes = here.e.iter().zip(&exact.e).map(|(here, exact)| exact - here).take(few.n).collect();
+    let (here, turned) = (depths(&few, motion), intake.turned(&few, HalfTurn::of(motion)));
+    let changes = if few.turn.is_some() {
+        let there = depths(&turned, motion);
+        there.e.iter().zip(&here.e).map(|(there, here)| there - here).take(few.n).collect()
+    } else {
+        (0..few.n).map(|k| half_way_residual(&turned, motion, k) - here.e[k]).collect()
+    };
     (few, changes)
+}
+
+/// The residual of a turned point with the row of the translation half way, as those that are not turned have it: `G(m) t = G(eta_1') t - (eta_2' - eta_1') t_z / 2`.
+fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
+    let Some(turn) = &turned.turn else { return 0.0 };
+    let row = turned.row(k);
+    let (t, left) = (row.g * motion.u(), row.f - row.r * motion.w());
+    let middle = t - left * (0.5 * (turn.mean * motion.u()).z);
+    let s2 = middle.norm_squared();
+    if s2 > turned.floor { (t.y * left.x - t.x * left.y) / s2.sqrt() } else { 0.0 }
 }
 
 /// The square of what an estimate would come out otherwise by, in its deviations, if the points were turned about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
@@ -105,16 +124,16 @@ pub(super) fn beforehand(
     let again =
         |points: &Observations, w| if robust { Some(reweighted(points, w)) } else { least_squares(points, |_| 1.0) };
     let mut w = again(few, if robust { likeliest(few, rng.stream(1))? } else { Vector3::zeros() })?;
-    let mut turned = intake.turned(few, &w);
+    let mut turned = intake.turned(few, HalfTurn::new(&w));
     let hidden = if unknown { 0.0 } else { HIDDEN * 2.0 * (points.n as f64).sqrt() };
     if rest(few, &turned, &w) * points.n as f64 <= hidden {
         return None;
     }
     for _ in 0..TURNS {
         w = again(&turned, w)?;
-        turned = intake.turned(few, &w);
+        turned = intake.turned(few, HalfTurn::new(&w));
     }
-    Some(intake.turned(points, &w))
+    Some(intake.turned(points, HalfTurn::new(&w)))
 }
 
 /// The mean square of what turning changes in the flow that a rotation leaves.
@@ -127,34 +146,77 @@ fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
 }
 
 /// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all points, and refines `found`. `unknown`: the noise is what the lead leaves.
+///
+/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn out to be much larger once its own rotation is taken out, the other minima are followed, too, and only those stay that are as good as the best.
 pub(super) fn settle(
     intake: &Intake<'_>,
     all: &mut Observations,
     inliers: &mut Observations,
     found: &mut Vec<Minimum>,
-    mut lead: Minimum,
+    lead: &Minimum,
     unknown: bool,
 ) {
-    let settled = if inliers.n < MANY { SETTLED } else { ROUGHLY };
-    let mut negligible = if inliers.turn.is_some() { settled } else { NEGLIGIBLE };
-    let (began, mut turned) = (lead.motion, false);
+    let follow = |minimum: &Minimum| follow(intake, inliers, *minimum, unknown);
+    let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
+    let own = follow(lead);
+    let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
+    if others.is_empty() || own.cost <= limit(lead.equations.cost) {
+        let Some(turned) = own.turned else { return };
+        let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, Effort::ROUGH);
+        *found = different(others.par_iter().map(again).chain([own.minimum]).collect());
+        *inliers = turned;
+    } else {
+        let mut followed: Vec<Followed> = others.par_iter().map(follow).collect();
+        followed.push(own);
+        followed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let best = &followed[0];
+        let good = followed.iter().filter(|other| other.cost <= limit(best.cost));
+        let turned = best.turned.as_ref().unwrap_or(inliers).clone();
+        let again = |other: &Followed| {
+            let there = refine(&turned, other.minimum.motion, None, Effort::ROUGH);
+            (there.motion.angle_to(&other.minimum.motion).to_degrees() < APART).then_some(there)
+        };
+        *found = different(good.filter_map(again).chain([best.minimum]).collect());
+        *inliers = turned;
+    }
+    if let Some(turn) = inliers.turn {
+        *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, turn) };
+    }
+}
+
+/// The noise's variance in present units: 1, or what a minimum leaves.
+fn noise(cost: f64, n: usize, unknown: bool) -> f64 {
+    if unknown { cost / n.saturating_sub(5).max(1) as f64 } else { 1.0 }
+}
+
+/// A minimum with its own rotation taken out of the points, where that makes a difference.
+struct Followed {
+    minimum: Minimum,
+    turned: Option<Observations>,
+    /// What it leaves; infinite where points are led behind the camera, which then do not count.
+    cost: f64,
+}
+
+/// Turns the points about the rotation of a minimum until that stays.
+fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unknown: bool) -> Followed {
+    let settled = if points.n < MANY { SETTLED } else { ROUGHLY };
+    let mut negligible = if points.turn.is_some() { settled } else { NEGLIGIBLE };
+    let mut turned: Option<Observations> = None;
     for _ in 0..ROUNDS {
-        let w = lead.motion.w();
-        let noise = if unknown { lead.equations.cost / inliers.n.saturating_sub(5).max(1) as f64 } else { 1.0 };
-        let same = inliers.turn.is_some_and(|turn| (turn.rotation - w).norm() < ROUNDING);
-        if same || shift(intake, inliers, &lead.motion) <= negligible * noise {
+        let here = turned.as_ref().unwrap_or(points);
+        let w = minimum.motion.w();
+        let same = here.turn.is_some_and(|turn| (turn.rotation - w).norm() < ROUNDING);
+        if same || shift(intake, here, &minimum.motion) <= negligible * noise(minimum.equations.cost, points.n, unknown)
+        {
             break;
         }
-        *inliers = intake.turned(inliers, &w);
-        lead = refine(inliers, lead.motion, None, Effort::FULL);
-        (negligible, turned) = (settled, true);
+        let next = intake.turned(here, HalfTurn::of(&minimum.motion));
+        minimum = refine(&next, minimum.motion, None, Effort::FULL);
+        turned = Some(next);
+        negligible = settled;
     }
-    if let Some(turn) = inliers.turn.filter(|_| turned) {
-        *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, &turn.rotation) };
-        let other = |minimum: &&Minimum| minimum.motion != began;
-        let again = |minimum: &Minimum| refine(inliers, minimum.motion, None, Effort::ROUGH);
-        *found = different(found.par_iter().filter(other).map(again).chain([lead]).collect());
-    }
+    let lost = turned.as_ref().is_some_and(|turned| turned.unseen() > points.unseen());
+    Followed { minimum, turned, cost: if lost { f64::INFINITY } else { minimum.equations.cost } }
 }
 
 /// The rotation of two points that most points come near to.

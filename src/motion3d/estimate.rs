@@ -17,6 +17,7 @@ use super::selected::{doubted, of_estimated_noise, with_all_inliers};
 use super::smoothing::DepthSmoother;
 use super::special::{RotationOnly, by_chance, rotation_only};
 use super::trial::{DISTINCT, Trial, close, smoothed};
+use super::turned::HalfTurn;
 use super::verdict::{Evidence, judge};
 use crate::error::Result;
 use crate::math::random::CounterRng;
@@ -94,9 +95,11 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         && options.robust
         && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
     {
-        // Nothing is left that noise could be estimated from.
-        let all = &scaled.observations;
-        return rotation_report(flow, all, all, &rotation, 0.0);
+        // Nothing is left that noise could be estimated from, but for rounding.
+        let (before, left) = (scaled.sigma, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
+        scaled.take(left);
+        let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.sigma));
+        return rotation_report(flow, all, all, &rotation, scaled.sigma);
     }
     if options.robust {
         let Some(kept) = exact_consensus(&intake, &mut scaled, rng.stream(1)) else {
@@ -125,7 +128,7 @@ fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) ->
         if !decides(intake, &obeying, &kept.motion) {
             break;
         }
-        scaled.observations = intake.turned(&scaled.observations, &kept.motion.w());
+        scaled.observations = intake.turned(&scaled.observations, HalfTurn::of(&kept.motion));
         kept = consensus(scaled, rng)?;
     }
     Some(kept)
@@ -188,7 +191,7 @@ fn on(
     let Some(&first) = found.first() else {
         return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
     };
-    settle(intake, &mut scaled.observations, &mut inliers, &mut found, first, scaled.unknown);
+    settle(intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
     let best = found[0].equations.cost;
     let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
     if scaled.unknown {
@@ -215,7 +218,7 @@ fn on(
     let (mut candidates, mut made) = preferred_of(&inliers, &found);
     if matters(intake, &inliers, candidates[0].motion()) {
         // Chosen for its depths, with the rotation of another one taken out.
-        settle(intake, &mut scaled.observations, &mut inliers, &mut found, candidates[0].minimum, false);
+        settle(intake, &mut scaled.observations, &mut inliers, &mut found, &candidates[0].minimum, false);
         (candidates, made) = preferred_of(&inliers, &found);
     }
     let chosen = candidates[0];

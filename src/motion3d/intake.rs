@@ -57,7 +57,19 @@ impl Intake<'_> {
         let source = kept().map(|(_, source)| *source).collect();
         let mut out = Observations::new(&whitened, position, matches!(self.flow, Flow::Sphere { .. }), source);
         out.displaced = self.displaced();
+        out.site = self.sites(&out);
         out
+    }
+
+    /// Where points were given: bearings, or places on the plane at distance 1.
+    fn sites(&self, points: &Observations) -> Vec<[f64; 3]> {
+        let Flow::Plane { points: given, camera, .. } = self.flow else { return points.position.clone() };
+        let place = |&k: &u32| {
+            let at = given[k as usize];
+            let [x, y] = camera.map_or(at, |camera| camera.to_plane(at));
+            [x, y, 0.0]
+        };
+        points.source.iter().map(place).collect()
     }
 
     /// Whether flow is a displacement from a place that is given.
@@ -65,9 +77,8 @@ impl Intake<'_> {
         self.placement == Placement::Midpoint && matches!(self.flow, Flow::Plane { .. })
     }
 
-    /// The same points in the same units, with the rotation `w` taken out of their displacements; a point that this leads behind the camera gets weight 0.
-    pub fn turned(&self, points: &Observations, w: &Vector3<f64>) -> Observations {
-        let turn = HalfTurn::new(w);
+    /// The same points in the same units, with the rotation of a motion taken out of their displacements; a point that this leads behind the camera gets weight 0.
+    pub fn turned(&self, points: &Observations, turn: HalfTurn) -> Observations {
         let nothing = Row { g: nalgebra::Matrix2x3::zeros(), r: nalgebra::Matrix2x3::zeros(), f: Vector2::zeros() };
         let one = |(&k, &before): (&u32, &[f64; 3])| match self.row(k as usize, Some(&turn)) {
             (Some(row), at) => (row, at),
@@ -78,6 +89,7 @@ impl Intake<'_> {
         given.map(one).unzip_into_vecs(&mut whitened, &mut position);
         let mut out = Observations::new(&whitened, position, false, points.source.clone());
         out.like(points);
+        out.site.clone_from(&points.site);
         out.turn = Some(turn);
         out
     }

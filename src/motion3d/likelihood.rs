@@ -73,6 +73,11 @@ pub(super) fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
     kept
 }
 
+/// By how much the costs of two minima of `n` points may differ by chance.
+pub(super) fn close(n: usize) -> f64 {
+    8.0 * (n as f64).sqrt() + 25.0
+}
+
 /// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness of their depths, too.
 ///
 /// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and differ by about `2 sqrt(n)` by chance.
@@ -85,8 +90,8 @@ pub(super) fn choose(
         minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
-    let close = best + 8.0 * (observations.n as f64).sqrt() + 25.0;
-    let rivals = candidates.iter().take_while(|candidate| candidate.cost < close).count();
+    let limit = best + close(observations.n);
+    let rivals = candidates.iter().take_while(|candidate| candidate.cost < limit).count();
     if rivals < 2 {
         return (candidates, None);
     }

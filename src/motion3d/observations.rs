@@ -31,9 +31,11 @@ pub(super) struct Observations {
     pub n: usize,
     pub stride: usize,
     planes: Vec<f64>,
-    /// Where the points lie, for neighbourhoods: `(x, y, 0)` on the plane, the bearing on the sphere.
+    /// Where the rows are those of: `(x, y, 0)` on the plane, the bearing on the sphere. Half way along a displacement this has half of the flow's noise in it.
     pub position: Vec<[f64; 3]>,
-    /// Whether `position` are bearings.
+    /// Where the points were given, in the same axes, for neighbourhoods and what is predicted from them: free of the flow's noise, so that a prediction is independent of the point's residual.
+    pub site: Vec<[f64; 3]>,
+    /// Whether positions and sites are bearings.
     pub spherical: bool,
     /// Index of each point in what was given.
     pub source: Vec<u32>,
@@ -94,7 +96,7 @@ impl Row {
 }
 
 impl Observations {
-    /// Usable points in the order given; `source` tells where they come from.
+    /// Usable points in the order given; `source` tells where they come from. Their sites are left to be told.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
@@ -120,6 +122,7 @@ impl Observations {
             n,
             stride,
             planes,
+            site: Vec::new(),
             position,
             spherical,
             source,
@@ -155,6 +158,7 @@ impl Observations {
             stride,
             planes,
             position: chosen.iter().map(|k| self.position[pick(k)]).collect(),
+            site: chosen.iter().map(|k| self.site[pick(k)]).collect(),
             spherical: self.spherical,
             source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
             floor: self.floor,
@@ -203,6 +207,12 @@ impl Observations {
             r: Matrix2x3::from_fn(|i, j| at(6 + 3 * i + j)),
             f: Vector2::new(at(12), at(13)),
         }
+    }
+
+    /// How many points count nothing, as another rotation leads them behind the camera.
+    pub fn unseen(&self) -> usize {
+        let along = |p: usize| &self.plane(p)[..self.n];
+        along(0).iter().zip(along(4)).filter(|(first, second)| **first == 0.0 && **second == 0.0).count()
     }
 
     /// The median of `|f|`, in units of noise.

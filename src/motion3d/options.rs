@@ -219,8 +219,9 @@ impl Flow<'_> {
             }
         }
         match noise {
-            Noise::Sigma(sigma) if !(sigma.is_finite() && *sigma > 0.0) => {
-                Err(Error::argument("sigma", "a positive number", sigma))
+            // The sums of squares that an estimate is made of are of its fourth power.
+            Noise::Sigma(sigma) if !(*sigma > 0.0 && sigma.powi(4).is_normal()) => {
+                Err(Error::argument("sigma", "a positive number between 1e-75 and 1e75", sigma))
             }
             Noise::Covariances(c) if c.len() != values * points => {
                 let expected = format!("{points} matrices of {values} values");

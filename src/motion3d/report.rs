@@ -1,6 +1,6 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
-use super::bend::bent;
+use super::bend::{bent, narrowed};
 use super::contact::Rates;
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
@@ -66,12 +66,13 @@ impl Solution {
         }
     }
 
-    /// Takes into the covariance what a linear theory of independent points leaves out: the bend of the valley that the direction lies in, and errors that go together over a length, in the unit of the points.
+    /// Takes into the covariance what a linear theory of independent points leaves out: the bend of the valley that the direction lies in, what a narrow field adds, and errors that go together over a length, in the unit of the points.
     pub fn widen(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
         let Some(mut covariance) = self.covariance else { return };
         if let Some(nu) = &self.smooth {
             covariance = bent(&covariance, inliers, &self.motion, &self.tangent, nu);
         }
+        covariance = narrowed(&covariance, inliers);
         self.covariance = match length.filter(|length| *length > 0.0) {
             Some(length) => {
                 let own;

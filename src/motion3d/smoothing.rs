@@ -70,7 +70,7 @@ pub(super) struct DepthSmoother {
 impl DepthSmoother {
     /// For these points.
     pub fn new(observations: &Observations, which: Smoother, rng: CounterRng) -> Self {
-        let tree = Tree::new(&observations.position);
+        let tree = Tree::new(&observations.site);
         let n = observations.n;
         let compared = sample(n, COMPARED, rng);
         let most = SIZES.into_iter().rfind(|&k| k < n);

@@ -5,6 +5,7 @@ use super::kernels::{Depths, depths};
 use super::motion::{Motion, Rows};
 use super::observations::Observations;
 use super::refine::{Effort, refine};
+use super::turned::HalfTurn;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::borrow::Cow;
 
@@ -101,7 +102,13 @@ pub(super) struct Twin {
 ///
 /// `distinct`: least angle between both directions, rad, that is no mere error of the estimate.
 pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
-    let Depths { nu, s2, .. } = depths(observations, motion);
+    let Depths { mut nu, s2, .. } = depths(observations, motion);
+    if let Some(turn) = &observations.turn {
+        let middle = turn.middle(&motion.u());
+        for nu in &mut nu {
+            *nu = middle.depth(*nu);
+        }
+    }
     let (mut normal, mut right, mut used) = (Matrix3::zeros(), Vector3::zeros(), 0usize);
     let eta = |k: usize| place(observations, motion, k, nu[k]);
     for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
@@ -161,7 +168,7 @@ fn other_motion<'a>(
     let mut other = Motion::of(&(back * n).normalize(), &w);
     let mut seen = observations.clone();
     for _ in 0..TURNS {
-        seen = intake.turned(&seen, &other.w());
+        seen = intake.turned(&seen, HalfTurn::of(&other));
         other = refine(&seen, other, None, Effort::FULL).motion;
     }
     Some((other, Cow::Owned(seen)))

@@ -5,6 +5,7 @@ mod degenerate;
 mod dense;
 mod displaced;
 mod estimators;
+mod narrow;
 mod patches;
 mod published;
 pub(super) mod scenes;

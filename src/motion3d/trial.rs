@@ -3,7 +3,7 @@
 use super::covariance::direction_deviation;
 use super::efficient::{Efficient, WeightDepths, efficient};
 use super::kernels::{depths, equations};
-use super::likelihood::Candidate;
+use super::likelihood::{self, Candidate};
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::options::MotionOptions;
@@ -73,7 +73,7 @@ fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motio
 
 /// The chosen minimum and those that come close to it.
 pub(super) fn close(candidates: &[Candidate], n: usize) -> &[Candidate] {
-    let limit = candidates[0].cost + 8.0 * (n as f64).sqrt() + 25.0;
+    let limit = candidates[0].cost + likelihood::close(n);
     let count = candidates.iter().take_while(|other| other.cost < limit).count();
     &candidates[..count.max(1)]
 }

@@ -6,20 +6,25 @@
 //! X_2' = X_1' + t,    t = V' u,    V' = int exp(s [w]x) ds from -1/2 to 1/2 = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,   a = |w|
 //! ```
 //!
-//! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and `eta_2'`, lie on a line through the epipole, and with their middle `m` and `nu = 2 / (Z_1' + Z_2')`
+//! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and `eta_2'`, lie on a line through the epipole, and with `nu = 1 / Z_2'`
 //!
 //! ```text
-//! eta_2' - eta_1' = nu G(m) t        exactly, however long the displacement
+//! eta_2' - eta_1' = nu G(eta_1') t        exactly, however long the displacement
 //! ```
 //!
-//! A rotation that is `d` more than the one that was taken out adds `R(m) V' d` to first order, as `exp([w + d]x) = exp([w]x / 2) exp([V' d]x) exp([w]x / 2)`. So the rows `G(m) V'`, `R(m) V'` with the flow `eta_2' - eta_1' + R(m) V' w` (and `V' w = w`) have the same unknowns `(u, w)` as those of
-//! instantaneous flow, and are exact where the rotation taken out is the motion's own.
+//! A rotation that is `d` more than the one that was taken out adds `R V' d` across the line to first order, with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends, as `exp([w + d]x) = exp([w]x / 2) exp([V' d]x) exp([w]x / 2)`. So the rows `G(eta_1') V'`, `R V'` with the flow `eta_2' - eta_1' + R V' w` (and `V' w = w`)
+//! have the same unknowns `(u, w)` as those of instantaneous flow, and are exact where the rotation taken out is the motion's own.
+//!
+//! At the middle the same holds, with `nu = 2 / (Z_1' + Z_2')`; but there the noise of the second view's point is in `m`, too, and the residual across the line is its distance from the epipolar line times `2 Z_2' / (Z_1' + Z_2')`: a motion that takes all depths far away would make any flow fit.
 
-use super::motion::{Rows, cross_matrix};
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use super::motion::{Motion, Rows, cross_matrix};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 /// Angle, rad, below which series are exact to double precision where closed forms cancel.
 const SMALL: f64 = 1e-3;
+
+/// The most, relative to the depth half way, that the depth of a point may change on half of its way.
+const CHANGE: f64 = 0.5;
 
 /// A rotation that is taken out of displacements, half of it from each end.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +37,8 @@ pub(super) struct HalfTurn {
     pub mean: Matrix3<f64>,
     /// `(1 - cos(a / 2)) / a^2`.
     lag: f64,
+    /// `t = V' u` in the direction that is known, which the rows of `w` depend on a little; 0 where none is.
+    towards: Vector3<f64>,
 }
 
 /// A displacement with the rotation taken out.
@@ -39,7 +46,7 @@ pub(super) struct HalfTurn {
 pub(super) struct Turned {
     /// `m`, half way between both ends.
     pub middle: [f64; 2],
-    /// The rows of `u` and `w` there.
+    /// The rows of `u` at the first of both ends, free of the flow's noise, and of `w` half way.
     pub rows: Rows,
     /// `eta_2' - eta_1'`.
     pub left: Vector2<f64>,
@@ -81,7 +88,23 @@ impl HalfTurn {
             half: *nalgebra::Rotation3::new(0.5 * rotation).matrix(),
             mean: Matrix3::identity() + shorter * cross * cross,
             lag,
+            towards: Vector3::zeros(),
         }
+    }
+
+    /// Takes out the rotation of a motion, whose translation tells what another rotation would change.
+    pub fn of(motion: &Motion) -> Self {
+        let turn = Self::new(&motion.w());
+        let towards = turn.mean * motion.u();
+        if towards.iter().all(|value| value.is_finite()) { Self { towards, ..turn } } else { turn }
+    }
+
+    /// `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which the depth of a displacement `left` changes the rows of `w`: rather less than by far too much, where noise has it.
+    fn nearer(&self, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> f64 {
+        let t = g * self.towards;
+        let square = t.norm_squared();
+        let change = if square > 0.0 { 0.5 * self.towards.z * t.dot(left) / square } else { 0.0 };
+        1.0 - change.clamp(-CHANGE, CHANGE)
     }
 
     /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation; `None` where that leads behind the camera.
@@ -89,10 +112,10 @@ impl HalfTurn {
         let (from, at_first) = pictured(&self.half, first)?;
         let (to, spread) = pictured(&self.half.transpose(), second)?;
         let middle: [f64; 2] = (0.5 * (from + to)).into();
-        let plain = Rows::plane(middle);
-        let rows = Rows { g: plain.g * self.mean, r: plain.r * self.mean };
-        let left = to - from;
-        let flow = left + plain.r * self.rotation;
+        let (left, g) = (to - from, Rows::plane(from.into()).g);
+        let turning = Rows::plane(middle).r * self.nearer(&g, &left);
+        let rows = Rows { g: g * self.mean, r: turning * self.mean };
+        let flow = left + turning * self.rotation;
         Some(Turned { middle, rows, left, flow, spread, first: at_first })
     }
 
@@ -114,14 +137,19 @@ impl HalfTurn {
 
     /// Inverse depths half way in time from those in the rows, for the translation `u`.
     pub fn half_way(&self, u: &Vector3<f64>) -> HalfWay {
-        HalfWay { ahead: self.lag * self.rotation.cross(u).z }
+        HalfWay { ahead: self.lag * self.rotation.cross(u).z + self.middle(u).ahead }
+    }
+
+    /// Those half way between both ends.
+    pub fn middle(&self, u: &Vector3<f64>) -> HalfWay {
+        HalfWay { ahead: -0.5 * (self.mean * u).z }
     }
 }
 
 /// From inverse depths in rows that a rotation was taken out of to those half way in time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HalfWay {
-    /// How much farther along the optical axis a point is half way in time than on average of both ends, in units of `|u|`: `(X_1' + X_2') / 2 = X - (1 - cos(a / 2)) / a^2 (w x u)`.
+    /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`: `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2 + (1 - cos(a / 2)) / a^2 (w x u)`.
     ahead: f64,
 }
 
@@ -139,7 +167,6 @@ impl HalfWay {
 
 #[cfg(test)]
 mod tests {
-    use super::super::motion::Motion;
     use super::*;
 
     /// `(first, second, depth half way)` of a point under a motion over a whole frame.

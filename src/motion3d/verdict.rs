@@ -88,6 +88,9 @@ pub(super) fn judge(
     let motions = [solution.motion, evidence.likelihood.0];
     solution.status = if inliers.n < FEW {
         Status::FewPoints
+    } else if inliers.unseen() > 0 {
+        // Turned by so much that points are behind the camera: such a motion was not told by all of them.
+        Status::IllConditioned
     } else if !determined(inliers, &solution.motion) {
         solution.covariance = None;
         Status::IllConditioned

@@ -326,6 +326,8 @@ MISTAKES = [
     ({"K": np.zeros((3, 3))}, "K"),
     ({"sigma": 0.0}, "sigma"),
     ({"sigma": -1.0}, "sigma"),
+    ({"sigma": 1e-300}, "sigma"),
+    ({"sigma": 1e300}, "sigma"),
     ({"cov": np.ones((5, 2))}, "cov"),
     ({"sigma": 1.0, "cov": np.ones((5, 2, 2))}, "cov"),
     ({"method": "best"}, "method"),
@@ -358,7 +360,7 @@ def test_arguments_of_another_kind_are_refused():
         motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
     with pytest.raises(TypeError, match=r"^sigma\b"):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
-    for wrong in ({"shared": "2"}, {"shared": None}, {"shared": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"seed": True}, {"sigma": "0.3"}, {"sigma": True}, {"seed": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
+    for wrong in ({"robust": "no"}, {"robust": 1}, {"robust": None}, {"shared": "2"}, {"shared": None}, {"shared": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"seed": True}, {"sigma": "0.3"}, {"sigma": True}, {"seed": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
         with pytest.raises(TypeError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
     for name in ("method", "placement", "projection", "smoother"):

@@ -34,7 +34,7 @@ enum Around {
 
 impl Around {
     fn new(observations: &Observations) -> Self {
-        let tree = Tree::new(&observations.position);
+        let tree = Tree::new(&observations.site);
         if observations.n > MANY {
             let cells = tree.cells(2 * NEAREST);
             return Self::Cells(tree, cells);

@@ -35,7 +35,7 @@ impl<'a> Gate<'a> {
     /// For these points.
     pub fn new(observations: &'a Observations) -> Self {
         let cells = (observations.n > MANY).then(|| {
-            let tree = Tree::new(&observations.position);
+            let tree = Tree::new(&observations.site);
             let cells = tree.cells(CELL);
             (tree, cells)
         });
@@ -69,8 +69,8 @@ impl<'a> Gate<'a> {
 
 /// Differences of the inliers' depths from the median of their nearest inliers'.
 fn from_nearest(observations: &Observations, inliers: &[u32], seen: &Depths) -> Vec<f64> {
-    let positions: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.position[k as usize]).collect();
-    let tree = Tree::new(&positions);
+    let sites: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.site[k as usize]).collect();
+    let tree = Tree::new(&sites);
     let places: Vec<u32> = (0..inliers.len() as u32).collect();
     let lists = tree.nearest(&places, NEAREST);
     let depth = |place: u32| seen.nu[inliers[tree.order()[place as usize] as usize] as usize];

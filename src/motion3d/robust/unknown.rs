@@ -91,8 +91,8 @@ fn together(observations: &Observations, found: &Consensus) -> bool {
         return false;
     }
     let seen = depths(observations, &found.motion).e;
-    let positions: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.position[k as usize]).collect();
-    let tree = Tree::new(&positions);
+    let sites: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.site[k as usize]).collect();
+    let tree = Tree::new(&sites);
     let places: Vec<u32> = (0..inliers.len() as u32).collect();
     let lists = tree.nearest(&places, NEAREST);
     let residual = |place: usize| seen[inliers[tree.order()[place] as usize] as usize];

@@ -35,7 +35,7 @@ fn lengths_and_values_are_checked_by_name() {
         assert!(error.starts_with(word), "{error}");
     };
     refused(&Flow::Plane { points: &scene.points, flow: &scene.flow[1..], camera: None }, &Noise::Unknown, "flow: ");
-    for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
         refused(&scene.flow(), &Noise::Sigma(sigma), "sigma: ");
     }
     refused(&scene.flow(), &Noise::Covariances(&[1.0; 7]), "cov: ");
@@ -64,8 +64,12 @@ fn a_camera_that_only_turns_or_stands_still() {
         }
         // The same without noise.
         scene.flow = scene.points.iter().map(|&p| motion.plane_flow(p, 0.0)).collect();
-        let exact = run(&scene, &Noise::Unknown);
-        assert_eq!(exact.status, Status::RotationOnly);
+        for robust in [false, true] {
+            let options = MotionOptions { robust, ..options() };
+            let exact = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
+            assert_eq!(exact.status, Status::RotationOnly);
+            assert!(exact.rotation_std.iter().all(|deviation| *deviation < 1e-9), "{robust}: {:?}", exact.rotation_std);
+        }
     }
 }
 
