@@ -231,7 +231,7 @@ class StereoTracker:
     arc_threshold : float
         Least score of an arc that continues a track, 0 to 2.
     reseed_below : float
-        Components with fewer pixels begin anew where the mixture explains least ("improved").
+        Components with fewer pixels begin anew where the mixture explains least, and a start from seeds is looked over for pieces of one surface and for small things that share a component ("improved"); 0: neither.
     recognition : bool
         Whether lost tracks are waited for; default yes ("paper": no). A component loses its track where less than `least_overlap` of its moved self, and of what it then is, meets the other; the track is waited for `patience` steps and given to a new component within
         `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity) behind which less than three fifths of them are seen.

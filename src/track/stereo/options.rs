@@ -168,7 +168,7 @@ pub struct StereoTrackerOptions {
     pub luminance_levels: usize,
     /// Least score of an arc that tracks follow, 0 to 2; default 0.4.
     pub arc_threshold: f64,
-    /// Components with fewer pixels after moving are seeded anew (`improved`); default 20.
+    /// Components with fewer pixels after moving are seeded anew, and a start from seeds is looked over for pieces of one surface and for small things that share a component (`improved`); 0: neither; default 20.
     pub reseed_below: f64,
     /// Whether lost tracks are waited for (`improved`).
     pub recognition: Option<Recognition>,

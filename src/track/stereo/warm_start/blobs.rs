@@ -43,17 +43,21 @@ pub(super) struct Blob {
 }
 
 impl Blob {
-    /// Some of the voxels, wherever they are.
-    pub fn of(voxels: &Voxels, some: &[usize]) -> Self {
+    /// Moments of some of the voxels, wherever they are; which ones is not kept.
+    pub fn moments(voxels: &Voxels, some: &[usize]) -> Self {
         let mut out = Self::default();
         for &n in some {
-            out.add(n, voxels.place(n), f64::from(voxels.counts[n]));
+            out.count(voxels.place(n), f64::from(voxels.counts[n]));
         }
         out
     }
 
     fn add(&mut self, voxel: usize, place: [f64; D], count: f64) {
         self.members.push(voxel);
+        self.count(place, count);
+    }
+
+    fn count(&mut self, place: [f64; D], count: f64) {
         self.pixels += count;
         for i in 0..D {
             self.sums[i] += count * place[i];
@@ -122,7 +126,7 @@ pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
         let (mut blob, mut front) = (Blob::default(), vec![first]);
         while let Some(n) = front.pop() {
             blob.add(n, voxels.place(n), f64::from(voxels.counts[n]));
-            let beside = neighbours().filter_map(|by| lattice.shifted(voxels.cells[n], by));
+            let beside = within(SEED_REACH).filter_map(|by| lattice.shifted(voxels.cells[n], by));
             front.extend(beside.filter_map(&mut take));
         }
         out.push(blob);
@@ -130,8 +134,7 @@ pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
     out
 }
 
-/// Shifts to the voxels beside one.
-fn neighbours() -> impl Iterator<Item = [i32; D]> {
-    let [x, y, z] = SEED_REACH;
+/// Shifts to the voxels no farther along x, y and disparity.
+pub(super) fn within([x, y, z]: [i32; D]) -> impl Iterator<Item = [i32; D]> {
     (-z..=z).flat_map(move |dz| (-y..=y).flat_map(move |dy| (-x..=x).map(move |dx| [dx, dy, dz])))
 }
