@@ -130,6 +130,17 @@ pub(super) mod tests {
         }
     }
 
+    /// The same with a third one elsewhere.
+    pub fn with_a_third() -> Posterior {
+        let mut three = posterior();
+        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
+            of.push(60.0);
+        }
+        three.means.extend([5.0, 55.0, 50.0]);
+        three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
+        three
+    }
+
     #[test]
     fn means_are_moved_by_their_motions() {
         let got = moved(&posterior(), &[Some([1.0, -2.0, 0.5]), None]);
@@ -171,12 +182,7 @@ pub(super) mod tests {
         let voxels = made_up(&cells, 1).voxels;
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut three = posterior();
-        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
-            of.push(60.0);
-        }
-        three.means.extend([5.0, 55.0, 50.0]);
-        three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
+        let mut three = with_a_third();
         let options = StereoTrackerOptions::default();
         let told = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
         // The second is the likeliest for all that the first does not explain, and keeps its place.

@@ -190,7 +190,7 @@ impl Pool {
 #[cfg(test)]
 mod tests {
     use super::super::super::clusters::tests::made_up;
-    use super::super::tests::posterior;
+    use super::super::tests::{posterior, with_a_third};
     use super::*;
 
     #[test]
@@ -222,10 +222,7 @@ mod tests {
         let voxels = made_up(&cells, 1).voxels;
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut three = posterior();
-        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
-            of.push(60.0);
-        }
+        let mut three = with_a_third();
         three.means = vec![15.5, 42.0, 30.0, 27.5, 42.0, 30.0, 26.0, 16.0, 45.0];
         three.scale_inverses = [60.0 * 12.0, 60.0 * 12.0, 60.0 * 60.0]
             .iter()
