@@ -229,6 +229,9 @@ mod tests {
             .flat_map(|&s| [s, 0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s / 12.0])
             .collect();
         three.scale_inverses[26] = 60.0 * 25.0;
+        // Nothing is where components are not to be seeded anew.
+        let never = StereoTrackerOptions { reseed_below: 0.0, ..StereoTrackerOptions::default() };
+        assert!(!rearrange(&mut three, &voxels, &points, &never).unwrap());
         assert!(rearrange(&mut three, &voxels, &points, &StereoTrackerOptions::default()).unwrap());
         let labels = three.labels(&points).unwrap();
         let of = |x: u16, y: u16| labels[voxels.cells.iter().position(|c| c[..2] == [x, y]).unwrap()];
