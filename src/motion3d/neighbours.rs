@@ -43,9 +43,14 @@ impl Neighbours {
     }
 }
 
+/// A square distance that single precision has; what is farther is as far as it can tell.
+fn told(square: f64) -> f64 {
+    square.min(f64::from(f32::MAX))
+}
+
 fn square_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    told(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
 }
 
 impl Node {
@@ -55,7 +60,7 @@ impl Node {
             let outside = (self.least[axis] - p[axis]).max(p[axis] - self.greatest[axis]).max(0.0);
             sum += outside * outside;
         }
-        sum
+        told(sum)
     }
 }
 
@@ -220,5 +225,7 @@ mod tests {
         check(&(0..20).map(at).collect::<Vec<_>>(), 16);
         let line: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k % 10), 0.0, 0.0]).collect();
         check(&line, 32);
+        let astray: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), if k == 7 { 1e200 } else { 0.0 }, 0.0]).collect();
+        check(&astray, 32);
     }
 }
