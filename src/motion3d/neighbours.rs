@@ -43,14 +43,14 @@ impl Neighbours {
     }
 }
 
-/// A square distance that single precision has; what is farther is as far as it can tell.
-fn told(square: f64) -> f64 {
+/// A square distance that single precision can hold: beyond its largest number, that.
+fn in_single(square: f64) -> f64 {
     square.min(f64::from(f32::MAX))
 }
 
 fn square_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    told(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    in_single(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
 }
 
 impl Node {
@@ -60,7 +60,7 @@ impl Node {
             let outside = (self.least[axis] - p[axis]).max(p[axis] - self.greatest[axis]).max(0.0);
             sum += outside * outside;
         }
-        told(sum)
+        in_single(sum)
     }
 }
 
