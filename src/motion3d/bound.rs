@@ -70,7 +70,7 @@ pub fn motion_bound(
     let mut nu: Vec<f64> = observations.source.iter().map(|&k| inverse_depth[k as usize]).collect();
     nu.resize(observations.stride, 0.0);
     let tangent = tangents(&motion.u());
-    let m = information(&observations, motion, &tangent, &nu);
+    let m = information(&observations, motion, &tangent, &nu, 0.0);
     let bound = determined(&m).ok_or_else(not_determined)?;
     let noise = equations(&observations, motion, &tangent, None).p;
     let likelihood = bound + bound * noise * bound;

@@ -5,6 +5,7 @@
 
 use super::covariance::{Matrix5, Plugged, direction_deviation};
 use super::efficient::Efficient;
+use super::motion::Motion;
 use super::observations::Observations;
 use super::refine::Minimum;
 use nalgebra::{Matrix2, SMatrix, Vector2};
@@ -21,8 +22,13 @@ pub(super) fn beyond_theory(observations: &Observations, minimum: &Minimum, plug
     if deviation < NOISY * direction_deviation(&plugged.bound) {
         return false;
     }
+    among(observations, &minimum.motion, deviation)
+}
+
+/// Whether the epipole may lie among the points, of a direction known to `deviation` degrees.
+pub(super) fn among(observations: &Observations, motion: &Motion, deviation: f64) -> bool {
     let reach = (REACH * deviation.to_radians()).powi(2);
-    let u = minimum.motion.u();
+    let u = motion.u();
     // On average over its two rows, |G u| is |G| / sqrt 2 for a u across the line of sight.
     (0..observations.n).any(|k| {
         let g = observations.row(k).g;

@@ -43,7 +43,7 @@ pub(super) enum WeightDepths<'a> {
 }
 
 impl WeightDepths<'_> {
-    fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
+    pub fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
         match self {
             Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
             Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
@@ -128,16 +128,17 @@ const SLOPES: std::ops::Range<f64> = 0.25..4.0;
 /// The least singular value of the slope relative to the largest at which known depths determine the motion.
 const DETERMINED: f64 = 1e-3;
 
-/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation: `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off, depths from elsewhere).
+/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights: `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off, depths from elsewhere).
 fn sandwich(
     observations: &Observations,
     motion: &Motion,
     tangent: &Matrix2x3<f64>,
     smooth: &Smoothed,
 ) -> Option<Matrix5> {
-    let squares = information(observations, motion, tangent, &smooth.nu);
+    let spread = damping(observations, motion, tangent, &smooth.nu)?;
+    let squares = information(observations, motion, tangent, &smooth.nu, spread);
     let plain = inverse(&squares)?;
-    let slope = slope(observations, motion, tangent, &smooth.nu, &smooth.share);
+    let slope = slope(observations, motion, tangent, &smooth.nu, &smooth.share, spread);
     let whiten = squares.cholesky()?.l().try_inverse()?;
     let relative = whiten * slope * whiten.transpose();
     let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
@@ -156,8 +157,9 @@ fn known_sandwich(
     tangent: &Matrix2x3<f64>,
     nu: &[f64],
 ) -> Option<Matrix5> {
-    let squares = information(observations, motion, tangent, nu);
-    let slope = slope(observations, motion, tangent, nu, &vec![0.0; nu.len()]);
+    let spread = damping(observations, motion, tangent, nu)?;
+    let squares = information(observations, motion, tangent, nu, spread);
+    let slope = slope(observations, motion, tangent, nu, &vec![0.0; nu.len()], spread);
     let whiten = squares.cholesky()?.l().try_inverse()?;
     let sizes = (whiten * slope * whiten.transpose()).singular_values();
     let back = slope.try_inverse().filter(|_| sizes.min() > DETERMINED * sizes.max())?;
@@ -166,11 +168,16 @@ fn known_sandwich(
     covariance.cholesky().map(|_| covariance)
 }
 
+/// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
+fn damping(observations: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: &[f64]) -> Option<f64> {
+    inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
+}
+
 /// The root of the equation whose weights are frozen at `start`.
 fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
     let tangent = tangents(&start.u());
-    let covariance = inverse(&information(observations, start, &tangent, nu))?;
-    let equation = Bilinear::new(observations, start, &tangent, nu, direction_spread(&covariance));
+    let spread = damping(observations, start, &tangent, nu)?;
+    let equation = Bilinear::new(observations, start, &tangent, nu, spread);
     let mut motion = *start;
     for _ in 0..STEPS {
         let tangent = tangents(&motion.u());

@@ -1,42 +1,27 @@
 //! The whole way from flow to motion.
 
-use super::covariance::{Plugged, direction_deviation, plugged};
-use super::departure::beyond_theory;
-use super::displaced::{beforehand, decides, matters, settle};
-use super::efficient::{Efficient, WeightDepths, unsolved};
+use super::displaced::{beforehand, decides};
 use super::intake::Intake;
-use super::likelihood::{Candidate, choose, different, minima};
-use super::motion::Motion;
-use super::observations::{Known, Observations};
-use super::options::{Flow, Method, MotionOptions, Noise};
-use super::refine::{Effort, Minimum, refine};
-use super::report::{Solution, report, rotation_report};
-use super::result::{Alternative, MotionEstimate, Status};
-use super::robust::{self, Consensus, Rival};
-use super::selected::{doubted, of_estimated_noise, with_all_inliers};
-use super::smoothing::DepthSmoother;
-use super::special::{RotationOnly, by_chance, rotation_only};
-use super::trial::{DISTINCT, Trial, close, smoothed};
+use super::observations::{Known, Observations, ROUNDING};
+use super::options::{Flow, MotionOptions, Noise};
+use super::report::rotation_report;
+use super::result::{MotionEstimate, Status};
+use super::robust::{self, Consensus};
+use super::selected::{doubted, with_all_inliers};
+use super::solve::Task;
+use super::special::{turning, turning_in_unknown_noise};
 use super::turned::HalfTurn;
-use super::verdict::{Evidence, judge};
 use crate::error::Result;
 use crate::math::random::CounterRng;
-use rayon::prelude::*;
 
 /// Least number of points for a motion.
 const LEAST: usize = 5;
-
-/// Number of points from which on [`Method::Auto`] smooths depths.
-const SMOOTHED: usize = 30;
 
 /// Noise of flow that is exactly zero, in its unit.
 const LEAST_NOISE: f64 = 1e-100;
 
 /// Times that a rotation is taken out of displacements and points that obey are looked for again.
 const TURNS: usize = 2;
-
-/// Residuals below this share of the flow are rounding.
-const ROUNDING: f64 = 1e-11;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -106,7 +91,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inner = scaled.observations.subset(&kept.inner);
-        let found = on(&intake, options, &mut scaled, inner, Some(&kept), rng);
+        let task = Task { intake: &intake, options, known: Some(&kept), rng };
+        let found = task.on(&mut scaled, inner);
         let found = with_all_inliers(found, &scaled.observations, &kept);
         doubted(found, &scaled.observations, &kept)
     } else {
@@ -116,7 +102,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma);
         }
         let inliers = scaled.observations.clone();
-        on(&intake, options, &mut scaled, inliers, None, rng)
+        Task { intake: &intake, options, known: None, rng }.on(&mut scaled, inliers)
     }
 }
 
@@ -145,150 +131,4 @@ fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
         rival.excess *= own * own;
     }
     Some(found)
-}
-
-/// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.
-fn turning(observations: &Observations) -> Option<RotationOnly> {
-    let rotation = rotation_only(observations)?;
-    by_chance(rotation.chi2, (2 * observations.n - 3) as f64 / observations.shared).then_some(rotation)
-}
-
-/// The same where the noise is to be estimated: `cost` is what the best motion leaves.
-///
-/// If there were no translation, that would take no more away than the same share of any noise, and what the choice of a direction takes.
-fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
-    let rotation = rotation_only(observations)?;
-    let n = observations.n as f64;
-    let sigma2 = rotation.chi2 / (2.0 * n - 3.0);
-    let left = cost / (n - 5.0).max(1.0);
-    let none = rotation.chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
-    (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
-}
-
-/// Standard deviations by which the best of all directions explains pure noise better than any one would, and a margin.
-const SEARCHED: f64 = 5.5;
-/// What few points add to that.
-const FEW_POINTS: f64 = 12.0;
-
-/// Estimates on the points that obey one motion.
-fn on(
-    intake: &Intake<'_>,
-    options: &MotionOptions,
-    scaled: &mut Scaled,
-    mut inliers: Observations,
-    known: Option<&Consensus>,
-    rng: CounterRng,
-) -> MotionEstimate {
-    let flow = intake.flow;
-    let mut found = match (&options.initial, known) {
-        (Some(initial), _) => {
-            let initial = Motion::new(initial.translation, initial.rotation);
-            vec![refine(&inliers, initial, None, Effort::FULL)]
-        }
-        (None, None) => minima(&inliers, rng.stream(2)),
-        (None, Some(known)) => again(&inliers, known),
-    };
-    let Some(&first) = found.first() else {
-        return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
-    };
-    settle(intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
-    let best = found[0].equations.cost;
-    let rivals: &[Rival] = known.map_or(&[], |known| &known.rivals);
-    if scaled.unknown {
-        if let Some(rotation) = turning_in_unknown_noise(&inliers, best) {
-            let sigma = (rotation.chi2 / (2 * inliers.n - 3) as f64).sqrt();
-            let factor = rescaled(scaled, &mut inliers, sigma);
-            return rotation_report(flow, &scaled.observations, &inliers, &rotation.in_units(factor), scaled.sigma);
-        }
-        let sigma = (best / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
-        rescaled(scaled, &mut inliers, sigma);
-        found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::FULL)).collect();
-    } else if options.robust
-        && let Some(rotation) = turning(&inliers)
-    {
-        return rotation_report(flow, &scaled.observations, &inliers, &rotation, scaled.sigma);
-    }
-    let preferred_of = |inliers: &Observations, found: &[Minimum]| {
-        if options.initial.is_some() {
-            let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
-            return (found.iter().map(given).collect(), None);
-        }
-        choose(inliers, found, || DepthSmoother::new(inliers, options.smoother, rng.stream(3)))
-    };
-    let (mut candidates, mut made) = preferred_of(&inliers, &found);
-    if matters(intake, &inliers, candidates[0].motion()) {
-        // Chosen for its depths, with the rotation of another one taken out.
-        settle(intake, &mut scaled.observations, &mut inliers, &mut found, &candidates[0].minimum, false);
-        (candidates, made) = preferred_of(&inliers, &found);
-    }
-    let chosen = candidates[0];
-    let smoother = || DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
-    let wanted = match options.method {
-        Method::Auto => inliers.n >= SMOOTHED,
-        Method::Efficient => true,
-        Method::MaximumLikelihood => false,
-    };
-    let plugged = plugged(&chosen.minimum.equations);
-    let low = plugged.is_none();
-    let several = close(&candidates, inliers.n).len() > 1;
-    let astray = plugged.as_ref().is_some_and(|plugged| beyond_theory(&inliers, &chosen.minimum, plugged));
-    let trial = if wanted || low || several || astray {
-        smoothed(&inliers, options, &candidates, made, smoother)
-    } else {
-        None
-    };
-    let (improved, mut undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
-    if let Some(best) = improved.as_ref().filter(|_| !wanted) {
-        undecided = preferred(best, &chosen, plugged.as_ref()).or(undecided);
-    }
-    let improved = improved.filter(|_| wanted || low || astray);
-    let unknown = low && improved.is_none();
-    let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
-    if unknown {
-        let mut smoother = DepthSmoother::new(&inliers, options.smoother, rng.stream(3));
-        let at = unsolved(&inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
-        solution.covariance = at.map(|at| at.covariance);
-    }
-    solution.widen(&inliers, flow, options.correlation_length);
-    if let Some(known) = known {
-        let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
-        solution.covariance = solution.covariance.map(|covariance| covariance * strays);
-    }
-    if scaled.unknown {
-        let widened = of_estimated_noise(inliers.n, known.is_some());
-        solution.covariance = solution.covariance.map(|covariance| covariance * widened);
-    }
-    solution.alternatives = close(&candidates, inliers.n)[1..]
-        .iter()
-        .map(|other| Alternative { motion: *other.motion(), excess: other.cost - chosen.cost })
-        .collect();
-    let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
-    let likelihood = (*chosen.motion(), chosen.minimum.equations.behind);
-    let evidence = Evidence { likelihood, deviation, low, rivals, undecided };
-    judge(intake, &inliers, &mut solution, &evidence, rng.stream(4));
-    report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
-}
-
-/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may be true.
-fn preferred(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
-    let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
-    let deviation = deviation.max(direction_deviation(&best.covariance));
-    let apart = best.motion.angle_to(chosen.motion()).to_degrees() > DISTINCT * deviation;
-    apart.then_some(Alternative { motion: best.motion, excess: 0.0 })
-}
-
-/// The minimum that a robust search led to, and those that other minima for the same points lead to.
-fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
-    let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
-    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
-    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())
-}
-
-/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
-fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
-    let before = scaled.sigma;
-    scaled.take(sigma);
-    let factor = before / scaled.sigma;
-    inliers.rescale(factor);
-    factor
 }

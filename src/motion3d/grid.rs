@@ -1,10 +1,10 @@
 //! The search over directions: where on the half sphere the residuals are small.
 
 use super::kernels::best_rotation;
-use super::motion::Motion;
+use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use crate::math::random::CounterRng;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -17,6 +17,17 @@ pub(super) const SEARCHED: usize = 1000;
 /// Starts that are refined, and the least angle between them, degrees.
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
+
+/// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond it, starts among them, and the share that these are apart.
+const ACROSS: usize = 12;
+const NARROW: f64 = 0.45;
+const BEYOND: f64 = 0.25;
+const STARTS_WITHIN: usize = 3;
+const APART_WITHIN: f64 = 0.25;
+
+/// Starts that are refined where what the first left is no noise, and the least angle between them, degrees.
+const FURTHER: usize = 16;
+const APART_FURTHER: f64 = 4.0;
 
 /// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
 const TOGETHER: usize = 20;
@@ -46,9 +57,13 @@ pub(super) fn sample(n: usize, count: usize, rng: CounterRng) -> Vec<u32> {
     chosen
 }
 
-/// Evaluates every direction, in groups that threads share.
+/// Evaluates every direction of the half sphere.
 pub(super) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
-    let directions = half_sphere();
+    each(&half_sphere(), work)
+}
+
+/// Evaluates directions in groups that threads share.
+fn each<R: Send>(directions: &[Vector3<f64>], work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
     let groups: Vec<Vec<R>> =
         directions.par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
     groups.into_iter().flatten().collect()
@@ -79,11 +94,64 @@ pub(super) fn at_most(observations: &Observations, most: usize, rng: CounterRng)
     }
 }
 
-/// The most promising motions of the whole half sphere, by `J` on at most 1000 random points.
-pub(super) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
-    let searched = &*at_most(observations, SEARCHED, rng);
-    let found = evaluate(|u| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost)));
-    apart(found, APART, STARTS).into_iter().map(|(motion, _)| motion).collect()
+/// Directions that were looked at, each with the rotation that suits it best and what that leaves.
+pub(super) struct Searched {
+    all: Vec<(Motion, f64)>,
+    within: Vec<(Motion, f64)>,
+    /// Least angle between starts within the picture, degrees.
+    apart: f64,
+}
+
+impl Searched {
+    /// The whole half sphere, and a narrow picture more closely, by `J` on at most 1000 random points.
+    pub fn new(observations: &Observations, rng: CounterRng) -> Self {
+        let searched = &*at_most(observations, SEARCHED, rng);
+        let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
+        let (within, width) = within(searched);
+        Self { all: evaluate(best), within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
+    }
+
+    /// The most promising motions.
+    pub fn starts(&self) -> Vec<Motion> {
+        let all = apart(self.all.clone(), APART, STARTS).into_iter();
+        let within = apart(self.within.clone(), self.apart, STARTS_WITHIN);
+        all.chain(within).map(|(motion, _)| motion).collect()
+    }
+
+    /// More of them, where none of those led to the flow's noise.
+    pub fn further(&self) -> Vec<Motion> {
+        let all = apart(self.all.clone(), APART_FURTHER, FURTHER).into_iter();
+        let within = apart(self.within.clone(), 0.5 * self.apart, FURTHER);
+        all.chain(within).map(|(motion, _)| motion).collect()
+    }
+}
+
+/// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half width, rad.
+fn within(observations: &Observations) -> (Vec<Vector3<f64>>, f64) {
+    let none = (Vec::new(), 0.0);
+    let seen = |at: &[f64; 3]| {
+        let along = if observations.spherical { at[2] } else { 1.0 };
+        Vector3::new(at[0], at[1], along).normalize()
+    };
+    let sum: Vector3<f64> = observations.site.iter().map(seen).sum();
+    let Some(middle) = sum.try_normalize(0.0) else { return none };
+    let axes = tangents(&middle);
+    let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+    for direction in observations.site.iter().map(seen) {
+        let along = direction.dot(&middle);
+        if along < NARROW.cos() {
+            return none;
+        }
+        let place = axes * direction / along;
+        (low, high) = (low.inf(&place), high.sup(&place));
+    }
+    let (centre, half) = ((low + high) * 0.5, (high - low) * (0.5 + BEYOND));
+    let step = |i: usize| 2.0 * (i as f64 + 0.5) / ACROSS as f64 - 1.0;
+    let direction = |i: usize| {
+        let at = centre + half.component_mul(&Vector2::new(step(i % ACROSS), step(i / ACROSS)));
+        (middle + axes.transpose() * at).normalize()
+    };
+    ((0..ACROSS * ACROSS).map(direction).collect(), half.max())
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Maximum likelihood over all motions, and which of several minima it was.
 
-use super::grid::{sample, starts};
+use super::grid::{Searched, sample};
 use super::kernels::depths;
 use super::motion::Motion;
 use super::observations::Observations;
 use super::refine::{Effort, Minimum, refine};
 use super::smoothing::DepthSmoother;
+use super::special::by_chance;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
 
@@ -41,9 +42,20 @@ impl Candidate {
     }
 }
 
-/// The minima of `J`, the cheapest first, with the best sign each.
-pub(super) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimum> {
-    let starts = starts(observations, rng.stream(0));
+/// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the best minimum leaves more than that, it is looked for from more starts.
+pub(super) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
+    let searched = Searched::new(observations, rng.stream(0));
+    let found = refined(observations, searched.starts(), rng);
+    let free = observations.n.saturating_sub(5) as f64 / observations.shared;
+    let noise = |best: &Minimum| by_chance(best.equations.cost, free);
+    if unknown || free <= 0.0 || found.first().is_none_or(noise) {
+        return found;
+    }
+    different(found.into_iter().chain(refined(observations, searched.further(), rng)).collect())
+}
+
+/// The minima that starts lead to.
+fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) -> Vec<Minimum> {
     let refined = if observations.n > MANY {
         let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
         let rough: Vec<Minimum> =

@@ -29,7 +29,6 @@
 //! ```
 
 mod belief;
-mod bend;
 mod bound;
 mod camera;
 mod contact;
@@ -57,12 +56,14 @@ mod robust;
 mod selected;
 mod signs;
 mod smoothing;
+mod solve;
 mod special;
 #[cfg(test)]
 mod tests;
 mod together;
 mod trial;
 mod turned;
+mod valley;
 mod verdict;
 
 pub use bound::{MotionBound, motion_bound};

@@ -80,6 +80,11 @@ impl Motion {
         Self { translation: self.translation.map(|value| -value), rotation: self.rotation }
     }
 
+    /// The same with a translation of length 1.
+    pub(super) fn normalized(&self) -> Self {
+        Self::new(self.translation, self.rotation)
+    }
+
     /// This motion after a small step `(psi, w)` in the tangent axes of its translation.
     pub(super) fn stepped(&self, tangent: &Matrix2x3<f64>, step: &SMatrix<f64, 5, 1>) -> Self {
         let u = self.u() + tangent.transpose() * Vector2::new(step[0], step[1]);

@@ -17,6 +17,9 @@ const ALIGN: usize = 8;
 /// `|G u| / |G|` below which a point sits on the epipole and says nothing.
 const EPIPOLE: f64 = 1e-9;
 
+/// Residuals below this share of the flow are rounding.
+pub(super) const ROUNDING: f64 = 1e-11;
+
 /// One point: `f = nu G u + R w + noise` with unit covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {

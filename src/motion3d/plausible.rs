@@ -107,6 +107,6 @@ fn consistent(observations: &Observations, motion: &Motion, smoother: &mut Depth
     let tangent = tangents(&motion.u());
     let nu = smoother.smooth(&depths(observations, motion)).nu;
     let (value, _) = Bilinear::new(observations, motion, &tangent, &nu, 0.0).at(motion, &tangent);
-    let Some(factor) = information(observations, motion, &tangent, &nu).cholesky() else { return false };
+    let Some(factor) = information(observations, motion, &tangent, &nu, 0.0).cholesky() else { return false };
     value.dot(&factor.solve(&value)) < CONSISTENT
 }

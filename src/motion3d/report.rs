@@ -1,6 +1,5 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
-use super::bend::{bent, narrowed};
 use super::contact::Rates;
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
@@ -11,9 +10,11 @@ use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use super::smoothing::DepthSmoother;
 use super::special::RotationOnly;
 use super::together::{Weighted, together};
 use super::turned::HalfWay;
+use super::valley::Valley;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 
 /// A motion found on the inliers.
@@ -29,6 +30,8 @@ pub(super) struct Solution {
     smooth: Option<Vec<f64>>,
     variance: Option<Vec<f64>>,
     fell_back: bool,
+    /// Whether the covariance is the mean square error of maximum likelihood as a better solution has it.
+    departed: bool,
 }
 
 impl Solution {
@@ -51,6 +54,7 @@ impl Solution {
             smooth: None,
             variance: None,
             fell_back: wanted && improved.is_none(),
+            departed: false,
         };
         match improved {
             Some(improved) if wanted => Self {
@@ -61,32 +65,36 @@ impl Solution {
                 variance: improved.variance,
                 ..plain
             },
-            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
+            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), departed: true, ..plain },
             None => plain,
         }
     }
 
-    /// Takes into the covariance what a linear theory of independent points leaves out: the bend of the valley that the direction lies in, what a narrow field adds, and errors that go together over a length, in the unit of the points.
-    pub fn widen(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
-        let Some(mut covariance) = self.covariance else { return };
-        if let Some(nu) = &self.smooth {
-            covariance = bent(&covariance, inliers, &self.motion, &self.tangent, nu);
-        }
-        covariance = narrowed(&covariance, inliers);
-        self.covariance = match length.filter(|length| *length > 0.0) {
-            Some(length) => {
-                let own;
-                let nu = if let Some(smooth) = &self.smooth {
-                    smooth
-                } else {
-                    own = depths(inliers, &self.motion).nu;
-                    &own
-                };
-                let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu };
-                together(&covariance, inliers, &at, flow, length)
-            }
-            None => Some(covariance),
+    /// Takes into the covariance what a valley that bends and widens adds, see [`valley`](super::valley).
+    pub fn lengthen(&mut self, inliers: &Observations, smoother: impl Fn() -> DepthSmoother) {
+        let Some(covariance) = self.covariance.filter(|_| !self.departed) else { return };
+        let valley = Valley { observations: inliers, motion: &self.motion, tangent: &self.tangent };
+        let mut made = None;
+        let longer = valley.lengthened(&covariance, |motion: &Motion| match (&self.smooth, &self.variance) {
+            (None, _) => depths(inliers, motion).nu,
+            (Some(known), None) => known.clone(),
+            (Some(_), Some(_)) => made.get_or_insert_with(&smoother).smooth(&depths(inliers, motion)).nu,
+        });
+        self.covariance = Some(longer);
+    }
+
+    /// Takes errors into the covariance that go together over a length, in the unit of the points.
+    pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
+        let (Some(covariance), Some(length)) = (self.covariance, length.filter(|length| *length > 0.0)) else { return };
+        let own;
+        let nu = if let Some(smooth) = &self.smooth {
+            smooth
+        } else {
+            own = depths(inliers, &self.motion).nu;
+            &own
         };
+        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu };
+        self.covariance = together(&covariance, inliers, &at, flow, length);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::intake::Intake;
 use super::kernels::{Depths, depths};
 use super::motion::{Motion, Rows};
-use super::observations::Observations;
+use super::observations::{Observations, ROUNDING};
 use super::refine::{Effort, refine};
 use super::turned::HalfTurn;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -35,6 +35,10 @@ const TURNS: usize = 5;
 
 /// Deviations of a standard normal that a share of 0.001 lies beyond.
 const RARE: f64 = 3.0902;
+
+/// Standard deviations by which the best of all directions explains pure noise better than any one would, and a margin; what few points add to that.
+const SEARCHED: f64 = 5.5;
+const FEW_POINTS: f64 = 12.0;
 
 /// How far, in standard deviations, a chi-squared value of `degrees` degrees of freedom lies from its expectation (E. Wilson, M. Hilferty 1931: its cube root is nearly normal).
 pub(super) fn chi2_deviation(chi2: f64, degrees: f64) -> f64 {
@@ -88,6 +92,24 @@ pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
         covariance,
         chi2,
     })
+}
+
+/// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.
+pub(super) fn turning(observations: &Observations) -> Option<RotationOnly> {
+    let rotation = rotation_only(observations)?;
+    by_chance(rotation.chi2, (2 * observations.n - 3) as f64 / observations.shared).then_some(rotation)
+}
+
+/// The same where the noise is to be estimated: `cost` is what the best motion leaves.
+///
+/// If there were no translation, that would take no more away than the same share of any noise, and what the choice of a direction takes.
+pub(super) fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
+    let rotation = rotation_only(observations)?;
+    let n = observations.n as f64;
+    let sigma2 = rotation.chi2 / (2.0 * n - 3.0);
+    let left = cost / (n - 5.0).max(1.0);
+    let none = rotation.chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
+    (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
 /// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n| u`.

@@ -43,7 +43,7 @@ pub(super) fn together(
     flow: &Flow<'_>,
     length: f64,
 ) -> Option<Matrix5> {
-    let squares = information(inliers, at.motion, at.tangent, at.nu);
+    let squares = information(inliers, at.motion, at.tangent, at.nu, 0.0);
     let excess = excess(inliers, at, flow, length);
     let l = squares.cholesky()?.l();
     let back = l.try_inverse()?;

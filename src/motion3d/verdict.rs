@@ -29,12 +29,6 @@ pub(super) const SPACING: f64 = 4.0;
 /// The same in the estimate's own deviations, for directions that the smoothed weights do not exclude.
 const CONSISTENT: f64 = 3.0;
 
-/// Standard deviation of the direction, degrees, up to which a covariance tells the shape of what is not known: the theory is linear.
-const LINEAR: f64 = 8.0;
-
-/// Fewer points are known to tell little; what they tell is not judged by the linear theory alone.
-const MANY: usize = 100;
-
 /// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
 
@@ -103,7 +97,7 @@ pub(super) fn judge(
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
         Status::Ambiguous
-    } else if evidence.low || (deviation > LINEAR && inliers.n >= MANY) {
+    } else if evidence.low {
         Status::LowSnr
     } else {
         Status::Ok

@@ -14,6 +14,19 @@ struct WeightSums<'a> {
     motion: &'a Motion,
     tangent: &'a Matrix2x3<f64>,
     floor: f64,
+    /// `kappa^2`, the largest variance of the direction: weights are damped within that of the epipole.
+    spread: f64,
+}
+
+/// `1 / (s^2 + g kappa^2)` with `g = |G|^2 / 2`, and nothing at the epipole: what damped weights have for `1 / s^2`.
+#[inline(always)]
+fn damped<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, s2: V, floor: V, half_spread: V) -> V {
+    let mut size = V::zero();
+    for p in 0..6 {
+        let g: V = at(planes, p, i);
+        size = g.mul_add(g, size);
+    }
+    V::select(floor.lt(s2), V::constant(1.0) / size.mul_add(half_spread, s2), V::zero())
 }
 
 impl WeightSums<'_> {
@@ -42,13 +55,16 @@ impl Kernel<f64> for WeightSums<'_> {
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 15] {
         let motion = Everywhere::<V>::new(self.motion);
         let axes = both_axes(self.tangent);
-        let floor = V::splat(self.floor);
+        let (floor, half_spread) = (V::splat(self.floor), V::splat(0.5 * self.spread));
         let mut sums = [V::zero(); 15];
         for i in (0..self.planes[0].len()).step_by(V::LANES) {
             let (seen, d) = Self::row(&self.planes, self.nu, i, &motion, &axes, floor);
+            // Each of both weights is damped: `s^2 / (s^2 + g kappa^2)`.
+            let inverse = damped(&self.planes, i, seen.s2, floor, half_spread);
+            let both = inverse * inverse * seen.s2;
             let mut k = 0;
             for row in 0..5 {
-                let weighted = d[row] * seen.inverse;
+                let weighted = d[row] * both;
                 for column in row..5 {
                     sums[k] = weighted.mul_add(d[column], sums[k]);
                     k += 1;
@@ -59,17 +75,18 @@ impl Kernel<f64> for WeightSums<'_> {
     }
 }
 
-/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights.
+/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights, which are damped within `kappa^2 = spread` of the epipole.
 pub(in super::super) fn information(
     observations: &Observations,
     motion: &Motion,
     tangent: &Matrix2x3<f64>,
     nu: &[f64],
+    spread: f64,
 ) -> SMatrix<f64, 5, 5> {
     let sums = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
         let nu = &nu[range];
-        dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor })
+        dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread })
     });
     let mut h = SMatrix::<f64, 5, 5>::zeros();
     for (value, &(i, j)) in sums.iter().zip(&UPPER) {
@@ -95,10 +112,10 @@ impl Kernel<f64> for SlopeSums<'_> {
     type Output = [f64; SLOPES];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; SLOPES] {
-        let WeightSums { planes, nu, motion, tangent, floor } = self.weights;
+        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.weights;
         let motion = Everywhere::<V>::new(motion);
         let axes = both_axes(tangent);
-        let floor = V::splat(floor);
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
         let mut sums = [V::zero(); SLOPES];
         for i in (0..planes[0].len()).step_by(V::LANES) {
             let (seen, [pulled, pushed, ..]) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
@@ -107,12 +124,13 @@ impl Kernel<f64> for SlopeSums<'_> {
             // The noise of the own depth is in both factors, as far as it is in the weight.
             let own = seen.along * seen.inverse;
             let both = V::load(&nu[i..]).mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
-            let psi = both * seen.inverse;
+            let weight = damped(&planes, i, seen.s2, floor, half_spread);
+            let psi = both * weight;
             sums[0] = (psi * a).mul_add(a, sums[0]);
             sums[1] = (psi * a).mul_add(b, sums[1]);
             sums[2] = (psi * b).mul_add(b, sums[2]);
-            let (own_a, own_b) = (own * a * seen.inverse, own * b * seen.inverse);
-            let (weight_a, weight_b) = (pulled * seen.inverse, pushed * seen.inverse);
+            let (own_a, own_b) = (own * a * weight, own * b * weight);
+            let (weight_a, weight_b) = (pulled * weight, pushed * weight);
             let mut k = 15;
             for row in 0..3 {
                 let q = seen.q[row];
@@ -120,7 +138,7 @@ impl Kernel<f64> for SlopeSums<'_> {
                 sums[6 + row] = weight_b.mul_add(q, sums[6 + row]);
                 sums[9 + row] = own_a.mul_add(q, sums[9 + row]);
                 sums[12 + row] = own_b.mul_add(q, sums[12 + row]);
-                let weighted = q * seen.inverse;
+                let weighted = q * weight;
                 for column in row..3 {
                     sums[k] = weighted.mul_add(seen.q[column], sums[k]);
                     k += 1;
@@ -131,17 +149,19 @@ impl Kernel<f64> for SlopeSums<'_> {
     }
 }
 
-/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without bias: true depths are taken from the points' own flow, of which `share` is in `nu`.
+/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without bias: true depths are taken from the points' own flow, of which `share` is in `nu`. Weights are damped within `kappa^2 = spread` of the epipole.
 pub(in super::super) fn slope(
     observations: &Observations,
     motion: &Motion,
     tangent: &Matrix2x3<f64>,
     nu: &[f64],
     share: &[f64],
+    spread: f64,
 ) -> SMatrix<f64, 5, 5> {
     let sums = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
-        let weights = WeightSums { planes, nu: &nu[range.clone()], motion, tangent, floor: observations.floor };
+        let nu = &nu[range.clone()];
+        let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
         dispatch(observations.level, SlopeSums { weights, share: &share[range] })
     });
     let mut slope = SMatrix::<f64, 5, 5>::zeros();
@@ -162,11 +182,7 @@ pub(in super::super) fn slope(
 }
 
 /// `sum V^t h` of the bilinear residual `s e = sum_i u_i (h_i0 + sum_j h_ij w_j)`.
-struct BilinearSums<'a> {
-    weights: WeightSums<'a>,
-    /// `kappa^2`, the largest variance of the direction.
-    spread: f64,
-}
+struct BilinearSums<'a>(WeightSums<'a>);
 
 const BILINEAR_SUMS: usize = 60;
 
@@ -174,24 +190,17 @@ impl Kernel<f64> for BilinearSums<'_> {
     type Output = [f64; BILINEAR_SUMS];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; BILINEAR_SUMS] {
-        let WeightSums { planes, nu, motion, tangent, floor } = self.weights;
+        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.0;
         let motion = Everywhere::<V>::new(motion);
         let axes = both_axes(tangent);
-        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * self.spread));
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
         let mut sums = [[V::zero(); 12]; 5];
         for i in (0..planes[0].len()).step_by(V::LANES) {
             let (seen, d) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
-            let mut g = [V::zero(); 6];
-            let mut size = V::zero();
-            for p in 0..6 {
-                g[p] = at(&planes, p, i);
-                size = g[p].mul_add(g[p], size);
-            }
             // V = W s / (s^2 + g kappa^2), and nothing at the epipole.
-            let damped = size.mul_add(half_spread, seen.s2);
-            let scale = V::select(floor.lt(seen.s2), V::constant(1.0) / damped, V::zero());
+            let scale = damped(&planes, i, seen.s2, floor, half_spread);
             for c in 0..3 {
-                let column = [g[c], g[3 + c]];
+                let column: [V; 2] = [at(&planes, c, i), at(&planes, 3 + c, i)];
                 let mut h = [turn(&column, at(&planes, 12, i), at(&planes, 13, i)) * scale; 4];
                 for j in 0..3 {
                     h[1 + j] = -turn(&column, at(&planes, 6 + j, i), at(&planes, 9 + j, i)) * scale;
@@ -229,8 +238,9 @@ impl Bilinear {
     ) -> Self {
         let sums = over_chunks(observations, |range| {
             let planes = observations.slices(&range);
-            let weights = WeightSums { planes, nu: &nu[range], motion, tangent, floor: observations.floor };
-            dispatch(observations.level, BilinearSums { weights, spread })
+            let nu = &nu[range];
+            let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
+            dispatch(observations.level, BilinearSums(weights))
         });
         Self { sums, prior: observations.prior }
     }

@@ -8,7 +8,7 @@ use crate::math::random::CounterRng;
 
 /// The noise of all points if all obey one motion.
 pub(super) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64> {
-    let best = minima(observations, rng.stream(20)).first()?.equations.cost;
+    let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0)
 }

@@ -81,7 +81,7 @@ fn one_unknown_has_its_closed_forms() {
     let tangent = super::super::motion::tangents(&motion.u());
     let mut nu = depths.clone();
     nu.resize(observations.stride, 0.0);
-    let m = super::super::kernels::information(&observations, &motion, &tangent, &nu);
+    let m = super::super::kernels::information(&observations, &motion, &tangent, &nu, 0.0);
     let p = super::super::kernels::equations(&observations, &motion, &tangent, None).p;
     // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
     let axis = usize::from(tangent[(1, 1)].abs() > 0.5);

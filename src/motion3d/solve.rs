@@ -1,0 +1,218 @@
+//! From the points that obey one motion to what is told about it.
+
+use super::covariance::{Plugged, direction_deviation, plugged};
+use super::departure::beyond_theory;
+use super::displaced::{matters, settle};
+use super::efficient::{Efficient, WeightDepths, unsolved};
+use super::estimate::Scaled;
+use super::intake::Intake;
+use super::likelihood::{Candidate, choose, different, minima};
+use super::motion::Motion;
+use super::observations::Observations;
+use super::options::{Method, MotionOptions};
+use super::refine::{Effort, Minimum, refine};
+use super::report::{Solution, report, rotation_report};
+use super::result::{Alternative, MotionEstimate, Status};
+use super::robust::{self, Consensus, Rival};
+use super::selected::of_estimated_noise;
+use super::smoothing::DepthSmoother;
+use super::special::{by_chance, turning, turning_in_unknown_noise};
+use super::trial::{DISTINCT, Trial, close, smoothed};
+use super::verdict::{Evidence, judge};
+use crate::math::random::CounterRng;
+use rayon::prelude::*;
+
+/// Number of points from which on [`Method::Auto`] smooths depths.
+const SMOOTHED: usize = 30;
+
+/// Times that a minimum is chosen anew once its own rotation is taken out of displacements.
+const CHOICES: usize = 4;
+
+/// The points that obey one motion, and what is asked of them.
+pub(super) struct Task<'a, 'b> {
+    pub intake: &'a Intake<'b>,
+    pub options: &'a MotionOptions,
+    /// What a robust search found.
+    pub known: Option<&'a Consensus>,
+    pub rng: CounterRng,
+}
+
+/// A motion with what speaks for and against it.
+struct Solved {
+    solution: Solution,
+    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
+    deviation: f64,
+    low: bool,
+    undecided: Option<Alternative>,
+}
+
+impl Task<'_, '_> {
+    /// Estimates on the `inliers` of all points.
+    pub fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
+        let flow = self.intake.flow;
+        let mut found = self.begin(&inliers, scaled.unknown);
+        let Some(&first) = found.first() else {
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
+        };
+        settle(self.intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
+        if let Some(told) = self.without_translation(scaled, &mut inliers, found[0].equations.cost) {
+            return told;
+        }
+        if scaled.unknown {
+            let sigma = (found[0].equations.cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
+            rescaled(scaled, &mut inliers, sigma);
+            found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::FULL)).collect();
+        }
+        let (candidates, made) = self.chosen(scaled, &mut inliers, found);
+        let mut solved = self.solved(&inliers, &candidates, made);
+        self.widen(&mut solved.solution, &inliers, scaled.unknown, candidates[0].minimum.equations.cost);
+        solved.solution.alternatives = close(&candidates, inliers.n)[1..]
+            .iter()
+            .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
+            .collect();
+        let rivals: &[Rival] = self.known.map_or(&[], |known| &known.rivals);
+        let Solved { mut solution, deviation, low, undecided } = solved;
+        let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
+        let evidence = Evidence { likelihood, deviation, low, rivals, undecided };
+        judge(self.intake, &inliers, &mut solution, &evidence, self.rng.stream(4));
+        report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
+    }
+
+    /// The minima of the likelihood.
+    fn begin(&self, inliers: &Observations, unknown: bool) -> Vec<Minimum> {
+        match (&self.options.initial, self.known) {
+            (Some(initial), _) => {
+                let initial = Motion::new(initial.translation, initial.rotation);
+                vec![refine(inliers, initial, None, Effort::FULL)]
+            }
+            (None, None) => minima(inliers, unknown, self.rng.stream(2)),
+            (None, Some(known)) => again(inliers, known),
+        }
+    }
+
+    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves. (Of all points in known noise that was asked before any motion was looked for.)
+    fn without_translation(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        cost: f64,
+    ) -> Option<MotionEstimate> {
+        let rotation = if scaled.unknown {
+            let rotation = turning_in_unknown_noise(inliers, cost)?;
+            let sigma = (rotation.chi2 / (2 * inliers.n - 3) as f64).sqrt();
+            rotation.in_units(rescaled(scaled, inliers, sigma))
+        } else if self.options.robust {
+            turning(inliers)?
+        } else {
+            return None;
+        };
+        Some(rotation_report(self.intake.flow, &scaled.observations, inliers, &rotation, scaled.sigma))
+    }
+
+    /// The minima in the order of preference; the first has its own rotation taken out of the points.
+    fn chosen(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        mut found: Vec<Minimum>,
+    ) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        let (mut candidates, mut made) = self.preferred(inliers, &found);
+        for _ in 0..CHOICES {
+            let lead = candidates[0].minimum;
+            if !matters(self.intake, inliers, &lead.motion) {
+                return (candidates, made);
+            }
+            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+            (candidates, made) = self.preferred(inliers, &found);
+        }
+        // Each of two is preferred with the rotation of the other taken out: that whose own is out now is told.
+        if let Some(own) = candidates.iter().position(|other| !matters(self.intake, inliers, other.motion())) {
+            candidates[..=own].rotate_right(1);
+        }
+        (candidates, made)
+    }
+
+    fn preferred(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        if self.options.initial.is_some() {
+            let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
+            return (found.iter().map(given).collect(), None);
+        }
+        choose(inliers, found, || self.smoother(inliers))
+    }
+
+    fn smoother(&self, inliers: &Observations) -> DepthSmoother {
+        DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
+    }
+
+    /// Maximum likelihood's motion or that of the smoothed weights, which are asked as well where maximum likelihood's theory does not hold.
+    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solved {
+        let chosen = candidates[0];
+        let wanted = match self.options.method {
+            Method::Auto => inliers.n >= SMOOTHED,
+            Method::Efficient => true,
+            Method::MaximumLikelihood => false,
+        };
+        let plugged = plugged(&chosen.minimum.equations);
+        let low = plugged.is_none();
+        let several = close(candidates, inliers.n).len() > 1;
+        let astray = plugged.as_ref().is_some_and(|plugged| beyond_theory(inliers, &chosen.minimum, plugged));
+        let trial = if wanted || low || several || astray {
+            smoothed(inliers, self.options, candidates, made, || self.smoother(inliers))
+        } else {
+            None
+        };
+        let (improved, mut undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
+        if let Some(best) = improved.as_ref().filter(|_| !wanted) {
+            undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
+        }
+        let improved = improved.filter(|_| wanted || low || astray);
+        let unknown = low && improved.is_none();
+        let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
+        if unknown {
+            let mut smoother = self.smoother(inliers);
+            let at = unsolved(inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
+            solution.covariance = at.map(|at| at.covariance);
+        }
+        let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+        Solved { solution, deviation, low, undecided }
+    }
+
+    /// Takes into the covariance what a linear theory of independent points of known noise leaves out. `cost`: what maximum likelihood leaves.
+    fn widen(&self, solution: &mut Solution, inliers: &Observations, unknown: bool, cost: f64) {
+        solution.lengthen(inliers, || self.smoother(inliers));
+        solution.go_together(inliers, self.intake.flow, self.options.correlation_length);
+        let strays = self.known.map_or(1.0, |known| robust::with_strays(inliers, known, &solution.motion));
+        let noise = if unknown { of_estimated_noise(inliers.n, self.known.is_some()) } else { misfit(inliers, cost) };
+        solution.covariance = solution.covariance.map(|covariance| covariance * (strays * noise));
+    }
+}
+
+/// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it: whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was missed), the motion is off by as much (R. Birge 1932).
+fn misfit(inliers: &Observations, cost: f64) -> f64 {
+    let free = inliers.n.saturating_sub(5) as f64 / inliers.shared;
+    if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
+}
+
+/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may be true.
+fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
+    let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+    let deviation = deviation.max(direction_deviation(&best.covariance));
+    let apart = best.motion.angle_to(chosen.motion()).to_degrees() > DISTINCT * deviation;
+    apart.then_some(Alternative { motion: best.motion, excess: 0.0 })
+}
+
+/// The minimum that a robust search led to, and those that other minima for the same points lead to.
+fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
+    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
+    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())
+}
+
+/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
+fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
+    let before = scaled.sigma;
+    scaled.take(sigma);
+    let factor = before / scaled.sigma;
+    inliers.rescale(factor);
+    factor
+}

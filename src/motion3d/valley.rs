@@ -1,0 +1,226 @@
+//! What a covariance leaves out where the direction is known to a large share of the field only.
+//!
+//! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with them what the points tell, change: an estimate that is off may seem to know the motion much better than one that is right. So the confidence
+//! interval of that one unknown is looked for where it ends: where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the place only, not an estimate there).
+//! The deviation that has these ends is told, with the bend of the valley that they show, and with what the other unknowns are known to there.
+
+use super::covariance::{Matrix5, direction_block, direction_deviation, inverse};
+use super::departure::among;
+use super::kernels::{Bilinear, information};
+use super::motion::Motion;
+use super::observations::Observations;
+use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
+
+/// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where the epipole may lie among the points.
+const STRAIGHT: f64 = 0.08;
+const STRAIGHT_AMONG: f64 = 0.03;
+
+/// The 0.95 quantile of chi squared with one degree of freedom.
+const END: f64 = 3.841;
+
+/// Most places that an end is looked for at, how near its square deviation is to be, and the longest step from one to the next.
+const PLACES: usize = 6;
+const NEAR: f64 = 0.1;
+const LONGEST: f64 = 2.0;
+
+/// The farthest that is looked, rad: farther the direction is not known.
+const FARTHEST: f64 = 1.0;
+
+/// Most steps towards the valley's floor, and the length of one that is the last, rad.
+const STEPS: usize = 15;
+const STEP: f64 = 1e-9;
+
+/// Mean fourth power of a normal variable of variance 1.
+const KURTOSIS: f64 = 3.0;
+
+/// Weight of each end in a mean over the valley (Simpson's rule, whose ends lie at `sqrt 3` deviations).
+const SIMPSON: f64 = 1.0 / 6.0;
+
+type Vector4 = SMatrix<f64, 4, 1>;
+type Vector5 = SMatrix<f64, 5, 1>;
+
+/// An estimate whose covariance is asked.
+pub(super) struct Valley<'a> {
+    pub observations: &'a Observations,
+    pub motion: &'a Motion,
+    pub tangent: &'a Matrix2x3<f64>,
+}
+
+/// One end of the confidence interval along an axis, in units of the axes there.
+struct End {
+    /// How far the direction is off along the axis.
+    psi: f64,
+    /// The other unknowns that suit it.
+    rest: Vector4,
+    /// Their covariance at that place.
+    covariance: Matrix4<f64>,
+}
+
+impl Valley<'_> {
+    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion.
+    pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> Matrix5 {
+        let deviation = direction_deviation(covariance);
+        let share = deviation.to_radians() / spread(&self.observations.site);
+        if !share.is_finite() || share < STRAIGHT_AMONG {
+            return *covariance;
+        }
+        let inside = among(self.observations, self.motion, deviation);
+        if !inside && share < STRAIGHT {
+            return *covariance;
+        }
+        let mut out = *covariance;
+        // The axis that is known least; where the epipole may lie among the points each axis is a valley.
+        for rank in 0..if inside { 2 } else { 1 } {
+            if let Some(longer) = self.along(&out, covariance, rank, &mut weights) {
+                out = longer;
+            }
+        }
+        out
+    }
+
+    /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors the one with the larger value is number 0.
+    fn along(
+        &self,
+        so_far: &Matrix5,
+        first: &Matrix5,
+        rank: usize,
+        weights: &mut impl FnMut(&Motion) -> Vec<f64>,
+    ) -> Option<Matrix5> {
+        let eigen = SymmetricEigen::new(direction_block(first));
+        let mut axes = eigen.eigenvectors.transpose();
+        if (eigen.eigenvalues.imax() == 1) != (rank == 1) {
+            axes.swap_rows(0, 1);
+        }
+        let mut into = Matrix5::identity();
+        into.fixed_view_mut::<2, 2>(0, 0).copy_from(&axes);
+        let covariance = into * so_far * into.transpose();
+        let along = axes * self.tangent;
+        let variance = covariance[(0, 0)];
+        let slope: Vector4 = covariance.fixed_view::<4, 1>(1, 0) / variance;
+        let nu = weights(self.motion);
+        let here = others(&information(self.observations, self.motion, &along, &nu, 0.0))?;
+        let mut ends = [1.0, -1.0].map(|sign| self.end(&along, &slope, sign * variance.sqrt(), weights));
+        let found: Vec<End> = ends.iter_mut().filter_map(Option::take).collect();
+        if found.is_empty() {
+            return None;
+        }
+        let count = found.len() as f64;
+        let square: f64 = found.iter().map(|end| end.psi * end.psi).sum::<f64>() / count;
+        let longer = (square / END).max(variance);
+        let mut line = Vector5::zeros();
+        line[0] = 1.0;
+        line.fixed_rows_mut::<4>(1).copy_from(&slope);
+        let mut out = covariance + line * line.transpose() * (longer - variance);
+        let mut rest = out.fixed_view_mut::<4, 4>(1, 1);
+        for end in &found {
+            // The bend that this end shows, `c = bend / psi^2`, of a normal `psi` of the new variance.
+            let bend = (end.rest - slope * end.psi) * (longer / (end.psi * end.psi));
+            rest += bend * bend.transpose() * (KURTOSIS / count);
+            rest += (end.covariance - here) * (2.0 * SIMPSON / count);
+        }
+        let out = into.transpose() * out * into;
+        let out = 0.5 * (out + out.transpose());
+        inverse(&out).map(|_| out)
+    }
+
+    /// Where the score along the first axis is [`END`], on the side of `deviation`.
+    fn end(
+        &self,
+        axes: &Matrix2x3<f64>,
+        slope: &Vector4,
+        deviation: f64,
+        weights: &mut impl FnMut(&Motion) -> Vec<f64>,
+    ) -> Option<End> {
+        let mut psi = deviation * END.sqrt();
+        let mut rest = slope * psi;
+        for place in 1.. {
+            let (there, score) = self.at(axes, psi, rest, weights)?;
+            let longer = (END / score).sqrt().clamp(1.0 / LONGEST, LONGEST);
+            let next = (psi * longer).clamp(-FARTHEST, FARTHEST);
+            // The bend is carried on as a square.
+            rest = slope * next + (there.rest - slope * psi) * (next / psi).powi(2);
+            let settled = (longer - 1.0).abs() < NEAR || next == psi;
+            if settled || place == PLACES {
+                // An error of the direction is told as its part along the axes.
+                let scale = 1.0 / self.off(axes, next, rest[0]).norm();
+                rest[0] *= scale;
+                return Some(End { psi: next * scale, rest, ..there });
+            }
+            psi = next;
+        }
+        None
+    }
+
+    /// The direction that is off by so much, of any length.
+    fn off(&self, axes: &Matrix2x3<f64>, psi: f64, across: f64) -> Vector3<f64> {
+        self.motion.u() + axes.transpose() * Vector2::new(psi, across)
+    }
+
+    /// The other unknowns and the score, chi squared with one degree of freedom, where the direction is off by `psi`.
+    fn at(
+        &self,
+        axes: &Matrix2x3<f64>,
+        psi: f64,
+        guess: Vector4,
+        weights: &mut impl FnMut(&Motion) -> Vec<f64>,
+    ) -> Option<(End, f64)> {
+        // Of any length: the equation's root does not depend on that, and so is solved by Newton's steps as it stands.
+        let moved = |rest: &Vector4| {
+            let turn = Vector3::new(rest[1], rest[2], rest[3]);
+            Motion::of(&self.off(axes, psi, rest[0]), &(self.motion.w() + turn))
+        };
+        let start = moved(&guess).normalized();
+        let there = carried(axes, &start.u());
+        let nu = weights(&start);
+        let equation = Bilinear::new(self.observations, &start, &there, &nu, 0.0);
+        let rest = floor(&equation, axes, guess, &moved)?;
+        let motion = moved(&rest).normalized();
+        let squares = information(self.observations, &motion, &there, &nu, 0.0);
+        let (value, _) = equation.at(&motion, &there);
+        let score = value[0] * value[0] * inverse(&squares)?[(0, 0)];
+        (score > 0.0 && score.is_finite()).then_some((End { psi, rest, covariance: others(&squares)? }, score))
+    }
+}
+
+/// The axes where the direction is `u`.
+fn carried(axes: &Matrix2x3<f64>, u: &Vector3<f64>) -> Matrix2x3<f64> {
+    let first = axes.row(0).transpose();
+    let first = (first - u * u.dot(&first)).normalize();
+    Matrix2x3::from_rows(&[first.transpose(), u.cross(&first).transpose()])
+}
+
+/// The covariance of the others where the first unknown is given.
+fn others(information: &Matrix5) -> Option<Matrix4<f64>> {
+    information.fixed_view::<4, 4>(1, 1).into_owned().cholesky().map(|factor| factor.inverse())
+}
+
+/// The other unknowns that solve their equations.
+fn floor(
+    equation: &Bilinear,
+    axes: &Matrix2x3<f64>,
+    guess: Vector4,
+    moved: &impl Fn(&Vector4) -> Motion,
+) -> Option<Vector4> {
+    let mut rest = guess;
+    for _ in 0..STEPS {
+        let (value, slope) = equation.at(&moved(&rest), axes);
+        let slope = slope.fixed_view::<4, 4>(1, 1).into_owned();
+        let change = slope.lu().solve(&-value.fixed_rows::<4>(1).into_owned())?;
+        if !change.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        rest += change;
+        if change.norm() < STEP {
+            return Some(rest);
+        }
+    }
+    None
+}
+
+/// Root mean square distance of points from their middle.
+fn spread(points: &[[f64; 3]]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&[f64; 3]) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let square: f64 = (0..3).map(|axis| mean(&|at| at[axis] * at[axis]) - mean(&|at| at[axis]).powi(2)).sum();
+    square.max(0.0).sqrt()
+}
