@@ -5,6 +5,7 @@ use super::kernels::{Bilinear, depths, information, slope};
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::smoothing::{DepthSmoother, Smoothed};
+use super::valley::Valley;
 use nalgebra::{Matrix2x3, SymmetricEigen};
 
 /// Times that depths are smoothed and the equation is solved.
@@ -31,6 +32,20 @@ pub(super) struct Efficient {
     pub smooth: Vec<f64>,
     /// Their posterior variances; `None` of depths from elsewhere.
     pub variance: Option<Vec<f64>>,
+}
+
+impl Efficient {
+    /// The covariance with what a valley that bends and widens adds.
+    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> Matrix5 {
+        let valley = Valley { observations, motion: &self.motion, tangent: &self.tangent };
+        let mut made = None;
+        valley.lengthened(&self.covariance, |motion: &Motion| {
+            if self.variance.is_none() {
+                return self.smooth.clone();
+            }
+            made.get_or_insert_with(&smoother).smooth(&depths(observations, motion)).nu
+        })
+    }
 }
 
 /// Where weights have their depths from.

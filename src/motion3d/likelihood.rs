@@ -42,16 +42,30 @@ impl Candidate {
     }
 }
 
+/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other, where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
+const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
+
 /// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the best minimum leaves more than that, it is looked for from more starts.
 pub(super) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
-    let searched = Searched::new(observations, rng.stream(0));
-    let found = refined(observations, searched.starts(), rng);
+    let longest = observations.longest();
+    let rounder: Vec<Observations> =
+        RATIOS.iter().filter(|ratio| **ratio < longest).map(|&ratio| observations.rounded(ratio)).collect();
+    let first = rounder.first().unwrap_or(observations);
+    let searched = Searched::new(first, rng.stream(0));
+    let led = |starts: Vec<Motion>| {
+        let mut starts = starts;
+        for points in &rounder {
+            starts = refined(points, starts, rng).iter().map(|minimum| minimum.motion).collect();
+        }
+        refined(observations, starts, rng)
+    };
+    let found = led(searched.starts());
     let free = observations.n.saturating_sub(5) as f64 / observations.shared;
     let noise = |best: &Minimum| by_chance(best.equations.cost, free);
     if unknown || free <= 0.0 || found.first().is_none_or(noise) {
         return found;
     }
-    different(found.into_iter().chain(refined(observations, searched.further(), rng)).collect())
+    different(found.into_iter().chain(led(searched.further())).collect())
 }
 
 /// The minima that starts lead to.

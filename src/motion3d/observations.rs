@@ -5,7 +5,7 @@ use super::motion::Rows;
 use super::options::RotationPrior;
 use super::turned::HalfTurn;
 use crate::simd::Level;
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
@@ -19,6 +19,10 @@ const EPIPOLE: f64 = 1e-9;
 
 /// Residuals below this share of the flow are rounding.
 pub(super) const ROUNDING: f64 = 1e-11;
+
+/// Points that are asked how far their noise is from round, and the share of them of which that is told.
+const ENOUGH: usize = 1000;
+const FAR_FROM_ROUND: f64 = 0.9;
 
 /// One point: `f = nu G u + R w + noise` with unit covariance.
 #[derive(Debug, Clone, Copy)]
@@ -172,6 +176,38 @@ impl Observations {
             turn: self.turn,
             units: self.units,
         }
+    }
+
+    /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with little of it.
+    fn stretch(&self, k: usize) -> (f64, Vector2<f64>) {
+        let g = self.row(k).g;
+        // Rows of whitened points are stretched along the axis with little noise.
+        let eigen = SymmetricEigen::new(g * g.transpose());
+        let most = eigen.eigenvalues.imax();
+        let stretch = (eigen.eigenvalues[most] / eigen.eigenvalues[1 - most]).sqrt();
+        (stretch, eigen.eigenvectors.column(most).into_owned())
+    }
+
+    /// How many times as large noise is along one axis as along the other, of all but a tenth of the points at most.
+    pub fn longest(&self) -> f64 {
+        let few = (0..self.n).step_by(self.n.div_ceil(ENOUGH).max(1));
+        let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
+        quantile(&mut stretches, FAR_FROM_ROUND)
+    }
+
+    /// The same points where no point's noise is more than `ratio` times as large along one axis as along the other: the smaller deviation is taken to be larger.
+    pub fn rounded(&self, ratio: f64) -> Self {
+        let mut out = self.clone();
+        for k in 0..self.n {
+            let (stretch, axis) = self.stretch(k);
+            if stretch > ratio {
+                let row = self.row(k);
+                let less = Matrix2::identity() - axis * axis.transpose() * (1.0 - ratio / stretch);
+                let rounder = Row { g: less * row.g, r: less * row.r, f: less * row.f };
+                rounder.values().iter().enumerate().for_each(|(p, value)| out.planes[p * self.stride + k] = *value);
+            }
+        }
+        out
     }
 
     /// Measures in other units of noise: everything times `factor`.

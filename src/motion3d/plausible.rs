@@ -21,6 +21,9 @@ const CONSISTENT: f64 = 5.99;
 /// Deviations that chance may add to a difference of `J`.
 const CHANCE: f64 = 2.0;
 
+/// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
+const COMPARED: usize = 12;
+
 /// Angles to the estimate, degrees, beyond which a direction is asked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Farther {
@@ -66,6 +69,7 @@ pub(super) fn plausible_beyond(
         return true;
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    doubts.truncate(COMPARED);
     as_likely(searched, &known, &doubts, rng.stream(1))
 }
 

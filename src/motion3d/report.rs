@@ -10,11 +10,9 @@ use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use super::smoothing::DepthSmoother;
 use super::special::RotationOnly;
 use super::together::{Weighted, together};
 use super::turned::HalfWay;
-use super::valley::Valley;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
 
 /// A motion found on the inliers.
@@ -30,8 +28,6 @@ pub(super) struct Solution {
     smooth: Option<Vec<f64>>,
     variance: Option<Vec<f64>>,
     fell_back: bool,
-    /// Whether the covariance is the mean square error of maximum likelihood as a better solution has it.
-    departed: bool,
 }
 
 impl Solution {
@@ -54,7 +50,6 @@ impl Solution {
             smooth: None,
             variance: None,
             fell_back: wanted && improved.is_none(),
-            departed: false,
         };
         match improved {
             Some(improved) if wanted => Self {
@@ -65,22 +60,9 @@ impl Solution {
                 variance: improved.variance,
                 ..plain
             },
-            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), departed: true, ..plain },
+            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
             None => plain,
         }
-    }
-
-    /// Takes into the covariance what a valley that bends and widens adds, see [`valley`](super::valley).
-    pub fn lengthen(&mut self, inliers: &Observations, smoother: impl Fn() -> DepthSmoother) {
-        let Some(covariance) = self.covariance.filter(|_| !self.departed) else { return };
-        let valley = Valley { observations: inliers, motion: &self.motion, tangent: &self.tangent };
-        let mut made = None;
-        let longer = valley.lengthened(&covariance, |motion: &Motion| match (&self.smooth, &self.variance) {
-            (None, _) => depths(inliers, motion).nu,
-            (Some(known), None) => known.clone(),
-            (Some(_), Some(_)) => made.get_or_insert_with(&smoother).smooth(&depths(inliers, motion)).nu,
-        });
-        self.covariance = Some(longer);
     }
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.

@@ -18,6 +18,7 @@ use super::selected::of_estimated_noise;
 use super::smoothing::DepthSmoother;
 use super::special::{by_chance, turning, turning_in_unknown_noise};
 use super::trial::{DISTINCT, Trial, close, smoothed};
+use super::valley::Valley;
 use super::verdict::{Evidence, judge};
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
@@ -155,7 +156,12 @@ impl Task<'_, '_> {
         let plugged = plugged(&chosen.minimum.equations);
         let low = plugged.is_none();
         let several = close(candidates, inliers.n).len() > 1;
-        let astray = plugged.as_ref().is_some_and(|plugged| beyond_theory(inliers, &chosen.minimum, plugged));
+        let Minimum { motion, tangent, .. } = &chosen.minimum;
+        let valley = Valley { observations: inliers, motion, tangent };
+        let beyond = |plugged: &Plugged| {
+            beyond_theory(inliers, &chosen.minimum, plugged) || valley.bent(&plugged.likelihood) > 0
+        };
+        let astray = plugged.as_ref().is_some_and(beyond);
         let trial = if wanted || low || several || astray {
             smoothed(inliers, self.options, candidates, made, || self.smoother(inliers))
         } else {
@@ -165,7 +171,10 @@ impl Task<'_, '_> {
         if let Some(best) = improved.as_ref().filter(|_| !wanted) {
             undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
         }
-        let improved = improved.filter(|_| wanted || low || astray);
+        let mut improved = improved.filter(|_| wanted || low || astray);
+        if let Some(best) = &mut improved {
+            best.covariance = best.lengthened(inliers, || self.smoother(inliers));
+        }
         let unknown = low && improved.is_none();
         let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
         if unknown {
@@ -179,7 +188,6 @@ impl Task<'_, '_> {
 
     /// Takes into the covariance what a linear theory of independent points of known noise leaves out. `cost`: what maximum likelihood leaves.
     fn widen(&self, solution: &mut Solution, inliers: &Observations, unknown: bool, cost: f64) {
-        solution.lengthen(inliers, || self.smoother(inliers));
         solution.go_together(inliers, self.intake.flow, self.options.correlation_length);
         let strays = self.known.map_or(1.0, |known| robust::with_strays(inliers, known, &solution.motion));
         let noise = if unknown { of_estimated_noise(inliers.n, self.known.is_some()) } else { misfit(inliers, cost) };

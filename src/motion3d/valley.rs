@@ -15,6 +15,9 @@ use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 const STRAIGHT: f64 = 0.08;
 const STRAIGHT_AMONG: f64 = 0.03;
 
+/// Times that noise may be as large along one axis as along the other to count as round.
+const ROUND: f64 = 6.0;
+
 /// The 0.95 quantile of chi squared with one degree of freedom.
 const END: f64 = 3.841;
 
@@ -57,25 +60,28 @@ struct End {
 }
 
 impl Valley<'_> {
-    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion.
-    pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> Matrix5 {
+    /// How many axes of the direction, the one that is known least first, have a covariance that the theory at the estimate does not tell.
+    pub fn bent(&self, covariance: &Matrix5) -> usize {
         let deviation = direction_deviation(covariance);
         let share = deviation.to_radians() / spread(&self.observations.site);
-        if !share.is_finite() || share < STRAIGHT_AMONG {
-            return *covariance;
+        if !share.is_finite() {
+            return 0;
         }
-        let inside = among(self.observations, self.motion, deviation);
-        if !inside && share < STRAIGHT {
-            return *covariance;
+        // Noise that is small along one axis makes a valley as narrow as the angle to that axis.
+        let narrower = (self.observations.longest() / ROUND).max(1.0);
+        let inside = || narrower > 1.0 || among(self.observations, self.motion, deviation);
+        match share * narrower {
+            // Where the epipole may lie among the points each axis is a valley.
+            share if share > STRAIGHT_AMONG && inside() => 2,
+            share if share > STRAIGHT => 1,
+            _ => 0,
         }
-        let mut out = *covariance;
-        // The axis that is known least; where the epipole may lie among the points each axis is a valley.
-        for rank in 0..if inside { 2 } else { 1 } {
-            if let Some(longer) = self.along(&out, covariance, rank, &mut weights) {
-                out = longer;
-            }
-        }
-        out
+    }
+
+    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion.
+    pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> Matrix5 {
+        let along = |out, rank| self.along(&out, covariance, rank, &mut weights).unwrap_or(out);
+        (0..self.bent(covariance)).fold(*covariance, along)
     }
 
     /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors the one with the larger value is number 0.
@@ -218,7 +224,7 @@ fn floor(
 }
 
 /// Root mean square distance of points from their middle.
-fn spread(points: &[[f64; 3]]) -> f64 {
+pub(super) fn spread(points: &[[f64; 3]]) -> f64 {
     let n = points.len().max(1) as f64;
     let mean = |of: &dyn Fn(&[f64; 3]) -> f64| points.iter().map(of).sum::<f64>() / n;
     let square: f64 = (0..3).map(|axis| mean(&|at| at[axis] * at[axis]) - mean(&|at| at[axis]).powi(2)).sum();

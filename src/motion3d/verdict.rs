@@ -35,6 +35,9 @@ const MOST: f64 = 1.5;
 /// Most points that are asked again where few leave a doubt.
 const ASKED_AGAIN: usize = 16_000;
 
+/// The angle, degrees, beyond which few points are not asked.
+const BLIND: f64 = 20.0;
+
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
 
@@ -127,12 +130,16 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
         let farther = Farther {
             residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
-            // Of so many points chance hides no more.
-            chance: if most > SEARCHED { f64::INFINITY } else { CONSISTENT * own * fewer + SPACING },
+            chance: CONSISTENT * own * fewer + SPACING,
         };
         plausible_beyond(inliers, motions, farther, most, rng)
     };
-    beyond(SEARCHED) && (inliers.n <= SEARCHED || beyond(ASKED_AGAIN))
+    if inliers.n <= SEARCHED {
+        return beyond(SEARCHED);
+    }
+    // Where the deviation of few is too large for anything to lie beyond it, these tell nothing.
+    let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
+    (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
 }
 
 /// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.
