@@ -16,7 +16,7 @@ import motion3d_scores as scores
 WEIGHTS = ("shrunk", "ml", "ones")
 
 
-def flow(n=200, angle=2.2, sigma=0.3, seed=1):
+def flow(n=200, angle=2.2, sigma=0.3, seed=2):
     nu = np.linspace(0.5, 1.5, n)
     return nu, np.outer(nu, [np.cos(angle), np.sin(angle)]) + sigma * np.random.default_rng(seed).normal(size=(n, 2))
 

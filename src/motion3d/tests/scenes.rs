@@ -100,12 +100,12 @@ impl Held {
         self.inside += u32::from(mahalanobis(found, truth) < ELLIPSOID);
     }
 
-    pub fn share(&self) -> f64 {
+    pub fn share(self) -> f64 {
         f64::from(self.inside) / f64::from(self.of)
     }
 
     /// Whether the share is what is asked of covariances: .88 to .97.
-    pub fn honest(&self) -> bool {
+    pub fn honest(self) -> bool {
         (0.88..=0.97).contains(&self.share())
     }
 }
