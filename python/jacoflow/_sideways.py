@@ -35,7 +35,7 @@ class SidewaysEstimate:
 
     @property
     def angle_std(self) -> float:
-        """Standard deviation of `angle`, degrees."""
+        """Standard deviation of `angle` (which is in rad), degrees."""
         return float(np.degrees(np.sqrt(self.variance)))
 
 
