@@ -12,6 +12,7 @@ from pathlib import Path
 
 import motion3d_claims as further
 import motion3d_coverage as coverage
+import motion3d_drive as driving
 import motion3d_fixed as fixed
 import motion3d_honesty as honesty
 import motion3d_recordings as recordings
@@ -81,6 +82,8 @@ def sections(only: list[str] | None = None, factor: float = 1.0, data: Path | No
     if data is not None and wanted("recordings"):
         if (data / "kitti_odometry").is_dir():
             out["3-D motion: a drive with true poses, medians"] = recordings.drive(data)
+            out["3-D motion: rotations of the drive and of its reference, pair by pair"] = driving.poses(data)
+            out["3-D motion: errors that go together on the drive"] = driving.together(data)
             out["3-D motion: do halves of the picture differ by what their covariances say?"] = recordings.spacings(data)
         if (data / "ttc_kitti_lidar").is_dir():
             out["3-D motion: time to contact of the car ahead"] = recordings.car(data)

@@ -41,10 +41,9 @@ def fixed_values() -> list[Row]:
             got = [np.degrees(np.sqrt(np.trace(covariance[:2, :2]))), *(1e3 * np.sqrt(np.diag(covariance)[2:]))]
             for part, figure, value in zip(("direction, deg", "w_x, mrad", "w_y, mrad", "w_z, mrad"), published, got, strict=True):
                 tell(f"21 x 21 grid, {name}, {what}: {part}", figure, value)
-    nu, sigma = np.linspace(0.5, 1.5, 101), 0.3
-    m2, mean, n = np.mean(nu**2), np.mean(nu), len(nu)
-    tell("one unknown (29)", 8.8940e-4, sigma**2 / (n * m2) + sigma**4 / (n * m2**2))
-    tell("one unknown (31)", 8.9109e-4, sigma**2 / (n * mean**2))
-    tell("one unknown, CRLB", 8.2128e-4, sigma**2 / (n * m2))
-    tell("one unknown, crossover sigma", 0.30369, np.sqrt(m2) * np.std(nu) / mean)
+    sideways = motion3d.sideways_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
+    tell("one unknown (29)", 8.8940e-4, sideways.ml_variance)
+    tell("one unknown (31)", 8.9109e-4, sideways.ones_variance)
+    tell("one unknown, CRLB", 8.2128e-4, sideways.crlb)
+    tell("one unknown, crossover sigma", 0.30369, sideways.crossover)
     return rows

@@ -28,7 +28,7 @@ CAR_SPACING = 8.0
 TURNING = 5e-4
 """What the car ahead may turn by itself, rad/frame: 0.3 degrees a second, of one that keeps its lane."""
 INTERPOLATED = 12
-"""The drive's first so many true rotations are one and the same to 0.001 degrees: they were interpolated, and tell nothing of single frames."""
+"""The drive's first so many true rotations were interpolated, and tell nothing of single pairs: but for the last of them they are one and the same to 0.001 degrees, while the camera shook by hundredths of a degree, as in the pairs that follow, whose changes ours follow to 0.02 degrees (`motion3d_drive.poses` prints both pair by pair)."""
 
 
 def frames(folder: Path) -> list[NDArray[np.uint8]]:

@@ -61,6 +61,8 @@ __all__ = [
     "_motion3d_field_points",
     "_motion3d_focus",
     "_motion3d_predict",
+    "_motion3d_sideways",
+    "_motion3d_sideways_bound",
     "_motion3d_two_views",
     "_observability",
     "_edge_disparity",
@@ -991,6 +993,8 @@ def _motion3d_focus(
 def _motion3d_predict(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool, whole_frame: bool
 ) -> NDArray[np.float64]: ...
+def _motion3d_sideways(flow: ArrayLike, sigma: float | None, weights: str) -> dict[str, Any]: ...
+def _motion3d_sideways_bound(inverse_depth: ArrayLike, sigma: float) -> dict[str, float]: ...
 def _motion3d_two_views(
     translation: ArrayLike, rotation: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

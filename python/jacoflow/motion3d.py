@@ -35,6 +35,7 @@ from ._jacoflow import (
     _motion3d_predict,
     _motion3d_two_views,
 )
+from ._sideways import SidewaysBound, SidewaysEstimate, estimate_sideways, sideways_bound
 
 if TYPE_CHECKING:
     from . import FlowField
@@ -43,12 +44,16 @@ __all__ = [
     "MotionBound",
     "MotionEstimate",
     "MotionSolution",
+    "SidewaysBound",
+    "SidewaysEstimate",
     "essential_matrix",
     "estimate_field_motion",
     "estimate_motion",
+    "estimate_sideways",
     "focus_of_expansion",
     "motion_bound",
     "predict_flow",
+    "sideways_bound",
     "time_to_contact",
     "time_to_contact_map",
     "time_to_contact_std",

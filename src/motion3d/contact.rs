@@ -142,7 +142,7 @@ fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Ha
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::scenes::Scene;
+    use super::super::tests::scenes::{Scene, smooth};
     use super::super::{MotionOptions, Noise, estimate_motion};
     use super::*;
     use crate::types::{FieldLayout, MOTION_NAMES, Sites};
@@ -232,7 +232,6 @@ mod tests {
     #[test]
     fn deviations_are_those_of_the_smoothed_depths() {
         let motion = Motion::new([0.35, 0.25, 1.0], [0.02, -0.03, 0.01]);
-        let smooth = |x: f64, y: f64| 1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y;
         let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
         let (mut held, mut all, mut narrower) = (0, 0, 0);
         for seed in 0..20 {

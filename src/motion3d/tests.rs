@@ -1,13 +1,18 @@
 //! Published values, degenerate scenes and promises.
 
+mod by_name;
 mod confidence;
 mod degenerate;
 mod dense;
 mod displaced;
 mod estimators;
+mod movers;
 mod narrow;
+mod outliers;
 mod patches;
 mod published;
 pub(super) mod scenes;
+mod sideways;
 mod silent;
+mod statuses;
 mod together;

@@ -1,17 +1,12 @@
 //! Points closer than their errors go together.
 
 use super::super::*;
-use super::estimators::mahalanobis;
-use super::scenes::Scene;
+use super::scenes::{ELLIPSOID, Scene, mahalanobis, smooth};
 use crate::math::random::CounterRng;
 
 /// Points that share one error, and its deviation.
 const SHARED: usize = 12;
 const OWN: f64 = 0.01;
-
-fn smooth(x: f64, y: f64) -> f64 {
-    1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
-}
 
 /// Points of which [`SHARED`] in a row have one error, and `scale` times the depths.
 fn dense(motion: Motion, n: usize, scale: f64, seed: u64) -> Scene {
@@ -49,7 +44,7 @@ fn outliers_are_judged_by_their_own_errors() {
         let found = run(&scene, ALL, true);
         right += out(&found);
         without += out(&run(&scene, None, true));
-        inside += u32::from(mahalanobis(&found, &motion) < 11.07);
+        inside += u32::from(mahalanobis(&found, &motion) < ELLIPSOID);
         let kept = found.inliers.iter().filter(|inlier| **inlier).count();
         assert!(kept > 700, "{seed}: {kept}");
     }

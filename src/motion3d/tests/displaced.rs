@@ -1,7 +1,7 @@
 //! Displacements over a whole frame of fast turns.
 
 use super::super::*;
-use super::estimators::mahalanobis;
+use super::scenes::{ELLIPSOID, mahalanobis};
 use crate::math::random::CounterRng;
 use nalgebra::{Matrix3, Vector3};
 
@@ -130,7 +130,7 @@ fn covariances_of_fast_turns_hold() {
             let found = seen.run(&Noise::Sigma(4e-4), &MotionOptions { robust, ..MotionOptions::default() });
             if found.status == Status::Ok {
                 ok += 1;
-                held += u32::from(mahalanobis(&found, &truth) < 11.07);
+                held += u32::from(mahalanobis(&found, &truth) < ELLIPSOID);
             }
         }
         assert!(ok >= 54 && f64::from(held) >= 0.88 * f64::from(ok), "{robust}: {held} of {ok}");
@@ -174,7 +174,7 @@ fn smoothed_weights_are_as_good_on_a_curve() {
         };
         let seen = views_at(&truth, 196, seed, circle, |_, r| 0.1 * (0.5 + r)).noisy(3e-3, 100 + seed);
         let found = seen.run(&Noise::Sigma(3e-3), &MotionOptions::default());
-        held += u32::from(mahalanobis(&found, &truth) < 11.07);
+        held += u32::from(mahalanobis(&found, &truth) < ELLIPSOID);
         smoothed += found.motion.angle_to(&truth).powi(2);
         likelihood += found.likelihood.motion.angle_to(&truth).powi(2);
     }

@@ -1,6 +1,7 @@
 //! Values that the theory gives without chance.
 
 use super::super::*;
+use super::scenes::{oblique, smooth};
 
 fn near(got: f64, want: f64, name: &str) {
     assert!((got - want).abs() < 6e-4 * want.abs(), "{name}: {got} is not {want}");
@@ -10,11 +11,7 @@ fn near(got: f64, want: f64, name: &str) {
 fn grid() -> (Vec<[f64; 2]>, Vec<f64>) {
     let at = |i: usize| -0.6 + 0.06 * i as f64;
     let points: Vec<[f64; 2]> = (0..441).map(|k| [at(k % 21), at(k / 21)]).collect();
-    let depth = |p: &[f64; 2]| {
-        let (x, y) = (p[0] / 0.6, p[1] / 0.6);
-        1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
-    };
-    let depths = points.iter().map(depth).collect();
+    let depths = points.iter().map(|p| smooth(p[0] / 0.6, p[1] / 0.6)).collect();
     (points, depths)
 }
 
@@ -28,7 +25,7 @@ fn bound_of(motion: &Motion) -> MotionBound {
 #[test]
 fn bound_maximum_likelihood_and_ideal_weights_on_the_grid() {
     let lateral = bound_of(&Motion::new([1.0, 0.0, 0.0], [0.0; 3]));
-    let oblique = bound_of(&Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]));
+    let oblique = bound_of(&oblique());
     let want = [
         (&lateral, [1.632, 1.808, 1.634], [[23.71, 36.13, 14.53], [26.71, 36.13, 14.90], [23.74, 36.13, 14.53]]),
         (&oblique, [2.840, 4.219, 2.873], [[37.05, 41.41, 21.66], [58.46, 57.31, 27.92], [37.53, 41.85, 21.77]]),
@@ -47,7 +44,7 @@ fn bound_maximum_likelihood_and_ideal_weights_on_the_grid() {
 fn the_bound_is_that_of_pixels_too() {
     let camera = Intrinsics::new([[500.0, 2.0, 320.0], [0.0, 480.0, 240.0], [0.0, 0.0, 1.0]]).unwrap();
     let (points, depths) = grid();
-    let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+    let motion = oblique();
     let pixels: Vec<[f64; 2]> = points.iter().map(|&p| camera.to_pixel(p)).collect();
     let flow = vec![[0.0; 2]; points.len()];
     // The covariance that is 0.1^2 on the plane: K S K^t.
@@ -66,13 +63,11 @@ fn the_bound_is_that_of_pixels_too() {
 #[test]
 fn one_unknown_has_its_closed_forms() {
     let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
-    let n = 101.0;
-    let (m1, m2) = (depths.iter().sum::<f64>() / n, depths.iter().map(|v| v * v).sum::<f64>() / n);
-    let s2 = 0.09;
-    near(s2 / (n * m2) + s2 * s2 / (n * m2 * m2), 8.8940e-4, "(29)");
-    near(s2 / (n * m1 * m1), 8.9109e-4, "(31)");
-    near(s2 / (n * m2), 8.2128e-4, "bound");
-    near((m2 * (m2 - m1 * m1)).sqrt() / m1, 0.30369, "crossover");
+    let bound = sideways_bound(&depths, 0.3).unwrap();
+    near(bound.likelihood, 8.8940e-4, "(29)");
+    near(bound.ones, 8.9109e-4, "(31)");
+    near(bound.bound, 8.2128e-4, "bound");
+    near(bound.crossover, 0.30369, "crossover");
     // The same from the general forms, whose psi lies in the image plane once the other unknowns are taken out.
     let at = vec![[0.0; 2]; 101];
     let flow = Flow::Plane { points: &at, flow: &at, camera: None };
@@ -86,8 +81,8 @@ fn one_unknown_has_its_closed_forms() {
     // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
     let axis = usize::from(tangent[(1, 1)].abs() > 0.5);
     let (m, p) = (m[(axis, axis)], p[(axis, axis)]);
-    near(1.0 / m, 8.2128e-4, "bound");
-    near(1.0 / m + p / (m * m), 8.8940e-4, "(17)");
+    assert!((1.0 / m - bound.bound).abs() < 1e-12, "{m}");
+    assert!((1.0 / m + p / (m * m) - bound.likelihood).abs() < 1e-12, "{m} {p}");
 }
 
 #[test]
@@ -105,7 +100,7 @@ fn points_that_determine_nothing_have_no_bound() {
 
 #[test]
 fn too_few_places_have_no_bound_whatever_rounding_makes_of_them() {
-    let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+    let motion = oblique();
     let bound = |points: &[[f64; 2]]| {
         let flow = vec![[0.0; 2]; points.len()];
         let depths: Vec<f64> = (0..points.len()).map(|k| 0.5 + 0.37 * (k % 3) as f64).collect();

@@ -1,9 +1,28 @@
-//! Random scenes with exact truth.
+//! Random scenes with exact truth, and how estimates lie to it.
 
 use super::super::intake::Intake;
 use super::super::observations::Observations;
-use super::super::{Flow, Motion, Noise, Placement};
+use super::super::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
 use crate::math::random::CounterRng;
+use nalgebra::{SMatrix, Vector3};
+
+/// Rotation rate of the published scenes.
+pub(in super::super) const W: [f64; 3] = [0.02, -0.03, 0.01];
+
+/// The published oblique motion.
+pub(in super::super) fn oblique() -> Motion {
+    Motion::new([0.6, 0.2, 0.75], W)
+}
+
+/// Inverse depths of the published scenes, at places `(x, y) / h`: a curved wall.
+pub(in super::super) fn smooth(x: f64, y: f64) -> f64 {
+    1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
+}
+
+/// Of ground under a far wall.
+pub(in super::super) fn ground(y: f64) -> f64 {
+    0.3 + 1.2 * y.max(0.0)
+}
 
 /// Points on the plane at distance 1 with their flow.
 #[derive(Debug, Clone)]
@@ -43,7 +62,50 @@ impl Scene {
         Flow::Plane { points: &self.points, flow: &self.flow, camera: None }
     }
 
+    /// Estimates with its noise known, flow being instantaneous.
+    pub fn run(&self, options: &MotionOptions) -> MotionEstimate {
+        let options = MotionOptions { placement: Placement::Start, ..options.clone() };
+        estimate_motion(&self.flow(), &Noise::Sigma(self.sigma), &options).unwrap()
+    }
+
     pub fn observations(&self) -> Observations {
         Intake::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
+    }
+}
+
+/// Squared Mahalanobis distance of the truth from an estimate.
+pub(in super::super) fn mahalanobis(found: &MotionEstimate, truth: &Motion) -> f64 {
+    let to = Vector3::from(truth.translation);
+    let along = |a: usize| Vector3::from(found.tangent[a]).dot(&to);
+    let w = Vector3::from(truth.rotation) - Vector3::from(found.motion.rotation);
+    let error = SMatrix::<f64, 5, 1>::from_column_slice(&[along(0), along(1), w.x, w.y, w.z]);
+    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| found.covariance[i][j]);
+    (error.transpose() * covariance.try_inverse().unwrap() * error)[0]
+}
+
+/// 95 % of chi squared with five degrees of freedom.
+pub(in super::super) const ELLIPSOID: f64 = 11.070;
+
+/// How many 95 % ellipsoids hold the truth.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in super::super) struct Held {
+    pub of: u32,
+    pub inside: u32,
+}
+
+impl Held {
+    /// One more estimate.
+    pub fn count(&mut self, found: &MotionEstimate, truth: &Motion) {
+        self.of += 1;
+        self.inside += u32::from(mahalanobis(found, truth) < ELLIPSOID);
+    }
+
+    pub fn share(self) -> f64 {
+        f64::from(self.inside) / f64::from(self.of)
+    }
+
+    /// Whether the share is what is asked of covariances: .88 to .97.
+    pub fn honest(self) -> bool {
+        (0.88..=0.97).contains(&self.share())
     }
 }

@@ -1,13 +1,7 @@
 //! Depths that are mostly noise hide the truth behind a lower minimum: that must not be told as `ok`.
 
 use super::super::*;
-use super::scenes::Scene;
-
-const W: [f64; 3] = [0.02, -0.03, 0.01];
-
-fn ground(y: f64) -> f64 {
-    0.3 + 1.2 * y.max(0.0)
-}
+use super::scenes::{Scene, ground, oblique, smooth};
 
 /// How many of the estimates are `ok`, and how many of those off by more than four deviations and 15 degrees.
 fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
@@ -27,8 +21,7 @@ fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
 #[test]
 fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
     let side = Motion::new([1.0, 0.3, 0.2], [0.0, 0.02, 0.0]);
-    let oblique = Motion::new([0.6, 0.2, 0.75], W);
-    for (motion, h, sigma) in [(side, 0.6, 0.2), (oblique, 0.4, 0.168), (oblique, 0.4, 0.105)] {
+    for (motion, h, sigma) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
         let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, sigma, seed, |_, y, _| ground(y)));
         assert!(wrong <= 1, "{motion:?} {sigma}: {wrong}");
     }
@@ -36,9 +29,8 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
 
 #[test]
 fn depths_that_tell_are_trusted() {
-    let motion = Motion::new([0.6, 0.2, 0.75], W);
-    let smooth = |x: f64, y: f64, _: f64| 1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y;
-    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 500, 0.6, 0.1, seed, smooth));
+    let motion = oblique();
+    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 500, 0.6, 0.1, seed, |x, y, _| smooth(x, y)));
     assert!(confident >= 51 && wrong == 0, "{confident} {wrong}");
     let (confident, wrong) = counts(60, |seed| Scene::new(motion, 1000, 0.6, 0.1, seed, |_, y, _| ground(y)));
     assert!(confident >= 57 && wrong == 0, "{confident} {wrong}");

@@ -4,10 +4,12 @@ mod field;
 mod flow;
 mod given;
 mod options;
+mod sideways;
 mod told;
 
 pub use field::{motion3d_contact_map, motion3d_field_points};
 pub use flow::{motion3d_focus, motion3d_predict, motion3d_two_views};
+pub use sideways::{motion3d_sideways, motion3d_sideways_bound};
 
 use crate::motion3d::{Motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
 use given::{Given, GivenPatches, Layout, rows, triple};

@@ -1,0 +1,241 @@
+//! A translation along the image plane without a rotation: section 5 of the paper, where one angle is unknown and everything has a closed form.
+//!
+//! On the plane at distance 1 with `u_z = 0`, `w = 0` and `u = (cos psi, sin psi, 0)` the flow is `f_k = nu_k u` with noise. Any weights `mean + a (m_k - mean)` of the parts `m_k = f_k . u` along
+//! the direction make the estimating equation `sum weight_k (f_k across u) = 0` the principal axis of
+//!
+//! ```text
+//! Q = F F^t / n + a (sum f f^t - F F^t / n),     F = sum f
+//! ```
+//!
+//! with `a = 1` for maximum likelihood (28), `a = 0` for weights of 1 (30) and `a = tau^2 / (tau^2 + sigma^2)`, `tau^2` the scatter of the depths, for shrunk ones. The variance is
+//! `sigma^2 (mean^2 + a^2 (tau^2 + sigma^2)) / (n (mean^2 + a tau^2)^2)`, which is (29), (31) and the least of all `a`.
+
+use crate::error::{Error, Result};
+use nalgebra::{Matrix2, Vector2};
+
+/// Times that the scatter of depths is asked along the direction found with the one before: it converges at once unless noise hides it.
+const ROUNDS: usize = 8;
+
+/// What the flow across the direction is weighed with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SidewaysWeights {
+    /// Depths drawn to their mean by what noise leaves of their scatter: never worse than either of the others.
+    #[default]
+    Shrunk,
+    /// Each point's own depth: maximum likelihood (28), the principal axis of `sum f f^t`.
+    Likelihood,
+    /// The same for all: (30), the angle of `sum f`.
+    Ones,
+}
+
+/// What section 5 of the paper says of known depths: variances of the angle `psi`, rad^2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SidewaysBound {
+    /// The Cramér-Rao bound `sigma^2 / (n m2)`, `m2 = mean nu^2`.
+    pub bound: f64,
+    /// Maximum likelihood `sigma^2 / (n m2) + sigma^4 / (n m2^2)` (29).
+    pub likelihood: f64,
+    /// Weights of 1: `sigma^2 / (n mean(nu)^2)` (31); infinite where depths cancel.
+    pub ones: f64,
+    /// Shrunk weights `sigma^2 / (n [mean^2 + var^2 / (var + sigma^2)])`.
+    pub shrunk: f64,
+    /// Noise above which weights of 1 beat maximum likelihood, `sqrt(m2) std(nu) / |mean nu|`, in the unit of the flow.
+    pub crossover: f64,
+}
+
+/// A direction along the image plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SidewaysEstimate {
+    /// `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; depths are positive, most of them.
+    pub angle: f64,
+    /// Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less their noise; infinite where noise explains all flow.
+    pub variance: f64,
+    /// The Cramér-Rao bound with the same moments, rad^2.
+    pub bound: f64,
+    /// Standard deviation of each component of the flow: as given, else estimated.
+    pub sigma: f64,
+    /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their deviation is `sigma`. NaN where the flow is not finite.
+    pub inverse_depth: Vec<f64>,
+}
+
+/// First two moments of inverse depths.
+#[derive(Debug, Clone, Copy)]
+struct Moments {
+    n: f64,
+    /// Square of the mean.
+    squared_mean: f64,
+    /// Scatter about the mean, `tau^2`.
+    scatter: f64,
+}
+
+impl Moments {
+    fn of(depths: &[f64]) -> Self {
+        let n = depths.len() as f64;
+        let mean = depths.iter().sum::<f64>() / n;
+        let scatter = depths.iter().map(|nu| (nu - mean).powi(2)).sum::<f64>() / n;
+        Self { n, squared_mean: mean * mean, scatter }
+    }
+
+    /// Mean of the squares, `m2`.
+    fn mean_square(&self) -> f64 {
+        self.squared_mean + self.scatter
+    }
+
+    /// `a` of the weights `mean + a (m - mean)`.
+    fn share(&self, weights: SidewaysWeights, noise: f64) -> f64 {
+        match weights {
+            SidewaysWeights::Likelihood => 1.0,
+            SidewaysWeights::Ones => 0.0,
+            // Depths without any scatter are their mean.
+            SidewaysWeights::Shrunk if self.scatter == 0.0 => 0.0,
+            SidewaysWeights::Shrunk => self.scatter / (self.scatter + noise),
+        }
+    }
+
+    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`; infinite where they see nothing.
+    fn variance(&self, a: f64, noise: f64) -> f64 {
+        let slope = self.squared_mean + a * self.scatter;
+        if slope == 0.0 {
+            return f64::INFINITY;
+        }
+        noise * (self.squared_mean + a * a * (self.scatter + noise)) / (self.n * slope * slope)
+    }
+
+    fn bound(&self, noise: f64) -> f64 {
+        if self.mean_square() == 0.0 { f64::INFINITY } else { noise / (self.n * self.mean_square()) }
+    }
+}
+
+/// Sums over the flow, of which all estimates are made.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    n: f64,
+    /// `sum f`.
+    first: Vector2<f64>,
+    /// `sum f f^t`.
+    second: Matrix2<f64>,
+}
+
+impl Sums {
+    fn of(flow: &[[f64; 2]]) -> Self {
+        let (mut n, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
+        for &f in flow.iter().filter(|f| finite(f)) {
+            let f = Vector2::from(f);
+            n += 1.0;
+            first += f;
+            second += f * f.transpose();
+        }
+        Self { n, first, second }
+    }
+
+    /// Scatter matrix about the mean.
+    fn about_mean(&self) -> Matrix2<f64> {
+        self.second - self.first * self.first.transpose() / self.n
+    }
+
+    /// The principal axis of `Q`, either way.
+    fn axis(&self, a: f64) -> Vector2<f64> {
+        let q = self.second - (1.0 - a) * self.about_mean();
+        let angle = 0.5 * (q[(0, 1)] + q[(1, 0)]).atan2(q[(0, 0)] - q[(1, 1)]);
+        Vector2::new(angle.cos(), angle.sin())
+    }
+
+    /// Noise variance by what is across a direction.
+    fn noise(&self, u: &Vector2<f64>) -> f64 {
+        let across = Vector2::new(-u.y, u.x);
+        (across.dot(&(self.second * across)) / (self.n - 1.0)).max(0.0)
+    }
+
+    /// Moments of the depths along a direction, less what noise adds to them.
+    fn moments(&self, u: &Vector2<f64>, noise: f64) -> Moments {
+        let mean = self.first.dot(u) / self.n;
+        let scatter = if self.n > 1.0 { u.dot(&(self.about_mean() * u)) / (self.n - 1.0) - noise } else { 0.0 };
+        Moments { n: self.n, squared_mean: (mean * mean - noise / self.n).max(0.0), scatter: scatter.max(0.0) }
+    }
+}
+
+fn finite(flow: &[f64; 2]) -> bool {
+    flow.iter().all(|value| value.is_finite())
+}
+
+fn check(sigma: f64) -> Result<()> {
+    // The sums of squares that an estimate is made of are of its fourth power.
+    if sigma > 0.0 && sigma.powi(4).is_normal() {
+        return Ok(());
+    }
+    Err(Error::argument("sigma", "a positive number between 1e-75 and 1e75", sigma))
+}
+
+/// Which way along an axis: the one that leaves less behind the camera, in squared deviations.
+fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
+    let (mut plus, mut minus) = (0.0, 0.0);
+    for f in flow.iter().filter(|f| finite(f)) {
+        let along = axis.dot(&Vector2::from(*f));
+        *(if along < 0.0 { &mut plus } else { &mut minus }) += along * along;
+    }
+    if plus <= minus { axis } else { -axis }
+}
+
+/// The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow at N points wherever they are.
+///
+/// `flow`: per frame on the plane at distance 1, or px/frame of a camera with square pixels; each component has the deviation `sigma`, which is estimated from the flow across the direction where
+/// it is `None`. Flow that is not finite is left out. (29) and (31) are of first order: they hold while they are small beside a radian.
+///
+/// # Errors
+/// [`Error::Argument`] for a `sigma` that is none and for a `flow` of fewer than two finite vectors (one where `sigma` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum, is zero.
+pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: SidewaysWeights) -> Result<SidewaysEstimate> {
+    sigma.map_or(Ok(()), check)?;
+    let sums = Sums::of(flow);
+    let least = if sigma.is_some() { 1.0 } else { 2.0 };
+    if sums.n < least {
+        return Err(Error::argument("flow", format!("at least {least} finite vectors"), sums.n));
+    }
+    if !sums.second.iter().all(|sum| sum.is_finite()) {
+        return Err(Error::argument("flow", "values whose squares are finite", "larger ones"));
+    }
+    let noise = |u: &Vector2<f64>| sigma.map_or_else(|| sums.noise(u), |sigma| sigma * sigma);
+    let share = |u: &Vector2<f64>| sums.moments(u, noise(u)).share(weights, noise(u));
+    let along = match weights {
+        SidewaysWeights::Ones => sums.first,
+        SidewaysWeights::Likelihood => before(sums.axis(1.0), flow),
+        SidewaysWeights::Shrunk => before((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
+    };
+    if sums.second.trace() == 0.0 || along == Vector2::zeros() {
+        return Err(Error::NotObservable("flow that is zero in sum has no direction".into()));
+    }
+    let u = along.normalize();
+    let (noise, moments) = (noise(&u), sums.moments(&u, noise(&u)));
+    Ok(SidewaysEstimate {
+        angle: u.y.atan2(u.x),
+        variance: moments.variance(moments.share(weights, noise), noise),
+        bound: moments.bound(noise),
+        sigma: noise.sqrt(),
+        inverse_depth: flow.iter().map(|&f| if finite(&f) { u.dot(&Vector2::from(f)) } else { f64::NAN }).collect(),
+    })
+}
+
+/// What any estimator, and each of those of [`estimate_sideways`], makes of points with these true inverse depths: for the design of an experiment.
+///
+/// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out. `sigma`: deviation of each component of the flow, in the same unit.
+///
+/// # Errors
+/// [`Error::Argument`] for a `sigma` that is none, and an `inverse_depth` without a finite value; [`Error::NotObservable`] when all are zero.
+pub fn sideways_bound(inverse_depth: &[f64], sigma: f64) -> Result<SidewaysBound> {
+    check(sigma)?;
+    let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();
+    if known.is_empty() {
+        return Err(Error::argument("inv_depth", "at least one finite value", "none"));
+    }
+    let (moments, noise) = (Moments::of(&known), sigma * sigma);
+    if moments.mean_square() == 0.0 {
+        return Err(Error::NotObservable("points that are infinitely far do not show a translation".into()));
+    }
+    let of = |weights| moments.variance(moments.share(weights, noise), noise);
+    Ok(SidewaysBound {
+        bound: moments.bound(noise),
+        likelihood: of(SidewaysWeights::Likelihood),
+        ones: of(SidewaysWeights::Ones),
+        shrunk: of(SidewaysWeights::Shrunk),
+        crossover: (moments.mean_square() * moments.scatter / moments.squared_mean).sqrt(),
+    })
+}

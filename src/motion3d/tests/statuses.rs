@@ -1,0 +1,57 @@
+//! Scenes with exactly one right status.
+
+use super::super::*;
+use super::scenes::{Scene, W, oblique, smooth};
+
+/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others.
+#[test]
+fn depths_that_are_mostly_noise_are_low_snr() {
+    let forward = Motion::new([0.05, -0.03, 1.0], W);
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-8 } else { 0.0 }));
+    let rotation_prior = Some(RotationPrior { rotation: W, covariance });
+    let options = MotionOptions { rotation_prior, ..MotionOptions::default() };
+    let mut low = 0;
+    for seed in 0..40 {
+        let found = Scene::new(forward, 300, 0.6, 0.6, seed, |x, y, _| smooth(x, y)).run(&options);
+        let nothing_left = found.likelihood.covariance[0][0].is_nan();
+        assert_eq!(found.status, if nothing_left { Status::LowSnr } else { Status::Ok }, "{seed}");
+        // What is told instead, that of the smoothed weights, holds all the same.
+        assert!(found.direction_std > 2.0 && found.motion.angle_to(&forward).to_degrees() < 4.0 * found.direction_std);
+        low += u32::from(nothing_left);
+    }
+    assert!((4..=36).contains(&low), "{low} of 40");
+}
+
+#[test]
+fn a_field_of_two_degrees_is_ill_conditioned() {
+    for seed in 0..30 {
+        let scene = Scene::new(oblique(), 300, 0.02, 0.03, seed, |_, _, r| 0.5 + r);
+        assert_eq!(scene.run(&MotionOptions::default()).status, Status::IllConditioned, "{seed}");
+    }
+}
+
+/// At one place there are two numbers for five unknowns, whatever is told of the noise.
+#[test]
+fn one_place_is_ill_conditioned_without_a_covariance() {
+    let points = [[0.2, -0.1]; 60];
+    let flow: Vec<[f64; 2]> = (0..60).map(|k| oblique().plane_flow(points[k], 0.5 + k as f64 / 60.0)).collect();
+    let given = Flow::Plane { points: &points, flow: &flow, camera: None };
+    let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
+    for noise in [Noise::Sigma(1e-6), Noise::Sigma(1e-3)] {
+        let found = estimate_motion(&given, &noise, &options).unwrap();
+        assert_eq!(found.status, Status::IllConditioned, "{noise:?}");
+        assert!(found.direction_std.is_nan() && found.covariance[0][0].is_nan(), "{noise:?}");
+    }
+}
+
+/// "Auto" smooths depths from 30 points on.
+#[test]
+fn thirty_points_are_enough_for_smoothed_weights() {
+    for (n, smoothed) in [(12, false), (29, false), (30, true), (31, true)] {
+        assert_eq!(Scene::oblique(n, 0.005, 3).run(&MotionOptions::default()).efficient, smoothed, "{n}");
+        for (method, wanted) in [(Method::Efficient, true), (Method::MaximumLikelihood, false)] {
+            let options = MotionOptions { method, ..MotionOptions::default() };
+            assert_eq!(Scene::oblique(n, 0.005, 3).run(&options).efficient, wanted, "{n} {method:?}");
+        }
+    }
+}
