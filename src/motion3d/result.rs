@@ -19,7 +19,7 @@ pub enum Status {
     Ambiguous,
     /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees, or directions farther than the covariance has it explain the flow as well.
     IllConditioned,
-    /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed weights is given. Or, of 100 points and more, the direction's standard deviation exceeds 8 degrees: a covariance no longer tells the shape of what is not known.
+    /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed weights is given.
     LowSnr,
 }
 

@@ -1,7 +1,7 @@
 //! Estimates against the truth and against what their covariances promise.
 
 use super::super::*;
-pub(super) use super::scenes::mahalanobis;
+use super::scenes::mahalanobis;
 use super::scenes::{Held, Scene, W, oblique, smooth};
 use crate::math::random::CounterRng;
 use crate::parallel::Threads;
