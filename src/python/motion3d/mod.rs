@@ -6,10 +6,10 @@ mod given;
 mod options;
 mod told;
 
-pub use field::{motion3d_contact_map, motion3d_field_points};
-pub use flow::{motion3d_focus, motion3d_predict, motion3d_two_views};
+pub use field::{motion3d_contact_map, motion3d_field_patches, motion3d_field_points};
+pub use flow::{motion3d_beside, motion3d_essential, motion3d_focus, motion3d_predict};
 
-use crate::motion3d::{Motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
+use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
 use given::{Given, GivenPatches, Layout, rows, triple};
 use options::Options;
 use pyo3::prelude::*;
@@ -45,7 +45,9 @@ pub fn motion3d_bound<'py>(
     rotation: &Bound<'py, PyAny>,
     layout: Layout<'py>,
 ) -> PyResult<ToldBound<'py>> {
-    let motion = Motion::new(triple("translation", translation)?, triple("rotation", rotation)?);
+    let (translation, rotation) = (triple("translation", translation)?, triple("rotation", rotation)?);
+    check_motion(&translation, &rotation)?;
+    let motion = Motion::new(translation, rotation);
     let (shape, depths) = super::arrays::doubles("inv_depth", inverse_depth)?;
     if layout.six {
         let given = GivenPatches::new(points, None, &layout)?;
