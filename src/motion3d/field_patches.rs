@@ -3,10 +3,11 @@
 use super::camera::Intrinsics;
 use super::field::{measured, within};
 use super::patches::AffinePatches;
+use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, Sites, Status};
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
 /// Least side of a window, px: six numbers of less are hardly more than those of its pixels.
@@ -41,11 +42,11 @@ impl FieldPatches {
     }
 }
 
-/// Cuts the field, or a region of it, into squares of `size` px that do not overlap, and fits one affine flow to the flow and the Jacobian of the pixels of each: the six numbers at its middle, by least squares with the pixels' covariances. Windows of
-/// which less than half is valid are left out.
+/// Cuts the field, or a region of it, into squares of `size` px that do not overlap, and fits one flow of second order to the flow and the Jacobian of the pixels of each, by least squares with the pixels' covariances: its six numbers at the middle. What bends
+/// would shift those of an affine flow by more than their noise. Windows of which less than half is valid are left out.
 ///
-/// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels times the number of its pixels over the number of disjoint windows in it, those of the area `4 pi l^2` over which errors of the
-/// correlation length `l` are one. Flow that is not affine in a window, as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as much that of the patch grows.
+/// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over which errors of the
+/// correlation length `l` are one, their tail beyond the windows included (see [`MotionOptions::correlation_length`](super::MotionOptions)). Flow that is of no second order in a window, as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as much that of the patch grows.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch, and `patches` for a size below 8 px.
@@ -145,16 +146,19 @@ impl Windows {
             return None;
         }
         let length = field.layout.correlation_length;
-        let sharing = (4.0 * std::f64::consts::PI * length * length / each).max(1.0);
+        let sharing = (area() * length * length / each).max(1.0);
         sums.solve().map(|(motion, covariance, misfit)| (motion, covariance * (sharing * misfit)))
     }
 }
 
-/// Normal equations of one affine flow.
+/// Six numbers and six second derivatives: of `(u, v)` by xx, xy, yy.
+const UNKNOWN: usize = 12;
+
+/// Normal equations of one flow of second order.
 #[derive(Default)]
 struct Sums {
-    normal: Matrix6<f64>,
-    right: Vector6<f64>,
+    normal: SMatrix<f64, UNKNOWN, UNKNOWN>,
+    right: SVector<f64, UNKNOWN>,
     square: f64,
     count: usize,
 }
@@ -180,20 +184,28 @@ impl Sums {
     fn solve(&self) -> Option<(Vector6<f64>, Matrix6<f64>, f64)> {
         let factor = self.normal.cholesky()?;
         let motion = factor.solve(&self.right);
-        let freedom = 6 * self.count.saturating_sub(1);
+        let freedom = (6 * self.count).saturating_sub(UNKNOWN);
         let rest = self.square - motion.dot(&self.right);
         let misfit = if freedom > 0 { (rest / freedom as f64).max(1.0) } else { 1.0 };
-        let covariance = factor.inverse();
-        (misfit.is_finite()).then(|| (motion, 0.5 * (covariance + covariance.transpose()), misfit))
+        let covariance = factor.inverse().fixed_view::<6, 6>(0, 0).into_owned();
+        let six = motion.fixed_rows::<6>(0).into_owned();
+        misfit.is_finite().then(|| (six, 0.5 * (covariance + covariance.transpose()), misfit))
     }
 }
 
-/// From the six numbers at the middle of an affine flow to those at a distance from it: `(u + u_x dx + u_y dy, ...)` with the same slopes.
-fn transport([dx, dy]: [f64; 2]) -> SMatrix<f64, 6, 6> {
-    let mut out = Matrix6::identity();
+/// From the unknowns at the middle to the six numbers at a distance from it: `u + u_x dx + u_y dy + (u_xx dx^2 + 2 u_xy dx dy + u_yy dy^2) / 2, ...`, `u_x + u_xx dx + u_xy dy, ...`.
+fn transport([dx, dy]: [f64; 2]) -> SMatrix<f64, 6, UNKNOWN> {
+    let mut out = SMatrix::zeros();
     for i in 0..2 {
-        out[(i, 2 + i)] = dx;
-        out[(i, 4 + i)] = dy;
+        for (k, value) in [1.0, dx, dy, 0.5 * dx * dx, dx * dy, 0.5 * dy * dy].into_iter().enumerate() {
+            out[(i, 2 * k + i)] = value;
+        }
+        for (k, value) in [(1, 1.0), (3, dx), (4, dy)] {
+            out[(2 + i, 2 * k + i)] = value;
+        }
+        for (k, value) in [(2, 1.0), (4, dx), (5, dy)] {
+            out[(4 + i, 2 * k + i)] = value;
+        }
     }
     out
 }

@@ -15,6 +15,16 @@ from ._results import MotionEstimate
 if TYPE_CHECKING:
     from .. import FlowField
 
+OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
+"""What may be said of the estimate; what a field tells itself is refused by name."""
+
+FIELD_OWN = {
+    "sigma": "has covariances of its own",
+    "cov": "has covariances of its own",
+    "jacobian": "has a Jacobian of its own, which patches= uses",
+    "projection": "is one of the plane",
+}
+
 
 def estimate_field_motion(
     field: FlowField,
@@ -47,7 +57,7 @@ def estimate_field_motion(
     turning : float, rad/frame
         Standard deviation of the thing's own rotation, per axis; it matters only with `scene`.
     patches : px or None
-        Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, fitted to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows, `4 pi l^2` px large, in the patch, and more where flow is not affine in it. Six numbers pay for
+        Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, from a fit of second order to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows in the patch, of the area `58 l^2` over which errors go together, and more where flow has edges in it. Six numbers pay for
         2 to 10 large patches (60 px and more) seen through a long lens. Windows lie side by side in the frame or `region`; those of which less than half is valid are left out. Not with `spacing`, `max_points`, `scene` and `robust`.
     **options
         Those of `estimate_motion` but `sigma`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True unless told otherwise or `patches` are asked for.
@@ -61,7 +71,7 @@ def estimate_field_motion(
     """
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    _check_options(options)
+    options = _own(options)
     if patches is not None:
         _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
         points, six, covariances = _motion3d_field_patches(field, count("patches", patches), region)
@@ -75,23 +85,15 @@ def estimate_field_motion(
     return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, **options}), points
 
 
-OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
-"""What may be said of the estimate; what a field tells itself is refused by name."""
-
-FIELD_OWN = {
-    "sigma": "has covariances of its own",
-    "cov": "has covariances of its own",
-    "jacobian": "has a Jacobian of its own, which patches= uses",
-    "projection": "is one of the plane",
-}
-
-
-def _check_options(options: dict[str, Any]) -> None:
+def _own(options: dict[str, Any]) -> dict[str, Any]:
+    """The options without those that a field tells itself, which are refused unless they say nothing else."""
     for name, value in options.items():
         if name not in OPTIONS:
             raise TypeError(f"{name}: expected an option of estimate_field_motion or of estimate_motion, got one that neither has")
-        if name in FIELD_OWN and value is not None:
+        nothing = value is None or (name == "projection" and isinstance(value, str) and value == "plane")
+        if name in FIELD_OWN and not nothing:
             raise ValueError(f"{name}: expected none, as a field {FIELD_OWN[name]}; got {_kind(value)}")
+    return {name: value for name, value in options.items() if name not in FIELD_OWN}
 
 
 def _kind(value: object) -> str:

@@ -59,17 +59,35 @@ fn an_affine_flow_is_told_at_the_middles() {
             assert!((got - want).abs() < 1e-10, "{got} {want}");
         }
     }
-    // The mean of 3600 pixels; a slope has its own information and that of the flow around the middle.
+    // A slope has its own information and that of the flow around the middle; the flow is told apart from a bend, which the slopes tell, too. With the means of dx^2 and of dx^4.
     let (flow, slope) = (NOISE[0] * NOISE[0], NOISE[2] * NOISE[2]);
-    let spread = (60.0 * 60.0 - 1.0) / 12.0;
-    let want = [flow / 3600.0, 1.0 / (3600.0 * (1.0 / slope + spread / flow))];
+    let (second, fourth) = ((3600.0 - 1.0) / 12.0, (3.0 * 3600.0 * 3600.0 - 10.0 * 3600.0 + 7.0) / 240.0);
+    let bend = 0.25 * (fourth + second * second) / flow + second / slope;
+    let level = 1.0 / flow - 2.0 * (0.5 * second / flow).powi(2) / bend;
+    let want = [1.0 / (3600.0 * level), 1.0 / (3600.0 * (1.0 / slope + second / flow))];
+    assert!(want[0] > 1.2 * flow / 3600.0);
     for (k, want) in [(0, want[0]), (7, want[0]), (14, want[1]), (35, want[1])] {
         assert!((found.covariances[k] / want - 1.0).abs() < 1e-9, "{k}: {} {want}", found.covariances[k]);
     }
-    // Every other pixel, whose errors go together over 3 px: 4 pi 9 / 4 pixels are one.
+    // Every other pixel, whose errors go together over 3 px: 58 * 9 / 4 of them are one.
     let sparse = field_patches(&field(2, 3.0, affine), 60, None).unwrap();
-    let sharing = 4.0 * std::f64::consts::PI * 9.0 / 4.0;
-    assert!((sparse.covariances[0] / (sharing * flow / 900.0) - 1.0).abs() < 0.01, "{}", sparse.covariances[0]);
+    let sharing = std::f64::consts::PI * (4.0 * 0.4 + 2.0 * 0.6 * 3.75 * 3.75) * 9.0 / 4.0;
+    for k in [0, 14] {
+        let larger = sparse.covariances[k] / found.covariances[k] / (4.0 * sharing);
+        assert!((larger - 1.0).abs() < 0.02, "{k}: {larger}");
+    }
+}
+
+#[test]
+fn a_bend_does_not_shift_the_middle() {
+    let bent = |x: f64, y: f64| {
+        let (x, y) = (x - 39.5, y - 29.5);
+        [1.0 + 1e-4 * x * x - 2e-4 * x * y, 3e-4 * y * y, 2e-4 * x - 2e-4 * y, 0.0, -2e-4 * x, 6e-4 * y]
+    };
+    let found = field_patches(&field(1, 0.0, bent), 60, None).unwrap();
+    for (got, want) in found.motion[0].iter().zip([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]) {
+        assert!((got - want).abs() < 1e-10, "{got} {want}");
+    }
 }
 
 #[test]
