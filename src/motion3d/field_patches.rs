@@ -136,13 +136,13 @@ impl Windows {
             let six = Vector6::from(field.affine(site).to_array().map(Real::to_f64));
             sums.add(&six, &Matrix6::from_fn(|i, j| covariance[i][j]), [column as f64 - x, row as f64 - y]);
         }
-        let area = (self.size * self.size) as f64;
+        let whole = (self.size * self.size) as f64;
         // Pixels that one site stands for.
         let each = match field.layout.sites {
             Sites::Grid { stride, .. } => (stride * stride) as f64,
-            Sites::Points(_) => area / sums.count as f64,
+            Sites::Points(_) => whole / sums.count as f64,
         };
-        if (sums.count as f64) * each < SEEN * area {
+        if (sums.count as f64) * each < SEEN * whole {
             return None;
         }
         let length = field.layout.correlation_length;

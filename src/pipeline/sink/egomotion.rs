@@ -199,7 +199,7 @@ impl Egomotion {
     }
 }
 
-/// Deviations that no estimator's can be below: of the direction, degrees, and of the rotation, rad/frame.
+/// Deviations of the bound: of the direction, degrees, and of the rotation, rad/frame.
 fn bound_deviations(bound: &[[f64; 5]; 5]) -> [f64; 4] {
     let deviation = |i: usize| bound[i][i].sqrt();
     [deviation(0).hypot(deviation(1)).to_degrees(), deviation(2), deviation(3), deviation(4)]
