@@ -162,7 +162,7 @@ def test_two_patches_of_a_field_determine_a_motion():
     found, middles = motion3d.estimate_field_motion(field, CAMERA, patches=150)
     assert len(middles) == 2 and found.status == "few_points" and found.inv_depth.shape == (2,)
     assert_array_equal(middles, [[84.5, 119.5], [234.5, 119.5]])
-    print(scores.angle(found.translation, u), [scores.angle(o.translation, u) for o in found.alternatives], found.direction_std)
+    assert scores.angle(found.translation, u) < 2 * found.direction_std < 30
     one, _ = motion3d.estimate_field_motion(field, CAMERA, patches=100, region=(60, 60, 120, 120))
     assert one.status == "too_few_points" and np.isnan(one.translation).all()
     inside, middles = motion3d.estimate_field_motion(field, CAMERA, patches=40, region=(60, 60, 125, 85))
