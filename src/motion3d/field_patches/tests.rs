@@ -115,7 +115,7 @@ fn only_what_is_seen_is_told() {
 
 #[test]
 fn a_window_over_an_edge_is_told_less_surely() {
-    let step = |x: f64, _: f64| if x < 70.0 { [3.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { [2.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+    let step = |x: f64, _: f64| if x < 30.0 { [3.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { [2.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
     let found = field_patches(&field(1, 0.0, step), 60, None).unwrap();
     let variance = |k: usize| found.covariances[36 * k];
     // A third of the window moves by another pixel, 16 deviations of its noise.
@@ -184,27 +184,22 @@ fn squared(found: &super::super::MotionEstimate, truth: &Motion) -> f64 {
 fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
     let truth = Motion::new([0.6, 0.2, 0.75], [0.002, -0.003, 0.001]);
     let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
-    for (size, least) in [(60, 20), (100, 6)] {
-        let (mut held, mut told, mut errors) = (0, 0, Vec::new());
+    for (size, number, most) in [(60, 20, 0.8), (100, 6, 2.2)] {
+        let (mut told, mut held, mut sum, mut errors) = (0, 0, 0.0, Vec::new());
         for seed in 0..24 {
             let patches = field_patches(&drive(&truth, seed), size, None).unwrap();
-            assert_eq!(patches.points.len(), least);
+            assert_eq!(patches.points.len(), number);
             let found = estimate_patch_motion(&patches.seen_by(&camera()), &options).unwrap();
-            assert!(found.motion.translation[0].is_finite() && found.status != Told::TooFewPoints);
-            let error = found.motion.angle_to(&truth).to_degrees();
-            eprintln!(
-                "{size} {seed} {:?} {error:.2} {:.2} {:.2}",
-                found.status,
-                found.direction_std,
-                squared(&found, &truth)
-            );
-            errors.push(error);
-            if found.status == Told::Ok {
-                told += 1;
-                held += u32::from(squared(&found, &truth) < 11.07);
-            }
+            errors.push(found.motion.angle_to(&truth).to_degrees());
+            let square = squared(&found, &truth);
+            told += u32::from(found.status == Told::Ok);
+            held += u32::from(square < 11.07);
+            sum += square;
         }
         errors.sort_by(f64::total_cmp);
-        eprintln!("{size}: {held} of {told}, {:?}", errors[12]);
+        assert!(told >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {told}, {}", errors[12]);
+        // This noise has no tail, so that the area over which it is one is smaller than the one that is reckoned with.
+        let mean = sum / 24.0 / 5.0 * area() / (4.0 * std::f64::consts::PI);
+        assert!((0.4..2.2).contains(&mean), "{size}: {mean}");
     }
 }
