@@ -150,7 +150,7 @@ fn smoothed(width: usize, height: usize, length: f64, rng: CounterRng) -> Vec<f6
 /// The field of a motion past a smooth scene with noise that goes together over 3 px.
 fn drive(motion: &Motion, seed: u64) -> FlowField<f64> {
     let rng = CounterRng::new(seed);
-    let phase = 6.28 * rng.uniform(0);
+    let phase = std::f64::consts::TAU * rng.uniform(0);
     let mut field = field(1, 3.0, |px, py| {
         let [x, y] = camera().to_plane([px, py]);
         let (a, b) = (9.0 * x + phase, 7.0 * y - phase);
