@@ -14,6 +14,7 @@ import jacoflow
 import motion3d_rivals as rivals
 import motion3d_scenes as scenes
 from jacoflow import motion3d
+from jacoflow._jacoflow import _motion3d_field_points
 from motion3d_scores import angle
 
 Array = NDArray[np.float64]
@@ -146,7 +147,7 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
         fields = [field(*images[index : index + 2], preset) for index in range(len(images) - 1)]
         length = fields[0].correlation_length
         for spacing in spacings:
-            taken = [motion3d._motion3d_field_points(flow, float(spacing), None, None) for flow in fields]
+            taken = [_motion3d_field_points(flow, float(spacing), None, None) for flow in fields]
             for name, split in HALVES.items():
                 correlated, independent = [], []
                 for points, vectors, covariances, (_, shared, _) in taken:

@@ -79,9 +79,28 @@ impl Error {
     }
 }
 
+/// A number in a message: as it is, or with an exponent where that is shorter.
+pub(crate) fn number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+/// Numbers in a message: `(1, 2.5, 3e300)`.
+pub(crate) fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
+    let words: Vec<String> = values.into_iter().map(|&value| number(value)).collect();
+    format!("({})", words.join(", "))
+}
+
 /// A value of hundreds of digits tells nothing that its beginning does not.
 fn shortened(text: String) -> String {
     const MOST: usize = 160;
+    // More digits than a number has: zeros before or behind them.
+    const DIGITS: usize = 24;
+    if text.len() > DIGITS
+        && let Ok(value) = text.parse()
+    {
+        return number(value);
+    }
     match text.char_indices().nth(MOST) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text,
@@ -94,7 +113,19 @@ mod tests {
 
     #[test]
     fn long_values_are_cut() {
-        assert_eq!(Error::argument("sigma", "less", 1e300).to_string().len(), "sigma: expected less, got ".len() + 163);
+        let long = Error::argument("name", "less", "x".repeat(300)).to_string();
+        assert_eq!(long.len(), "name: expected less, got ".len() + 163);
+    }
+
+    #[test]
+    fn huge_and_tiny_numbers_have_an_exponent() {
+        for (value, word) in [(1e300, "1e300"), (-2.5e-300, "-2.5e-300"), (0.1, "0.1"), (f64::NAN, "NaN")] {
+            assert_eq!(
+                Error::argument("sigma", "less", value).to_string(),
+                format!("sigma: expected less, got {word}")
+            );
+        }
+        assert_eq!(numbers(&[0.0, -1.5, 1e300, 1e-9]), "(0, -1.5, 1e300, 1e-9)");
     }
 
     #[test]

@@ -55,15 +55,17 @@ __all__ = [
     "_mixture_densities",
     "_mixture_fit",
     "_mixture_partial_fit",
+    "_motion3d_beside",
     "_motion3d_bound",
     "_motion3d_contact_map",
+    "_motion3d_essential",
     "_motion3d_estimate",
+    "_motion3d_field_patches",
     "_motion3d_field_points",
     "_motion3d_focus",
     "_motion3d_predict",
     "_motion3d_sideways",
     "_motion3d_sideways_bound",
-    "_motion3d_two_views",
     "_observability",
     "_edge_disparity",
     "_edge_pixels",
@@ -977,13 +979,20 @@ def _mixture_partial_fit(
 def _mixture_densities(
     points: NDArray[np.float64], components: dict[str, Any], threads: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def _motion3d_beside(
+    rotation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, turning: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
 def _motion3d_bound(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, layout: dict[str, Any]
 ) -> dict[str, NDArray[np.float64]]: ...
 def _motion3d_contact_map(
     field: FlowField, intrinsics: ArrayLike, told: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], placement: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def _motion3d_essential(translation: ArrayLike, rotation: ArrayLike) -> NDArray[np.float64]: ...
 def _motion3d_estimate(points: ArrayLike, flow: ArrayLike, layout: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]: ...
+def _motion3d_field_patches(
+    field: FlowField, size: int, region: Sequence[int] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def _motion3d_field_points(
     field: FlowField, spacing: float | None, most: int | None, region: Sequence[int] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[float]]: ...
@@ -995,9 +1004,6 @@ def _motion3d_predict(
 ) -> NDArray[np.float64]: ...
 def _motion3d_sideways(flow: ArrayLike, sigma: float | None, weights: str) -> dict[str, Any]: ...
 def _motion3d_sideways_bound(inverse_depth: ArrayLike, sigma: float) -> dict[str, float]: ...
-def _motion3d_two_views(
-    translation: ArrayLike, rotation: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

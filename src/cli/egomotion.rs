@@ -11,7 +11,7 @@ use super::run::{Telling, input_details, report, run_pipeline, table_target};
 use crate::error::{Error, Result};
 use crate::flow::{Estimator, Method};
 use crate::motion3d::{self, FieldOptions, Intrinsics, MotionOptions};
-use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline};
+use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline, TableTarget};
 use crate::simd::SimdReal;
 use clap::Args;
 use serde_json::{Value, json};
@@ -23,13 +23,15 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Rows: frame, time_s, status, method, points, inliers, direction u (the scene's relative to the camera; the camera moves by -u) with its deviation in\n\
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
-    contact (frames) with their deviations. Points are taken twice as far apart as errors of the flow go together, in a small --region closer; the deviations heed what they share.\n\
+    contact (frames) with their deviations; the status of the scene around a --region, how many other motions explain the flow about as well (--alternatives writes them), and the\n\
+    deviations of the Cramer-Rao bound of these points, estimated with the depths found (bound_..., nan where these are mostly noise). Points are taken twice as far apart as errors of the flow go together, in a small --region closer; the deviations heed what they share.\n\
+    Rows of a run that is stopped (Ctrl-C) are kept in name.partial.csv.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
     its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
     Examples:\n  \
     jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/ --maps contact/\n  \
-    jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust > motion.csv\n  \
+    jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust --alternatives others.csv > motion.csv\n  \
     jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 --turning 0.001 -o car.csv"
 )]
 pub struct EgomotionCommand {
@@ -63,6 +65,9 @@ pub struct EgomotionCommand {
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
+    /// A .csv file for other motions that explain the flow about as well, as those of a status ambiguous: frame, time_s, number (the best first), direction, rotation, how much less likely it is (squared units of noise), focus of expansion
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub alternatives: Option<PathBuf>,
     /// Draw what comes near in red, and the focus of expansion, over every frame: a folder for egomotion_000000.png, ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub picture: Option<PathBuf>,
@@ -83,6 +88,10 @@ impl EgomotionCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let plan = self.plan()?;
         let opened = open_input(&self.input)?;
+        if let Some(pitch) = self.method.pixel_pitch.filter(|pitch| *pitch != (1.0, 1.0)) {
+            let got = format!("{},{}", pitch.0, pitch.1);
+            return Err(Error::argument("pixel_pitch", "none, as motion is estimated from flow in px", got));
+        }
         if self.method.no_covariance {
             return Err(Error::argument("no_covariance", "a covariance, which weighs the points", "none"));
         }
@@ -132,9 +141,24 @@ impl EgomotionCommand {
             },
             turning: self.turning,
             target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
+            alternatives: self.others()?,
             pictures: self.picture.clone(),
             maps: self.maps.clone(),
         })
+    }
+
+    /// Where other motions go.
+    fn others(&self) -> Result<Option<TableTarget>> {
+        let Some(path) = self.alternatives.as_deref() else { return Ok(None) };
+        let refuse = |got: String| Error::argument("alternatives", "a .csv file of its own", got);
+        if path == Path::new("-") || Some(path) == self.output.as_deref() {
+            return Err(refuse(path.display().to_string()));
+        }
+        let target = table_target(Some(path), self.force, false).map_err(|error| match error {
+            Error::Argument { expected, got, .. } => Error::Argument { argument: "alternatives", expected, got },
+            other => other,
+        });
+        target.map(Some)
     }
 
     /// Whether a folder may be written into.

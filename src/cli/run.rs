@@ -38,7 +38,7 @@ pub fn run_pipeline<T: SimdReal>(
 /// The report of a run, told in words on standard error unless asked not to.
 pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -> Report {
     let interrupted = matches!(failure, Some(Error::Interrupted));
-    let output = place(summary, telling.output);
+    let output = place(summary, telling.output, failure.is_none());
     if !telling.tell.quiet && (failure.is_none() || interrupted) {
         tell(&in_words(summary, output));
     }
@@ -59,10 +59,11 @@ pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -
     Report { summary: object, failure }
 }
 
-/// Where the results are: the place asked for, or the other name of the one file of a run that was stopped.
-fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>) -> Option<&'a Path> {
-    match (&summary.latest, asked) {
-        (Some(file), Some(asked)) if summary.files == 1 && !is_folder(asked) => Some(file),
+/// Where the results are: the place asked for; of a run that was stopped the other name that one file has then, and nothing where it left none.
+fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>, complete: bool) -> Option<&'a Path> {
+    let one_file = |asked: &&Path| *asked != Path::new("-") && !is_folder(asked);
+    match asked.filter(one_file) {
+        Some(_) if !complete || summary.files == 1 => summary.latest.as_deref(),
         _ => asked,
     }
 }
@@ -78,8 +79,12 @@ fn in_words(summary: &Summary, output: Option<&Path>) -> String {
         parts.push(format!("{} repairs", summary.repairs));
     }
     if let Some(output) = output.filter(|_| summary.files > 0) {
-        let files = if summary.files == 1 { "file" } else { "files" };
-        parts.push(format!("{} {files}: {}", summary.files, output.display()));
+        let files = match summary.files {
+            1 => "1 file:".to_string(),
+            more if is_folder(output) => format!("{more} files:"),
+            more => format!("{more} files, among them"),
+        };
+        parts.push(format!("{files} {}", output.display()));
     }
     parts.join(", ")
 }

@@ -7,7 +7,7 @@ use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::options::{Flow, Noise, Placement};
 use super::result::nested;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, numbers};
 use nalgebra::{Matrix2x3, SMatrix, Vector2};
 
 /// Least number of points for a motion.
@@ -46,7 +46,7 @@ impl MotionBound {
 /// (17) holds while it predicts less than about 5 degrees and the epipole is outside the points.
 ///
 /// # Errors
-/// [`Error::Argument`] for lengths that differ, noise that is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the motion.
+/// [`Error::Argument`] for lengths that differ, fewer than 5 finite points, covariances or depths, noise that is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the motion.
 pub fn motion_bound(
     points: &Flow<'_>,
     noise: &Noise<'_>,
@@ -60,10 +60,14 @@ pub fn motion_bound(
         return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
     }
     let observations = Intake::new(points, noise, Placement::Start).whitened();
+    if observations.n < LEAST {
+        let finite = (0..points.len()).filter(|&k| points.place(k).iter().all(|value| value.is_finite())).count();
+        return Err(too_few(LEAST, finite));
+    }
     let known: Vec<u32> = (0..observations.n as u32)
         .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
         .collect();
-    if known.len() < LEAST && observations.n >= LEAST {
+    if known.len() < LEAST {
         return Err(Error::argument("inv_depth", "finite values at five points at least", known.len()));
     }
     let observations = observations.subset(&known);
@@ -82,12 +86,30 @@ pub(super) fn not_determined() -> Error {
     Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
 }
 
+/// What to say where fewer than `least` points are usable, of which so many have a finite place: the others lack a finite covariance.
+pub(super) fn too_few(least: usize, finite: usize) -> Error {
+    if finite < least {
+        Error::argument("points", format!("at least {least} points that are finite"), finite)
+    } else {
+        Error::argument("cov", format!("finite covariances of at least {least} points"), "fewer")
+    }
+}
+
 pub(super) fn check_truth(noise: &Noise<'_>, motion: &Motion) -> Result<()> {
     if matches!(noise, Noise::Unknown) {
         return Err(Error::argument("sigma", "the noise of the flow, as sigma or cov", "none"));
     }
-    if !motion.translation.iter().chain(&motion.rotation).all(|value| value.is_finite()) {
-        return Err(Error::argument("translation", "a finite motion with a direction", format!("{motion:?}")));
+    check_motion(&motion.translation, &motion.rotation)
+}
+
+/// Whether a motion is finite and has a direction.
+pub(crate) fn check_motion(translation: &[f64; 3], rotation: &[f64; 3]) -> Result<()> {
+    let finite = |values: &[f64; 3]| values.iter().all(|value| value.is_finite());
+    if !finite(translation) || *translation == [0.0; 3] {
+        return Err(Error::argument("translation", "a finite vector with a direction", numbers(translation)));
+    }
+    if !finite(rotation) {
+        return Err(Error::argument("rotation", "a finite vector", numbers(rotation)));
     }
     Ok(())
 }

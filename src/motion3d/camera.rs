@@ -1,6 +1,6 @@
 //! The pinhole camera: from pixels to the plane at distance 1 and back.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, number, numbers};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 
 /// The intrinsics matrix `K` of a pinhole camera: `(px, py, 1) = K (x, y, 1)`, skew and unequal focal lengths included.
@@ -23,13 +23,13 @@ impl Intrinsics {
             return refuse("entries that are not finite".into());
         }
         if matrix[2] != [0.0, 0.0, 1.0] {
-            return refuse(format!("the last row {:?}", matrix[2]));
+            return refuse(format!("the last row {}", numbers(&matrix[2])));
         }
         if matrix[1][0] != 0.0 {
-            return refuse(format!("K[1][0] = {}", matrix[1][0]));
+            return refuse(format!("K[1][0] = {}", number(matrix[1][0])));
         }
         if !(matrix[0][0] > 0.0 && matrix[1][1] > 0.0) {
-            return refuse(format!("the focal lengths {} and {}", matrix[0][0], matrix[1][1]));
+            return refuse(format!("the focal lengths {} and {}", number(matrix[0][0]), number(matrix[1][1])));
         }
         match k.try_inverse() {
             Some(inverse) if inverse.iter().all(|value| value.is_finite()) => Ok(Self { matrix: k, inverse }),

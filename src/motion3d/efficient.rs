@@ -74,11 +74,11 @@ impl WeightDepths<'_> {
             along += own.s2[k] * own.nu[k] * given[k];
             square += own.s2[k] * given[k] * given[k];
         }
-        (along.abs() > RELATED * square.sqrt()).then(|| along / square)
+        (along > RELATED * square.sqrt()).then(|| along / square)
     }
 }
 
-/// Deviations from zero of the factor between known depths and those of the flow, below which they have nothing to do with each other.
+/// Deviations above zero of the factor between known depths and those of the flow, below which they have nothing to do with each other.
 const RELATED: f64 = 3.0;
 
 /// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.

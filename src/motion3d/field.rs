@@ -151,7 +151,7 @@ fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
 }
 
 /// Whether a pixel lies in the region, which is everything where there is none.
-fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
+pub(super) fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
     region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
 }
 

@@ -38,6 +38,7 @@ mod displaced;
 mod efficient;
 mod estimate;
 mod field;
+mod field_patches;
 mod grid;
 mod intake;
 mod kernels;
@@ -67,11 +68,14 @@ mod turned;
 mod valley;
 mod verdict;
 
+#[cfg(feature = "python")]
+pub(crate) use bound::check_motion;
 pub use bound::{MotionBound, motion_bound};
 pub use camera::Intrinsics;
 pub use contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
 pub use field::{FieldOptions, FieldPoints, field_points};
+pub use field_patches::{FieldPatches, field_patches};
 pub use motion::{Motion, Projection};
 pub use options::{Flow, Method, MotionOptions, Noise, Placement, RotationPrior};
 pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};

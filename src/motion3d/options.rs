@@ -5,7 +5,7 @@ use super::motion::{Motion, Projection, tangents};
 use super::observations::Known;
 use super::result::MotionEstimate;
 use super::smoothing::Smoother;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -78,9 +78,14 @@ pub struct RotationPrior {
 impl RotationPrior {
     /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard deviation about each axis, rad/frame). `None` where the scene's is not known.
     pub fn of_scene(scene: &MotionEstimate, turning: f64) -> Option<Self> {
+        Self::beside(scene.motion.rotation, &scene.covariance, turning)
+    }
+
+    /// The same from the scene's rotation and the covariance of its `(psi, w)`.
+    pub fn beside(rotation: [f64; 3], covariance: &[[f64; 5]; 5], turning: f64) -> Option<Self> {
         let own = |i, j| if i == j { turning * turning } else { 0.0 };
-        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| scene.covariance[2 + i][2 + j] + own(i, j)));
-        let known = Self { rotation: scene.motion.rotation, covariance };
+        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance[2 + i][2 + j] + own(i, j)));
+        let known = Self { rotation, covariance };
         known.rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(known)
     }
 }
@@ -118,12 +123,25 @@ impl MotionOptions {
             let expected = format!("{} values, one for each point", flow.len());
             return Err(Error::argument("weight_inv_depth", expected, depths.len()));
         }
+        self.check_in_front()?;
         if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
             let expected = "a finite rotation with a positive definite covariance";
-            return Err(Error::argument("rotation_prior", expected, format!("{prior:?}")));
+            let (rotation, covariance) = (numbers(&prior.rotation), numbers(prior.covariance.as_flattened()));
+            return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
         }
         self.check_initial()?;
         self.check_correlation(noise)
+    }
+
+    /// Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
+    fn check_in_front(&self) -> Result<()> {
+        let Some(depths) = &self.weight_depths else { return Ok(()) };
+        let mut finite = depths.iter().filter(|nu| nu.is_finite()).peekable();
+        if finite.peek().is_none() || finite.any(|&nu| nu > 0.0) {
+            return Ok(());
+        }
+        let got = "none above 0";
+        Err(Error::argument("weight_inv_depth", "inverse depths of points before the camera, which are positive", got))
     }
 
     fn check_initial(&self) -> Result<()> {
@@ -135,7 +153,8 @@ impl MotionOptions {
                 Err(Error::argument("initial", "a translation with a direction", "zero"))
             }
             Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
-                Err(Error::argument("initial", "a finite motion", format!("{m:?}")))
+                let got = format!("{} and {}", numbers(&m.translation), numbers(&m.rotation));
+                Err(Error::argument("initial", "a finite translation and rotation", got))
             }
             _ => Ok(()),
         }
@@ -215,7 +234,7 @@ impl Flow<'_> {
         if let Self::Sphere { bearings, .. } = self {
             let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
             if let Some(wrong) = bearings.iter().find(off) {
-                return Err(Error::argument("points", "bearings of length 1", format!("{wrong:?}")));
+                return Err(Error::argument("points", "bearings of length 1", numbers(wrong)));
             }
         }
         match noise {
@@ -252,5 +271,5 @@ pub(super) fn is_covariance(matrix: &DMatrix<f64>) -> bool {
 }
 
 pub(super) fn not_covariance(k: usize, got: &[f64]) -> Error {
-    Error::argument("cov", "symmetric positive definite matrices", format!("{got:?} at point {k}"))
+    Error::argument("cov", "symmetric positive definite matrices", format!("at point {k} {}", numbers(got)))
 }

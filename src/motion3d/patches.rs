@@ -10,7 +10,7 @@ mod turned;
 mod verdict;
 
 use super::belief::believed;
-use super::bound::{MotionBound, check_truth, not_determined};
+use super::bound::{MotionBound, check_truth, not_determined, too_few};
 use super::camera::Intrinsics;
 use super::covariance::{determined, direction_deviation, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
@@ -253,10 +253,14 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
         return Err(Error::argument("inv_depth", expected, surfaces.len()));
     }
     let system = patches.system(Placement::Start, None);
+    if system.patches.len() < LEAST {
+        let finite = |at: &&[f64; 2]| at.iter().all(|value| value.is_finite());
+        return Err(too_few(LEAST, patches.points.iter().filter(finite).count()));
+    }
     let known: Vec<u32> = (0..system.patches.len() as u32)
         .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
         .collect();
-    if known.len() < LEAST && system.patches.len() >= LEAST {
+    if known.len() < LEAST {
         return Err(Error::argument("inv_depth", "finite surfaces of two patches at least", known.len()));
     }
     let system = system.subset(&known);

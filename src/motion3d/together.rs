@@ -25,6 +25,11 @@ fn correlation(distance: f64) -> f64 {
     QUICK * (-0.25 * distance * distance).exp() + (1.0 - QUICK) * (-distance / TAIL).exp()
 }
 
+/// The area over which errors are one, `int rho`, in squared correlation lengths: sums over larger areas err as if so much of it were one point.
+pub(super) fn area() -> f64 {
+    std::f64::consts::PI * (4.0 * QUICK + 2.0 * (1.0 - QUICK) * TAIL * TAIL)
+}
+
 /// A motion whose equations have these depths in their weights.
 pub(super) struct Weighted<'a> {
     pub motion: &'a Motion,

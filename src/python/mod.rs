@@ -58,8 +58,9 @@ mod _jacoflow {
     use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
     use super::motion3d::{
-        motion3d_bound, motion3d_contact_map, motion3d_estimate, motion3d_field_points, motion3d_focus,
-        motion3d_predict, motion3d_sideways, motion3d_sideways_bound, motion3d_two_views,
+        motion3d_beside, motion3d_bound, motion3d_contact_map, motion3d_essential, motion3d_estimate,
+        motion3d_field_patches, motion3d_field_points, motion3d_focus, motion3d_predict, motion3d_sideways,
+        motion3d_sideways_bound,
     };
     #[pymodule_export]
     use super::observability::{classify, observability};

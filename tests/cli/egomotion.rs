@@ -8,13 +8,18 @@ const GROWTH: f64 = 1.02;
 
 /// Frames of a textured plane that is approached, 128 x 96 px.
 fn approach(place: &Place, folder: &str, count: i32) {
+    approach_to(place, folder, count, (64.0, 48.0));
+}
+
+/// The same with another focus of expansion.
+fn approach_to(place: &Place, folder: &str, count: i32, focus: (f64, f64)) {
     std::fs::create_dir(place.path(folder)).unwrap();
     let wave =
         |k: f64, x: f64, y: f64| (0.11 + 0.3 * (k * 1.7).sin().abs()) * ((k * 2.3).cos() * x + (k * 2.3).sin() * y) + k;
     for frame in 0..count {
         let scale = GROWTH.powi(frame);
         let picture = GrayImage::from_fn(128, 96, |x, y| {
-            let (x, y) = ((f64::from(x) - 64.0) / scale, (f64::from(y) - 48.0) / scale);
+            let (x, y) = ((f64::from(x) - focus.0) / scale, (f64::from(y) - focus.1) / scale);
             let shade: f64 = (1..25).map(|k| 12.0 * wave(f64::from(k), x, y).sin()).sum();
             Luma([(128.0 + shade).clamp(0.0, 255.0).round() as u8])
         });
@@ -170,6 +175,86 @@ fn a_thing_ahead_has_its_own_time_to_contact() {
     }
     let ended = place.line("egomotion frames --intrinsics 250,250,96,72 --turning 0.001");
     assert!(ended.code == 2 && ended.err.contains("--region"), "{}", ended.err);
+}
+
+/// The bound is estimated, too, with the depths found: near the deviation where weights are good, and not told where depths are mostly noise.
+#[test]
+fn the_bound_stands_beside_the_deviations() {
+    let place = Place::new();
+    approach_to(&place, "frames", 3, (112.0, 48.0));
+    for row in
+        rows(&place.good("egomotion frames --intrinsics 120,120,64,48 --preset fast --pair --no-robust --quiet").out)
+    {
+        for name in ["direction_std_deg", "w_x_std", "w_y_std", "w_z_std"] {
+            let [own, bound] =
+                [name.to_string(), format!("bound_{name}")].map(|name| row[&name].parse::<f64>().unwrap());
+            assert!(bound > 0.5 * own && bound < 1.5 * own, "{name}: {row:?}");
+        }
+    }
+}
+
+/// A plane that faces the camera and is approached obliquely looks as if it were approached straight by a camera that turns.
+#[test]
+fn other_motions_that_explain_the_flow_have_a_table_of_their_own() {
+    let place = Place::new();
+    approach_to(&place, "frames", 4, (112.0, 48.0));
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --no-robust -o motion.csv --alternatives others.csv --json";
+    let summary = place.good(line).json();
+    assert_eq!((&summary["files"], &summary["output"]), (&2.into(), &"motion.csv".into()));
+    let read = |name: &str| rows(&std::fs::read_to_string(place.path(name)).unwrap());
+    let (motions, others) = (read("motion.csv"), read("others.csv"));
+    assert_eq!(motions.len(), 3);
+    let mut ambiguous = 0;
+    for row in &motions {
+        let own: Vec<_> = others.iter().filter(|other| other["frame"] == row["frame"]).collect();
+        assert_eq!(row["alternatives"], own.len().to_string(), "{row:?}");
+        if row["status"] != "ambiguous" {
+            continue;
+        }
+        ambiguous += 1;
+        // One of them is the true one, another comes along the normal.
+        let foci: Vec<f64> =
+            own.iter().map(|other| &other["foe_x"]).chain([&row["foe_x"]]).map(|x| x.parse().unwrap()).collect();
+        for truth in [112.0, 64.0] {
+            assert!(foci.iter().any(|x| (x - truth).abs() < 16.0), "{truth}: {foci:?}");
+        }
+        assert_eq!(own[0]["number"], "1");
+        let length: f64 = ["u_x", "u_y", "u_z"].iter().map(|name| own[0][*name].parse::<f64>().unwrap().powi(2)).sum();
+        assert!((length - 1.0).abs() < 1e-6 && own[0]["excess_cost"].parse::<f64>().unwrap().is_finite());
+    }
+    assert!(ambiguous > 0, "{motions:?}");
+    for (wrong, word) in
+        [("others.csv", "--force"), ("-", "alternatives"), ("motion2.csv", "its own"), ("o.txt", "alternatives")]
+    {
+        let line = line.replace("-o motion.csv", "-o motion2.csv").replace("others.csv", wrong);
+        let ended = place.line(&line);
+        assert!(ended.code == 2 && ended.err.contains("alternatives: ") && ended.err.contains(word), "{}", ended.err);
+    }
+    assert_eq!(place.names("."), ["frames", "motion.csv", "others.csv"]);
+}
+
+/// Not even a header is told to standard output before a run that can only fail.
+#[test]
+fn nothing_is_written_where_nothing_can_be_told() {
+    let place = Place::new();
+    approach(&place, "frames", 2);
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair";
+    for (options, words) in [
+        ("--limit 1", "at least 2 frames"),
+        ("--pixel-pitch 2", "pixel_pitch: expected none"),
+        ("--pixel-pitch 2,1", "2,1"),
+    ] {
+        let ended = place.line(&format!("{line} {options}"));
+        assert!(
+            ended.code == 2 && ended.out.is_empty() && ended.err.contains(words),
+            "{options}: {:?} {}",
+            ended.out,
+            ended.err
+        );
+        let ended = place.line(&format!("{line} {options} -o motion.csv --json"));
+        assert!(ended.code == 2 && ended.err.contains(words) && place.names(".") == ["frames"], "{}", ended.err);
+    }
+    place.good(&format!("{line} --pixel-pitch 1 --quiet"));
 }
 
 #[test]

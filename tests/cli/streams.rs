@@ -139,6 +139,37 @@ fn rows_of_an_interrupted_run_are_told_by_the_name_they_have() {
     }
 }
 
+/// With pictures beside it, and before there is any row.
+#[test]
+fn a_table_of_motions_that_was_interrupted_is_told_by_the_name_it_has() {
+    let line = "egomotion - --intrinsics 60,60,32,24 --method windowed --pair --spacing 6 --no-robust --picture pictures --alternatives others.csv -o motion.csv --json";
+    for frames in [1, 4] {
+        let place = Place::new();
+        let mut child = start(&place, line);
+        let mut pipe = child.stdin.take().unwrap();
+        pipe.write_all(&header()).unwrap();
+        (0..frames).for_each(|index| pipe.write_all(&frame(index)).unwrap());
+        pipe.flush().unwrap();
+        let pictures = || fs::read_dir(place.path("pictures")).map_or(0, Iterator::count);
+        wait_until("the tables and pictures", || temporary(&place.path(".")).len() == 2 && pictures() >= frames - 1);
+        interrupt(&child);
+        let output = child.wait_with_output().unwrap();
+        drop(pipe);
+        assert_eq!(output.status.code(), Some(130));
+        let words = String::from_utf8(output.stderr).unwrap();
+        let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(!place.path("motion.csv").exists() && temporary(&place.path(".")).is_empty());
+        if frames == 1 {
+            assert_eq!((&summary["output"], &summary["files"]), (&serde_json::Value::Null, &0.into()), "{words}");
+            assert!(!words.contains("motion.csv") && place.names(".").is_empty(), "{words}");
+        } else {
+            assert_eq!(summary["output"], "motion.partial.csv");
+            assert!(words.contains("files, among them motion.partial.csv"), "{words}");
+            assert_eq!(fs::read_to_string(place.path("motion.partial.csv")).unwrap().lines().count(), frames);
+        }
+    }
+}
+
 #[test]
 fn a_second_interrupt_ends_at_once_and_leaves_no_temporary_file() {
     for line in [

@@ -8,14 +8,14 @@ use crate::io::npz::NpzWriter;
 use crate::io::{NumberedFiles, cell, write_picture};
 use crate::math::Real;
 use crate::motion3d::{
-    FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, RotationPrior, Status,
-    contact_map, estimate_motion, field_points, focus_of_expansion,
+    Alternative, FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, RotationPrior,
+    Status, contact_map, estimate_motion, field_points, focus_of_expansion,
 };
 use crate::types::{AnyFrame, FlowField};
 use std::path::PathBuf;
 
 /// Columns of the table.
-const HEADER: [&str; 25] = [
+const HEADER: [&str; 30] = [
     "frame",
     "time_s",
     "status",
@@ -41,7 +41,16 @@ const HEADER: [&str; 25] = [
     "time_to_contact",
     "time_to_contact_std",
     "scene_status",
+    "alternatives",
+    "bound_direction_std_deg",
+    "bound_w_x_std",
+    "bound_w_y_std",
+    "bound_w_z_std",
 ];
+
+/// Columns of the table of other motions.
+const ALTERNATIVES: [&str; 12] =
+    ["frame", "time_s", "number", "u_x", "u_y", "u_z", "w_x", "w_y", "w_z", "excess_cost", "foe_x", "foe_y"];
 
 /// What is estimated from fields and where it goes.
 #[derive(Debug, Clone)]
@@ -56,6 +65,8 @@ pub struct EgomotionPlan {
     pub turning: Option<f64>,
     /// Where rows go.
     pub target: TableTarget,
+    /// Where other motions go that explain the flow about as well, one row each.
+    pub alternatives: Option<TableTarget>,
     /// A folder for pictures, `egomotion_000000.png`, ...
     pub pictures: Option<PathBuf>,
     /// A folder for times to contact all over the field, `contact_000000.npz`, ...
@@ -63,22 +74,25 @@ pub struct EgomotionPlan {
 }
 
 /// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame) and time
-/// to contact (frames) of all points together.
+/// to contact (frames) of all points together, and the Cramér-Rao bound; other motions that explain the flow as well into a table of their own.
 #[derive(Debug)]
 pub struct Egomotion {
     plan: EgomotionPlan,
     table: Table,
+    alternatives: Option<Table>,
     written: usize,
     latest: Option<PathBuf>,
 }
 
 impl Egomotion {
-    /// Opens the table.
+    /// Opens the tables.
     ///
     /// # Errors
     /// As [`Table::create`].
     pub fn open(plan: EgomotionPlan) -> Result<Self> {
-        Ok(Self { table: Table::create(&plan.target, &HEADER)?, plan, written: 0, latest: None })
+        let table = Table::create(&plan.target, &HEADER)?;
+        let alternatives = plan.alternatives.as_ref().map(|target| Table::create(target, &ALTERNATIVES)).transpose()?;
+        Ok(Self { table, alternatives, plan, written: 0, latest: None })
     }
 
     /// The motion of these points, with what is known of the rotation beforehand.
@@ -128,8 +142,26 @@ impl Egomotion {
         cells.extend(at.map(cell));
         cells.extend([spread[0][0].sqrt(), spread[1][1].sqrt(), rate, rate_std, contact, contact_std].map(cell));
         cells.push(scene.map_or("", Status::name).to_string());
+        cells.push(found.alternatives.len().to_string());
+        cells.extend(bound_deviations(&found.bound).map(cell));
         self.table.row(cells)?;
         self.table.flush()
+    }
+
+    /// Other motions that explain the flow about as well, the best first.
+    fn others(&mut self, frame: usize, time: Option<f64>, found: &MotionEstimate) -> Result<()> {
+        let Some(table) = &mut self.alternatives else { return Ok(()) };
+        for (k, Alternative { motion, excess }) in found.alternatives.iter().enumerate() {
+            let focus = focus_of_expansion(motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
+            let mut cells = vec![frame.to_string(), time.map(cell).unwrap_or_default(), (k + 1).to_string()];
+            cells.extend(motion.translation.map(cell));
+            cells.extend(motion.rotation.map(cell));
+            cells.push(cell(*excess));
+            // Its covariance would be that of the first choice.
+            cells.extend(focus.map_or([f64::NAN; 2], |(at, _)| at).map(cell));
+            table.row(cells)?;
+        }
+        Ok(())
     }
 
     /// The frame with its points in the colours of their rates of approach, and the focus of expansion.
@@ -167,6 +199,12 @@ impl Egomotion {
     }
 }
 
+/// Deviations of the bound: of the direction, degrees, and of the rotation, rad/frame.
+fn bound_deviations(bound: &[[f64; 5]; 5]) -> [f64; 4] {
+    let deviation = |i: usize| bound[i][i].sqrt();
+    [deviation(0).hypot(deviation(1)).to_degrees(), deviation(2), deviation(3), deviation(4)]
+}
+
 /// `-1 / rate` with its deviation; infinite without an approach.
 fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
     if rate == 0.0 { (f64::INFINITY, f64::INFINITY) } else { (-1.0 / rate, deviation / (rate * rate)) }
@@ -179,7 +217,9 @@ impl<T: Real> Sink<T> for Egomotion {
         let known = scene.as_ref().and_then(|(scene, turning)| RotationPrior::of_scene(scene, *turning));
         let found = self.motion(&points, known)?;
         let status = scene.map(|(scene, _)| scene.status);
-        self.row(step.field.layout.frame_index, step.time, &points, &found, status)?;
+        let frame = step.field.layout.frame_index;
+        self.row(frame, step.time, &points, &found, status)?;
+        self.others(frame, step.time, &found)?;
         if found.status == Status::TooFewPoints {
             return Ok(());
         }
@@ -188,11 +228,13 @@ impl<T: Real> Sink<T> for Egomotion {
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.table.finish(ending)
+        let others = self.alternatives.as_mut().map_or(Ok(()), |table| table.finish(ending));
+        self.table.finish(ending).and(others)
     }
 
     fn files(&self) -> (usize, Option<PathBuf>) {
         let (tables, table) = self.table.files();
-        (tables + self.written, table.or_else(|| self.latest.clone()))
+        let (others, _) = self.alternatives.as_ref().map(Table::files).unwrap_or_default();
+        (tables + others + self.written, table.or_else(|| self.latest.clone()))
     }
 }

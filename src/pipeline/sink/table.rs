@@ -34,10 +34,11 @@ impl TableTarget {
     }
 }
 
-/// A table that ends as a run ends.
+/// A table that ends as a run ends. On standard output its header comes with the first row: a run that fails before that leaves nothing there.
 #[derive(Debug)]
 pub struct Table {
     target: TableTarget,
+    header: Vec<String>,
     writer: Option<TableWriter>,
     rows: usize,
     kept: Option<PathBuf>,
@@ -49,8 +50,22 @@ impl Table {
     /// # Errors
     /// As [`TableWriter::create`].
     pub fn create(target: &TableTarget, header: &[&str]) -> Result<Self> {
-        let writer = TableWriter::create(target.path(), header)?;
-        Ok(Self { target: target.clone(), writer: Some(writer), rows: 0, kept: None })
+        let writer = TableWriter::create_without_header(target.path(), header.len())?;
+        let header = header.iter().map(ToString::to_string).collect();
+        let mut table = Self { target: target.clone(), header, writer: Some(writer), rows: 0, kept: None };
+        if *target != TableTarget::StandardOutput {
+            table.begin()?;
+        }
+        Ok(table)
+    }
+
+    /// Writes the header, once.
+    fn begin(&mut self) -> Result<()> {
+        let header = std::mem::take(&mut self.header);
+        match &mut self.writer {
+            Some(writer) if !header.is_empty() => writer.row(header),
+            _ => Ok(()),
+        }
     }
 
     /// Adds a row.
@@ -58,6 +73,7 @@ impl Table {
     /// # Errors
     /// As [`TableWriter::row`].
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) -> Result<()> {
+        self.begin()?;
         self.rows += 1;
         self.writer.as_mut().map_or(Ok(()), |writer| writer.row(cells))
     }
@@ -78,6 +94,9 @@ impl Table {
     /// # Errors
     /// As [`TableWriter::finish`].
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
+        if ending == Ending::Complete {
+            self.begin()?;
+        }
         let Some(writer) = self.writer.take() else { return Ok(()) };
         self.kept = end_table(&self.target, ending, self.rows > 0, |name| match name {
             Some(name) => writer.finish_as(name),

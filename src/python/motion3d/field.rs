@@ -3,7 +3,8 @@
 use super::flow::{motion, spread};
 use super::given::{square, word};
 use super::options::PLACEMENTS;
-use crate::motion3d::{FieldOptions, Intrinsics, contact_map, field_points};
+use super::told::matrix;
+use crate::motion3d::{FieldOptions, Intrinsics, contact_map, field_patches, field_points};
 use crate::python::arrays;
 use crate::python::field::{FlowField, Store, each};
 use crate::python::options::{self, Region};
@@ -29,12 +30,33 @@ pub fn motion3d_field_points<'py>(
         py.detach(|| field_points(&field, &chosen))
     })?;
     let n = found.points.len();
-    let flat = |rows: Vec<[f64; 2]>| rows.into_iter().flatten().collect::<Vec<f64>>();
     Ok((
-        arrays::owned(py, &[n, 2], flat(found.points))?.into_any(),
-        arrays::owned(py, &[n, 2], flat(found.flow))?.into_any(),
+        matrix(py, &found.points)?.into_any(),
+        matrix(py, &found.flow)?.into_any(),
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
         [found.spacing, found.shared, found.correlation_length],
+    ))
+}
+
+#[pyfunction]
+#[pyo3(name = "_motion3d_field_patches")]
+pub fn motion3d_field_patches<'py>(
+    py: Python<'py>,
+    field: &FlowField,
+    size: usize,
+    region: Option<Region>,
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>)> {
+    single(field)?;
+    let region = options::region(region)?;
+    let found = each!(field.store(), packed => {
+        let field = field.core(packed, 0);
+        py.detach(|| field_patches(&field, size, region))
+    })?;
+    let n = found.points.len();
+    Ok((
+        matrix(py, &found.points)?.into_any(),
+        matrix(py, &found.motion)?.into_any(),
+        arrays::owned(py, &[n, 6, 6], found.covariances)?.into_any(),
     ))
 }
 

@@ -3,7 +3,7 @@
 use super::given::{camera, rows, triple};
 use super::told::{matrix, vector};
 use crate::error::Error;
-use crate::motion3d::{Motion, focus_of_expansion};
+use crate::motion3d::{Motion, RotationPrior, focus_of_expansion};
 use crate::python::arrays;
 use pyo3::prelude::*;
 
@@ -42,15 +42,28 @@ pub fn motion3d_focus<'py>(
 }
 
 #[pyfunction]
-#[pyo3(name = "_motion3d_two_views")]
-pub fn motion3d_two_views<'py>(
-    py: Python<'py>,
-    translation: &Any<'py>,
-    rotation: &Any<'py>,
-) -> PyResult<(Any<'py>, Any<'py>, Any<'py>)> {
+#[pyo3(name = "_motion3d_essential")]
+pub fn motion3d_essential<'py>(py: Python<'py>, translation: &Any<'py>, rotation: &Any<'py>) -> PyResult<Any<'py>> {
     let motion = motion(translation, rotation)?;
-    let (essential, turn) = (matrix(py, &motion.essential_matrix())?, matrix(py, &motion.rotation_matrix())?);
-    Ok((essential.into_any(), turn.into_any(), vector(py, motion.displacement())?.into_any()))
+    Ok(matrix(py, &motion.essential_matrix())?.into_any())
+}
+
+/// The rotation of a thing in a scene as far as the scene's tells it, and its covariance; `None` where the scene's is not known.
+#[pyfunction]
+#[pyo3(name = "_motion3d_beside")]
+pub fn motion3d_beside<'py>(
+    py: Python<'py>,
+    rotation: &Any<'py>,
+    tangent: &Any<'py>,
+    covariance: &Any<'py>,
+    turning: f64,
+) -> PyResult<Option<(Any<'py>, Any<'py>)>> {
+    if !(turning.is_finite() && turning > 0.0) {
+        return Err(Error::argument("turning", "a positive number", turning).into());
+    }
+    let (_, covariance) = spread(tangent, covariance)?;
+    let Some(known) = RotationPrior::beside(triple("scene", rotation)?, &covariance, turning) else { return Ok(None) };
+    Ok(Some((vector(py, known.rotation)?.into_any(), matrix(py, &known.covariance)?.into_any())))
 }
 
 #[pyfunction]

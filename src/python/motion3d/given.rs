@@ -139,7 +139,12 @@ impl GivenPatches {
     /// Without `affine`, the numbers are zero: bounds do not look at them.
     pub fn new(points: &Any<'_>, affine: Option<&Any<'_>>, layout: &Layout<'_>) -> PyResult<Self> {
         if layout.projection != "plane" {
-            return Err(Error::argument("projection", "\"plane\", for six numbers a patch", "another").into());
+            return Err(Error::argument(
+                "projection",
+                "\"plane\", for six numbers a patch",
+                format!("{:?}", layout.projection),
+            )
+            .into());
         }
         let (shape, values) = arrays::doubles("points", points)?;
         let points: Vec<[f64; 2]> = rows("points", &shape, &values)?;

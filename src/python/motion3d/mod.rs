@@ -7,11 +7,11 @@ mod options;
 mod sideways;
 mod told;
 
-pub use field::{motion3d_contact_map, motion3d_field_points};
-pub use flow::{motion3d_focus, motion3d_predict, motion3d_two_views};
+pub use field::{motion3d_contact_map, motion3d_field_patches, motion3d_field_points};
+pub use flow::{motion3d_beside, motion3d_essential, motion3d_focus, motion3d_predict};
 pub use sideways::{motion3d_sideways, motion3d_sideways_bound};
 
-use crate::motion3d::{Motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
+use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
 use given::{Given, GivenPatches, Layout, rows, triple};
 use options::Options;
 use pyo3::prelude::*;
@@ -47,7 +47,9 @@ pub fn motion3d_bound<'py>(
     rotation: &Bound<'py, PyAny>,
     layout: Layout<'py>,
 ) -> PyResult<ToldBound<'py>> {
-    let motion = Motion::new(triple("translation", translation)?, triple("rotation", rotation)?);
+    let (translation, rotation) = (triple("translation", translation)?, triple("rotation", rotation)?);
+    check_motion(&translation, &rotation)?;
+    let motion = Motion::new(translation, rotation);
     let (shape, depths) = super::arrays::doubles("inv_depth", inverse_depth)?;
     if layout.six {
         let given = GivenPatches::new(points, None, &layout)?;

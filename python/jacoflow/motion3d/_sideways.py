@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _motion3d_sideways, _motion3d_sideways_bound
+from .._jacoflow import _motion3d_sideways, _motion3d_sideways_bound
+from ._checks import number, word
 
 __all__ = ["SidewaysBound", "SidewaysEstimate", "estimate_sideways", "sideways_bound"]
 
@@ -79,9 +80,8 @@ def estimate_sideways(flow: ArrayLike, *, sigma: float | None = None, weights: L
     >>> round(float(np.degrees(estimate_sideways([[0.9, 0.9], [1.1, 1.1]], sigma=0.01).angle)))
     45
     """
-    if not isinstance(weights, str):
-        raise TypeError(f"weights: expected a word, got {weights!r}")
-    return SidewaysEstimate(**_motion3d_sideways(flow, None if sigma is None else _number(sigma), weights))
+    word("weights", weights)
+    return SidewaysEstimate(**_motion3d_sideways(flow, None if sigma is None else number("sigma", sigma), weights))
 
 
 def sideways_bound(inv_depth: ArrayLike, *, sigma: float) -> SidewaysBound:
@@ -104,14 +104,4 @@ def sideways_bound(inv_depth: ArrayLike, *, sigma: float) -> SidewaysBound:
     >>> round(sideways_bound(np.linspace(0.5, 1.5, 101), sigma=0.3).crossover, 5)
     0.30369
     """
-    return SidewaysBound(**_motion3d_sideways_bound(inv_depth, _number(sigma)))
-
-
-def _number(sigma: float) -> float:
-    """A real number that is none of the things that Python turns into one."""
-    if not isinstance(sigma, str | bytes | bool | np.bool_ | complex):
-        try:
-            return float(sigma)
-        except (TypeError, ValueError, OverflowError):
-            pass
-    raise TypeError(f"sigma: expected a number, got {sigma!r}")
+    return SidewaysBound(**_motion3d_sideways_bound(inv_depth, number("sigma", sigma)))

@@ -1,0 +1,94 @@
+"""The motion that explains flow at points."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from numpy.typing import ArrayLike
+
+from .._jacoflow import _motion3d_estimate
+from ._checks import besides, count, layout, number, pair, six, switch, whole, word
+from ._results import MotionEstimate, estimate_of
+
+
+def estimate_motion(
+    points: ArrayLike,
+    flow: ArrayLike,
+    K: ArrayLike | None = None,
+    *,
+    sigma: float | None = None,
+    cov: ArrayLike | None = None,
+    jacobian: ArrayLike | None = None,
+    projection: Literal["plane", "sphere"] = "plane",
+    method: Literal["auto", "ml", "efficient"] = "auto",
+    robust: bool = False,
+    placement: Literal["midpoint", "start"] = "midpoint",
+    smoother: Literal["auto", "prior", "neighbours"] = "auto",
+    weight_inv_depth: ArrayLike | None = None,
+    rotation_prior: tuple[ArrayLike, ArrayLike] | None = None,
+    initial: tuple[ArrayLike, ArrayLike] | None = None,
+    shared: float = 1.0,
+    correlation_length: float = 0.0,
+    seed: int = 0,
+    threads: int | None = None,
+) -> MotionEstimate:
+    """The rigid motion that explains flow at N points, with covariance, depths and status.
+
+    Maximum likelihood over all directions (3), (4), then the estimating equation (19) whose weights have smoothed depths. Scenes that do not determine a motion are told by `status`. Everything is computed in double precision; the result does not depend on the
+    number of threads.
+
+    Parameters
+    ----------
+    points : array (N, 2), px with K, else (x, y) on the plane at distance 1; (N, 3), unit bearings, on the sphere
+        Where. Rows that are not finite are left out.
+    flow : array (N, 2), px/frame with K, else per frame; (N, 3) on the sphere
+        Displacement over one frame.
+    K : array (3, 3) or None
+        Camera matrix, px; skew and unequal focal lengths are heeded.
+    sigma : float, units of flow
+        Standard deviation of each component. None, and no `cov`: estimated from the residuals.
+    cov : array (N, 2, 2), units of flow squared; (N, 3, 3) on the sphere; (N, 6, 6) with `jacobian`
+        Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y). A point with a variance below a millionth of the lower quartile of all has that quartile added, as no measurement is so much better than the others.
+    jacobian : array (N, 2, 2), 1/frame
+        [[u_x, u_y], [v_x, v_y]] at the points: six numbers a patch, which pays for few (2 to 10), large patches (windows of 30 px and more) that do not overlap. Needs `cov`.
+    projection : "plane" or "sphere"
+        The screen.
+    method : "auto", "ml" or "efficient"
+        "auto": "efficient" from 30 points (5 patches) on, else "ml".
+    robust : bool
+        Find the points that obey one motion among up to 60 % that do not. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
+    placement : "midpoint" or "start"
+        What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
+        negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
+    smoother : "auto", "prior" or "neighbours"
+        What depths in the weights are drawn to: one normal distribution, regressions on 8 to 64 neighbours, or the better of them.
+    weight_inv_depth : array (N,), units of |u| per frame
+        Inverse depths for the weights, known from elsewhere, in any unit: a common factor is found, which is positive as the depths are. What is wrong with them costs variance, which the covariance tells, and causes no bias; where they have nothing to do with the flow's depths, `ml` is returned (`fell_back`). Points whose value is not finite are left out.
+    rotation_prior : (rotation (3,) in rad/frame, covariance (3, 3))
+        The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides.
+    initial : (translation (3,), rotation (3,) in rad/frame)
+        Look for the minimum near this motion instead of everywhere.
+    shared : float, no unit
+        How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
+    correlation_length : float, px with K, else units of points; rad on the sphere
+        How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. 0: errors are independent.
+    seed : int
+        Seed of the random choices.
+    threads : int or None
+        Number of threads; default: the environment variable JACOFLOW_THREADS, or every processor.
+
+    Raises
+    ------
+    ValueError
+        For shapes and values that do not fit; each message names the argument.
+    """
+    for name, value in (("method", method), ("placement", placement), ("smoother", smoother)):
+        word(name, value)
+    given = layout(K, sigma, cov, projection, jacobian is not None)
+    options = {
+        "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
+    }  # fmt: skip
+    if jacobian is not None:
+        flow = six(flow, jacobian)
+    return estimate_of(_motion3d_estimate(points, flow, given, options))

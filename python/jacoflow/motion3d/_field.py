@@ -1,0 +1,146 @@
+"""The motion of what a flow field shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from numpy.typing import ArrayLike
+
+from .._jacoflow import _motion3d_beside, _motion3d_contact_map, _motion3d_field_patches, _motion3d_field_points
+from ._checks import Array, count, number, word
+from ._estimate import estimate_motion
+from ._results import MotionEstimate
+
+if TYPE_CHECKING:
+    from .. import FlowField
+
+OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
+"""What may be said of the estimate; what a field tells itself is refused by name."""
+
+FIELD_OWN = {
+    "sigma": "has covariances of its own",
+    "cov": "has covariances of its own",
+    "jacobian": "has a Jacobian of its own, which patches= uses",
+    "projection": "is one of the plane",
+}
+
+
+def estimate_field_motion(
+    field: FlowField,
+    K: ArrayLike,
+    *,
+    spacing: float | None = None,
+    max_points: int | None = None,
+    region: Sequence[int] | None = None,
+    scene: MotionEstimate | None = None,
+    turning: float = 1e-3,
+    patches: int | None = None,
+    **options: Any,
+) -> tuple[MotionEstimate, Array]:
+    """The rigid motion of the scene in a flow field, from its own covariances, and the points (N, 2), px, that it was estimated from; with `patches` from the Jacobian, too.
+
+    Parameters
+    ----------
+    field : FlowField
+        One field (not a stack) with a covariance, in px/frame.
+    K : array (3, 3)
+        Camera matrix, px.
+    spacing : px or None
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that (`correlation_length` of `estimate_motion`).
+    max_points : int or None
+        Most points, of the `region` if there is one; the grid is made coarser to keep to it.
+    region : (x, y, width, height), px, or None
+        Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
+    scene : MotionEstimate or None
+        The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the thing's in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
+    turning : float, rad/frame
+        Standard deviation of the thing's own rotation, per axis; it matters only with `scene`.
+    patches : px or None
+        Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, from a fit of second order to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows in the patch, of the area `58 l^2` over which errors go together, and more where flow has edges in it. Six numbers pay for
+        2 to 10 large patches (60 px and more) seen through a long lens. Windows lie side by side in the frame or `region`; those of which less than half is valid are left out. Not with `spacing`, `max_points`, `scene` and `robust`.
+    **options
+        Those of `estimate_motion` but `sigma`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True unless told otherwise or `patches` are asked for.
+
+    Raises
+    ------
+    ValueError
+        For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` without a `region` or whose rotation is not known, for no `K`, and for options that do not fit.
+    TypeError
+        For a `scene` that is none, and for options that are not known.
+    """
+    if K is None:
+        raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
+    options = _own(options)
+    if patches is not None:
+        _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
+        points, six, covariances = _motion3d_field_patches(field, count("patches", patches), region)
+        slopes = six[:, 2:].reshape(-1, 2, 2).transpose(0, 2, 1)
+        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **options), points
+    if scene is not None:
+        if options.get("rotation_prior") is not None:
+            raise ValueError("rotation_prior: expected None with a scene, whose rotation it would be, got both")
+        options["rotation_prior"] = _beside(scene, turning, region)
+    points, flow, covariances, (_, shared, length) = _motion3d_field_points(field, None if spacing is None else number("spacing", spacing), None if max_points is None else count("max_points", max_points), region)
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, **options}), points
+
+
+def _own(options: dict[str, Any]) -> dict[str, Any]:
+    """The options without those that a field tells itself, which are refused unless they say nothing else."""
+    for name, value in options.items():
+        if name not in OPTIONS:
+            raise TypeError(f"{name}: expected an option of estimate_field_motion or of estimate_motion, got one that neither has")
+        nothing = value is None or (name == "projection" and isinstance(value, str) and value == "plane")
+        if name in FIELD_OWN and not nothing:
+            raise ValueError(f"{name}: expected none, as a field {FIELD_OWN[name]}; got {_kind(value)}")
+    return {name: value for name, value in options.items() if name not in FIELD_OWN}
+
+
+def _kind(value: object) -> str:
+    return repr(value) if isinstance(value, int | float | str) else type(value).__name__
+
+
+def _refuse_with_patches(**given: object) -> None:
+    for name, value in given.items():
+        if value is not None:
+            raise ValueError(f"{name}: expected its default with patches, got {_kind(value)}")
+
+
+def _beside(scene: MotionEstimate, turning: float, region: Sequence[int] | None) -> tuple[Array, Array]:
+    """What the scene's rotation says about that of a thing in it."""
+    if not isinstance(scene, MotionEstimate):
+        raise TypeError(f"scene: expected a MotionEstimate, got {_kind(scene)}")
+    if region is None:
+        raise ValueError("scene: expected a region beside it, of the thing whose motion is wanted, got no region")
+    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, number("turning", turning))
+    if known is None:
+        raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
+    return known
+
+
+def time_to_contact_map(
+    field: FlowField, result: MotionEstimate, K: ArrayLike, *, placement: Literal["midpoint", "start"] = "midpoint"
+) -> tuple[Array, Array, Array]:
+    """Frames to contact at every pixel of a flow field, (H, W), their standard deviations, frames, and residuals, in units of noise.
+
+    Each pixel has the time of whatever it shows, `-1 / (nu u_z)` with the inverse depth of its own flow: positive when approaching, infinite where the motion has no translation, NaN where the field is not valid. Times count from half way between the frames with
+    "midpoint". The deviations are those of the pixel's own flow and of the motion; errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 tells of something that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
+
+    Parameters
+    ----------
+    field : FlowField
+        One field (not a stack) with a covariance, in px/frame.
+    result : MotionEstimate
+        The motion of its scene, from `estimate_field_motion`.
+    K : array (3, 3)
+        Camera matrix, px.
+    placement : "midpoint" or "start"
+        As in `estimate_motion`.
+
+    Raises
+    ------
+    ValueError
+        For a stack, a field without a covariance or with a `pixel_pitch`, and for a matrix that is none of a camera.
+    """
+    word("placement", placement)
+    return _motion3d_contact_map(field, K, (result.translation, result.rotation, result.tangent, result.covariance), placement)
