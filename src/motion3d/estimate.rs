@@ -249,11 +249,10 @@ fn on(
         let at = unsolved(&inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
         solution.covariance = at.map(|at| at.covariance);
     }
-    solution.widen(&inliers, flow, options.correlation_length);
     if let Some(known) = known {
-        let strays = robust::with_strays(&scaled.observations, known, &solution.motion);
-        solution.covariance = solution.covariance.map(|covariance| covariance * strays);
+        solution.among_strays(&scaled.observations, known, options.weight_depths.is_some());
     }
+    solution.widen(&inliers, flow, options.correlation_length);
     if scaled.unknown {
         let widened = of_estimated_noise(inliers.n, known.is_some());
         solution.covariance = solution.covariance.map(|covariance| covariance * widened);

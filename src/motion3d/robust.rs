@@ -3,7 +3,9 @@
 mod coherence;
 mod gate;
 mod hanging;
+mod mixture;
 mod search;
+mod strays;
 mod unknown;
 mod whole;
 
@@ -15,8 +17,10 @@ use super::observations::Observations;
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use gate::Gate;
-pub(super) use hanging::{hangs_on_few, with_strays};
+pub(super) use hanging::hangs_on_few;
+pub(super) use mixture::{Told, among_strays};
 use rayon::prelude::*;
+use strays::{Odds, Strays};
 pub(super) use whole::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
@@ -79,11 +83,30 @@ pub(super) struct Consensus {
     pub doubtful: bool,
     /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
     pub whole: bool,
+    /// How likely points are strays that obey by chance; `None` where nothing is known of that.
+    pub strays: Option<Strays>,
+    /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
+    pub quiet: Option<Vec<bool>>,
 }
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self { motion, inliers, inner: Vec::new(), rivals: Vec::new(), doubtful: false, whole: false }
+        Self {
+            motion,
+            inliers,
+            inner: Vec::new(),
+            rivals: Vec::new(),
+            doubtful: false,
+            whole: false,
+            strays: None,
+            quiet: None,
+        }
+    }
+
+    /// How likely a point that obeys is a stray; `None` where it counts nothing.
+    fn odds(&self, k: usize) -> Option<Odds> {
+        let quiet = self.quiet.as_ref().is_none_or(|quiet| quiet[k]);
+        self.strays.as_ref().filter(|_| quiet)?.of(k)
     }
 }
 
@@ -135,7 +158,7 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     let mut found = settle(observations, best)?;
     let gate = Gate::new(observations);
     for _ in 0..GATES {
-        let kept = gate.passed(&found);
+        let (kept, _) = gate.passed(&found);
         if kept.len() < LEAST {
             break;
         }
@@ -143,9 +166,10 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         let obeying = obeying(observations, &motion);
         found = Consensus::new(motion, obeying);
     }
-    let inliers = gate.passed(&found);
+    let (inliers, strays) = gate.passed(&found);
     if inliers.len() >= LEAST {
         found.inliers = inliers;
+        found.strays = strays;
     }
     found.rivals = rivals;
     if found.inliers.len() < LEAST {
@@ -154,6 +178,7 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     found.inner.clone_from(&found.inliers);
     if let Some(inner) = coherence::inner(observations, &found) {
         found.inner = inner.inliers;
+        found.quiet = inner.quiet;
         found.rivals.extend(inner.rival);
     }
     Some(found)
