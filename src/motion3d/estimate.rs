@@ -277,7 +277,12 @@ fn preferred(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) ->
 }
 
 /// The minimum that a robust search led to, and those that other minima for the same points lead to.
+///
+/// Among many strays that motion is the likeliest as it is.
 fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    if known.many {
+        return vec![refine(inliers, known.motion, None, Effort::NONE)];
+    }
     let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
     let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
     different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())

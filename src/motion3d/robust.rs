@@ -20,7 +20,7 @@ use gate::Gate;
 pub(super) use hanging::hangs_on_few;
 pub(super) use mixture::{Told, among_strays};
 use rayon::prelude::*;
-use strays::{Odds, Strays};
+use strays::Strays;
 pub(super) use whole::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
@@ -45,6 +45,16 @@ const ROUNDS: usize = 10;
 
 /// Times that the depth gate closes.
 const GATES: usize = 2;
+
+/// Starts among many strays, and the least angle between them, degrees.
+const AMONG_MANY: usize = 12;
+const AMONG_MANY_APART: f64 = 20.0;
+
+/// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)` are as likely.
+const UNDECIDED: f64 = 1.0;
+
+/// The share of strays among those that obey from which on they matter for the search.
+const MATTER: f64 = 0.03;
 
 /// Fewest points that a motion is found from.
 const LEAST: usize = 5;
@@ -83,6 +93,8 @@ pub(super) struct Consensus {
     pub doubtful: bool,
     /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
     pub whole: bool,
+    /// Whether so many strays obey that least squares on all that obey would follow them.
+    pub many: bool,
     /// How likely points are strays that obey by chance; `None` where nothing is known of that.
     pub strays: Option<Strays>,
     /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
@@ -98,15 +110,10 @@ impl Consensus {
             rivals: Vec::new(),
             doubtful: false,
             whole: false,
+            many: false,
             strays: None,
             quiet: None,
         }
-    }
-
-    /// How likely a point that obeys is a stray; `None` where it counts nothing.
-    fn odds(&self, k: usize) -> Option<Odds> {
-        let quiet = self.quiet.as_ref().is_none_or(|quiet| quiet[k]);
-        self.strays.as_ref().filter(|_| quiet)?.of(k)
     }
 }
 
@@ -142,7 +149,8 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
     let bound = INLIER.max(SPACING * observations.median_flow());
-    let starts = apart(search::search(observations, INLIER, SPACING, rng), APART, STARTS);
+    let searched = search::search(observations, INLIER, SPACING, rng);
+    let starts = apart(searched.clone(), APART, STARTS);
     let fewer;
     let on = if observations.n > MANY {
         fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
@@ -152,6 +160,8 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     };
     let narrowed: Vec<Motion> = starts.into_par_iter().map(|(start, _)| narrow(on, start, bound)).collect();
     let mut candidates: Vec<(Motion, f64)> = narrowed.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    candidates.extend(second(on, candidates.first()?.0, bound, rng.stream(10)));
     candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
     let &(best, _) = candidates.first()?;
     let rivals = rivals(on, &candidates);
@@ -166,7 +176,14 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         let obeying = obeying(observations, &motion);
         found = Consensus::new(motion, obeying);
     }
-    let (inliers, strays) = gate.passed(&found);
+    let (mut inliers, mut strays) = gate.passed(&found);
+    let mut rivals = rivals;
+    let many = strays.as_ref().is_some_and(|strays| strays.share > MATTER);
+    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates, searched) {
+        found = Consensus { many, ..Consensus::new(motion, obeying(observations, &motion)) };
+        (inliers, strays) = gate.passed(&found);
+        rivals = others;
+    }
     if inliers.len() >= LEAST {
         found.inliers = inliers;
         found.strays = strays;
@@ -182,6 +199,47 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         found.rivals.extend(inner.rival);
     }
     Some(found)
+}
+
+/// The motion among strays that so many of obey that least squares follow them, from all candidates and from directions all around, as their truncated costs tell little; with others that are about as likely.
+fn among_many_strays(
+    observations: &Observations,
+    on: &Observations,
+    gate: &Gate<'_>,
+    candidates: &[(Motion, f64)],
+    searched: Vec<(Motion, f64)>,
+) -> Option<(Motion, Vec<Rival>)> {
+    let own = Gate::new(on);
+    let mut starts = candidates.to_vec();
+    starts
+        .extend(apart(searched, AMONG_MANY_APART, AMONG_MANY).into_iter().map(|(motion, _)| cheaper_sign(on, motion)));
+    let softened = starts.par_iter().filter_map(|(motion, _)| mixture::softened(on, &own, *motion));
+    let mut found: Vec<(Motion, f64)> = softened.collect();
+    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let &(best, cost) = found.first()?;
+    let limit = cost + UNDECIDED * (on.n as f64).sqrt();
+    let mut rivals: Vec<Rival> = Vec::new();
+    for (motion, other) in found.iter().skip(1).take_while(|(_, other)| *other < limit) {
+        let same = |known: &Motion| known.angle_to(motion).to_degrees() < APART;
+        if !same(&best) && !rivals.iter().any(|rival| same(&rival.motion)) {
+            rivals.push(Rival { motion: *motion, excess: other - cost, others: true });
+        }
+    }
+    let best = if on.n == observations.n { best } else { mixture::softened(observations, gate, best)?.0 };
+    Some((best, rivals))
+}
+
+/// What most points obey that do not obey `best`, refined on all, where they are so many that they may be the scene: the search among all may see one thing's motion only, from five sides, which part of the other's points obey by chance.
+fn second(observations: &Observations, best: Motion, bound: f64, rng: CounterRng) -> Option<(Motion, f64)> {
+    let obeys = obeying(observations, &best);
+    let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| obeys.binary_search(k).is_err()).collect();
+    if rejected.len() < FEWEST || (rejected.len() as f64) < MAJORITY * observations.n as f64 {
+        return None;
+    }
+    let rest = observations.subset(&rejected);
+    let (start, _) = apart(search::search(&rest, INLIER, SPACING, rng), APART, 1).pop()?;
+    let found = cheaper_sign(&rest, narrow(&rest, start, bound)).0;
+    Some(cheaper_sign(observations, narrow(observations, found, INLIER)))
 }
 
 /// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey only because others do.

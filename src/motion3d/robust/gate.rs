@@ -4,9 +4,10 @@
 //! depth. Points whose depths are as odd are strays as far as that many explain them (the local false discovery rate; B. Efron 2001).
 
 use super::super::kernels::{Depths, depths};
+use super::super::motion::Motion;
 use super::super::neighbours::Tree;
 use super::super::observations::{Observations, median, quantile};
-use super::strays::{BAND, Bin, Strays};
+use super::strays::{BAND, Bin, DOUBLING, Strays};
 use super::{Consensus, INLIER};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -24,6 +25,15 @@ const TOGETHER: usize = 64;
 /// The share of the differences whose quantile measures them, and that quantile of a standard normal's size: high enough for two layers of depth to stay.
 const SHARE: f64 = 0.85;
 const SHARE_DEVIATION: f64 = 1.44;
+
+/// What is told of points at a motion.
+pub(super) struct Judged {
+    pub strays: Strays,
+    /// Depths drawn to the median of the neighbours', as far as that can be trusted; 0 of points far from their lines.
+    pub smooth: Vec<f64>,
+    /// Minus twice by how much, in nats, residuals and depths are likelier than those of strays alone.
+    pub cost: f64,
+}
 
 /// Tells depths that do not fit among their neighbours'.
 pub(super) struct Gate<'a> {
@@ -46,10 +56,17 @@ impl<'a> Gate<'a> {
     /// The inliers without those that strays explain, and how likely each of the others is one.
     pub fn passed(&self, found: &Consensus) -> (Vec<u32>, Option<Strays>) {
         let inliers = &found.inliers;
+        let Some(Judged { strays, .. }) = self.judged(&found.motion, inliers) else { return (inliers.clone(), None) };
+        let kept = inliers.iter().copied().filter(|&k| strays.keeps(k)).collect();
+        (kept, Some(strays))
+    }
+
+    /// Who of those that obey a motion may be strays; `None` where these are too few to have neighbours.
+    pub fn judged(&self, motion: &Motion, inliers: &[u32]) -> Option<Judged> {
         if inliers.len() <= NEAREST {
-            return (inliers.clone(), None);
+            return None;
         }
-        let seen = depths(self.observations, &found.motion);
+        let seen = depths(self.observations, motion);
         let near = near(self.observations, &seen);
         let mut obeys = vec![false; self.observations.n];
         for &k in inliers {
@@ -59,7 +76,7 @@ impl<'a> Gate<'a> {
             Some((tree, cells)) => within_cells(tree, cells, &near, &obeys, &seen),
             None => from_nearest(self.observations, &near, &obeys, &seen),
         };
-        let deviations = deviations(&near, &differences, &obeys, &seen);
+        let (deviations, scene) = deviations(&near, &differences, &obeys, &seen);
         let strays = Strays::new(
             self.observations.n,
             near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
@@ -69,8 +86,15 @@ impl<'a> Gate<'a> {
                 residual: seen.e[k as usize],
             }),
         );
-        let kept = inliers.iter().copied().filter(|&k| strays.keeps(k)).collect();
-        (kept, Some(strays))
+        let mut smooth = vec![0.0; self.observations.n];
+        for ((&k, difference), deviation) in near.iter().zip(&differences).zip(&deviations) {
+            let k = k as usize;
+            let wide = scene * seen.s2[k];
+            let share = if deviation.abs() < DOUBLING { wide / (wide + 1.0) } else { 1.0 };
+            smooth[k] = seen.nu[k] - (1.0 - share) * difference;
+        }
+        let cost = -inliers.iter().map(|&k| strays.gain(k as usize, seen.e[k as usize])).sum::<f64>();
+        Some(Judged { strays, smooth, cost })
     }
 }
 
@@ -83,8 +107,8 @@ fn near(observations: &Observations, seen: &Depths) -> Vec<u32> {
     (0..observations.n as u32).filter(near).collect()
 }
 
-/// Differences in units of what the scene and the noise allow; 0 at the epipole, where the depth is not known and cannot speak against the point.
-fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) -> Vec<f64> {
+/// Differences in units of what the scene and the noise allow, and the variance that is the scene's; 0 at the epipole, where the depth is not known and cannot speak against the point.
+fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) -> (Vec<f64>, f64) {
     let known = |k: u32| seen.s2[k as usize] > 0.0;
     let obeying = || near.iter().zip(differences).filter(|(k, _)| obeys[**k as usize] && known(**k));
     let mut sizes: Vec<f64> = obeying().map(|(_, difference)| difference.abs()).collect();
@@ -93,7 +117,7 @@ fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) 
     let scene = (tau * tau - median(&mut variances)).max(0.0);
     let unit = |k: u32| (scene + 1.0 / seen.s2[k as usize]).sqrt().max(tau);
     let deviation = |(&k, difference): (&u32, &f64)| if known(k) { difference / unit(k) } else { 0.0 };
-    near.iter().zip(differences).map(deviation).collect()
+    (near.iter().zip(differences).map(deviation).collect(), scene)
 }
 
 /// Differences of depths from the median of the inliers among their nearest points.

@@ -7,8 +7,9 @@ use super::super::covariance::{Matrix5, direction_spread, inverse};
 use super::super::kernels::depths;
 use super::super::motion::{Motion, tangents};
 use super::super::observations::{CHUNK, Observations};
-use super::strays::normal;
-use super::{Consensus, INLIER};
+use super::gate::{Gate, Judged};
+use super::strays::{Strays, normal};
+use super::{Consensus, INLIER, LEAST, obeying};
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2};
 use rayon::prelude::*;
 
@@ -18,6 +19,13 @@ const STEP: f64 = 1e-4;
 
 /// The square of all of them, in deviations, from which on they lead to something else.
 const FARTHEST: f64 = 11.0;
+
+/// The longest step, rad: farther than that other points obey.
+const LONGEST: f64 = 0.2;
+
+/// Times that points are judged anew on the way to a root, and a change of the direction, rad, that is not worth another.
+const ROUNDS: usize = 6;
+const SETTLED: f64 = 1e-3;
 
 type Vector5 = SMatrix<f64, 5, 1>;
 
@@ -43,7 +51,9 @@ struct Sums {
 /// Points and depths that weigh the equation.
 struct Among<'a> {
     all: &'a Observations,
-    known: &'a Consensus,
+    strays: &'a Strays,
+    /// Points with hardly a rejected neighbour, which alone count; `None`: all do.
+    quiet: Option<&'a [bool]>,
     /// `nu~` by point, NaN where that is not known; `None`: the points' own.
     smooth: Option<Vec<f64>>,
     /// For points without one.
@@ -53,7 +63,10 @@ struct Among<'a> {
 impl Among<'_> {
     /// What one point adds at a motion, with the depth its row has.
     fn add(&self, sums: &mut Sums, at: &Told, k: usize, spread: f64) {
-        let Some(odds) = self.known.odds(k) else { return };
+        if self.quiet.is_some_and(|quiet| !quiet[k]) {
+            return;
+        }
+        let Some(odds) = self.strays.of(k) else { return };
         let row = self.all.row(k);
         let t = row.g * at.motion.u();
         let s2 = t.norm_squared();
@@ -81,13 +94,14 @@ impl Among<'_> {
     }
 
     /// Newton's steps to the root; `None` where they lead to something else.
-    fn root(&self, from: &Told, first: Sums, spread: f64) -> Option<(Told, Sums)> {
+    fn root(&self, from: &Told, first: Sums, spread: f64, farthest: f64) -> Option<(Told, Sums)> {
         let (mut at, mut sums, mut moved) = (*from, first, 0.0);
         for _ in 0..STEPS {
             let change = sums.slope.cholesky()?.solve(&sums.force);
+            let change = change * (LONGEST / change.norm()).min(1.0);
             let square = change.dot(&(sums.information * change));
             moved += square.sqrt();
-            let within = moved * moved < FARTHEST;
+            let within = moved * moved < farthest;
             if !within {
                 return None;
             }
@@ -134,14 +148,41 @@ pub(in super::super) fn among_strays(
     smooth: Option<&[f64]>,
     moves: bool,
 ) -> Option<Told> {
-    known.strays.as_ref()?;
+    let strays = known.strays.as_ref()?;
     let before = plain(all, known, from, smooth)?;
     let spread = direction_spread(&inverse(&before)?);
-    let among = Among::new(all, known, smooth);
+    let among = Among::new(all, known, strays, smooth);
     let first = among.sums(from, spread);
-    let (at, sums) = if moves { among.root(from, first, spread).unwrap_or((*from, first)) } else { (*from, first) };
+    let (at, sums) =
+        if moves { among.root(from, first, spread, FARTHEST).unwrap_or((*from, first)) } else { (*from, first) };
     let axes = at.tangent * from.tangent.transpose();
     Some(Told { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
+}
+
+/// From a motion that was found by least squares to the root of the equation with probabilities, points judged anew on the way; with its cost. `None` where too few obey.
+///
+/// Strays with depths of their own, which are large, weigh most in least squares; drawn to their neighbours' they weigh as inliers do.
+pub(super) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Option<(Motion, f64)> {
+    let mut motion = start;
+    for round in 0..=ROUNDS {
+        let inliers = obeying(all, &motion);
+        let Judged { strays, smooth, cost } = gate.judged(&motion, &inliers).filter(|_| inliers.len() >= LEAST)?;
+        if round == ROUNDS {
+            return Some((motion, cost));
+        }
+        let among = Among { all, strays: &strays, quiet: None, smooth: Some(smooth), usual: 0.0 };
+        let at = Told { motion, tangent: tangents(&motion.u()), covariance: Matrix5::zeros() };
+        let spread = direction_spread(&inverse(&among.sums(&at, 0.0).information)?);
+        let Some((next, _)) = among.root(&at, among.sums(&at, spread), spread, f64::INFINITY) else {
+            return Some((motion, cost));
+        };
+        let change = next.motion.angle_to(&motion);
+        motion = next.motion;
+        if change < SETTLED {
+            return Some((motion, cost));
+        }
+    }
+    None
 }
 
 /// `sum D^t D` of the inner inliers, all of which least squares take for such.
@@ -170,7 +211,7 @@ fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix
 }
 
 impl<'a> Among<'a> {
-    fn new(all: &'a Observations, known: &'a Consensus, smooth: Option<&[f64]>) -> Self {
+    fn new(all: &'a Observations, known: &'a Consensus, strays: &'a Strays, smooth: Option<&[f64]>) -> Self {
         let (mut sum, mut by_point) = (0.0, None);
         if let Some(smooth) = smooth {
             let mut values = vec![f64::NAN; all.n];
@@ -180,6 +221,7 @@ impl<'a> Among<'a> {
             }
             by_point = Some(values);
         }
-        Self { all, known, smooth: by_point, usual: sum / known.inner.len().max(1) as f64 }
+        let quiet = known.quiet.as_deref();
+        Self { all, strays, quiet, smooth: by_point, usual: sum / known.inner.len().max(1) as f64 }
     }
 }

@@ -11,18 +11,23 @@ pub(super) const BAND: Range<f64> = 4.0..10.0;
 
 /// Sizes of deviations at which bins begin; from the last one on they double.
 const FIRST: [f64; 6] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0];
-const DOUBLING: f64 = 4.0;
+pub(super) const DOUBLING: f64 = 4.0;
 const SIZES: usize = 16;
 
 /// Bins of both signs.
 const BINS: usize = 2 * SIZES;
 
+/// The least odds of strays: one for a million of inliers.
+const LEAST: f64 = 1e-6;
+
 /// The bin of points that are in none.
 const NONE: u8 = u8::MAX;
 
-/// Deviations of the number of strays that those with odd depths must be more than, and what a bin without a stray may have had.
-const MORE: f64 = 2.0;
-const UNSEEN: f64 = 1.0;
+/// Bins from here on are odd enough to be left out where strays are the most of them.
+const TAIL: usize = 4;
+
+/// How rarely, of all estimates, strays alone may make odd depths so many: each one that is kept wrongly decides nearly alone.
+const RARE: f64 = 1e-3;
 
 /// A point that is counted.
 pub(super) struct Bin {
@@ -49,6 +54,8 @@ pub(in super::super) struct Strays {
     bins: Vec<u8>,
     odds: [Odds; BINS],
     dropped: [bool; BINS],
+    /// The share of strays among all that obey and are not left out.
+    pub share: f64,
 }
 
 /// The density of a standard normal distribution.
@@ -70,6 +77,19 @@ fn told(strays: f64) -> f64 {
         end * density * density * e * e / (density + strays)
     };
     (0..=STEPS).map(value).sum::<f64>() * step / WITHIN
+}
+
+/// How often, of strays alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each obeys with the share that the strip of inliers has, `wider` times that of the band.
+fn by_chance(obeying: usize, beside: usize, wider: f64) -> f64 {
+    let (n, p) = (obeying + beside + 1, wider / (1.0 + wider));
+    // Terms of the binomial distribution, from all of them down to none of the others.
+    let mut term = n as f64 * p.ln();
+    let mut sum = 0.0;
+    for missing in 0..=beside + 1 {
+        sum += term.exp();
+        term += ((n - missing) as f64 / (missing + 1) as f64 * (1.0 - p) / p).ln();
+    }
+    sum
 }
 
 fn bin(deviation: f64) -> usize {
@@ -97,20 +117,29 @@ impl Strays {
         let any = beside.iter().any(|&count| count > 0);
         let wider = INLIER / (BAND.end - BAND.start);
         let (mut odds, mut dropped) = ([Odds { strays: f64::INFINITY, told: 0.0 }; BINS], [false; BINS]);
+        let (mut left, mut left_strays) = (0.0, 0.0);
         for place in 0..BINS {
             let odd = place % SIZES >= FIRST.len();
-            let beside = beside[place] as f64 + if any && odd { UNSEEN } else { 0.0 };
-            let (expected, count) = (beside * wider, obeying[place] as f64);
-            // Both numbers are by chance.
-            let limit = expected + MORE * (expected * (1.0 + wider)).sqrt();
-            dropped[place] = odd && any && count <= limit;
+            let (expected, count) = (beside[place] as f64 * wider, obeying[place] as f64);
+            let explained = any && by_chance(obeying[place], beside[place], wider) > RARE / BINS as f64;
+            let tail = place % SIZES >= TAIL;
+            dropped[place] = odd && explained || tail && count < 2.0 * expected;
             let inliers = (count - expected) / WITHIN;
             if !dropped[place] && inliers > 0.0 {
                 let strays = expected / (2.0 * INLIER) / inliers;
                 odds[place] = Odds { strays, told: told(strays) };
             }
+            if !dropped[place] {
+                (left, left_strays) = (left + count, left_strays + expected.min(count));
+            }
         }
-        Self { bins, odds, dropped }
+        let share = if left > 0.0 { left_strays / left } else { 0.0 };
+        Self { bins, odds, dropped, share }
+    }
+
+    /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and strays than among strays alone.
+    pub fn gain(&self, k: usize, e: f64) -> f64 {
+        self.of(k).map_or(0.0, |odds| 2.0 * (normal(e) / odds.strays.max(LEAST)).ln_1p())
     }
 
     /// Whether strays do not explain points like this one.
@@ -181,6 +210,6 @@ mod tests {
             strays.keeps(500)
         };
         assert!(run(100, 0) && run(100, 100) && run(1, 0));
-        assert!(!run(10, 20) && !run(1, 1));
+        assert!(!run(10, 20) && !run(10, 10) && !run(1, 1));
     }
 }
