@@ -46,15 +46,14 @@ const ROUNDS: usize = 10;
 /// Times that the depth gate closes.
 const GATES: usize = 2;
 
-/// Starts among many strays, and the least angle between them, degrees.
-const AMONG_MANY: usize = 12;
-const AMONG_MANY_APART: f64 = 20.0;
-
 /// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)` are as likely.
 const UNDECIDED: f64 = 1.0;
 
 /// The share of strays among those that obey from which on they matter for the search.
 const MATTER: f64 = 0.03;
+
+/// From which share on the motions of few points are not known: which of them are strays decides between directions far apart, whose residuals and depths are as likely.
+const DOUBT: f64 = 0.14;
 
 /// Fewest points that a motion is found from.
 const LEAST: usize = 5;
@@ -142,15 +141,14 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     if shorter < WORTH {
         scaled.take(sigma);
         let found = in_known_noise(&scaled.observations, rng)?;
-        return Some(Consensus { doubtful, whole: shorter < -LONGER, ..found });
+        return Some(Consensus { doubtful: doubtful || found.doubtful, whole: shorter < -LONGER, ..found });
     }
-    Some(Consensus { doubtful, ..found })
+    Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
     let bound = INLIER.max(SPACING * observations.median_flow());
-    let searched = search::search(observations, INLIER, SPACING, rng);
-    let starts = apart(searched.clone(), APART, STARTS);
+    let starts = apart(search::search(observations, INLIER, SPACING, rng), APART, STARTS);
     let fewer;
     let on = if observations.n > MANY {
         fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
@@ -179,10 +177,12 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     let (mut inliers, mut strays) = gate.passed(&found);
     let mut rivals = rivals;
     let many = strays.as_ref().is_some_and(|strays| strays.share > MATTER);
-    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates, searched) {
+    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates) {
         found = Consensus { many, ..Consensus::new(motion, obeying(observations, &motion)) };
         (inliers, strays) = gate.passed(&found);
         rivals = others;
+        let share = strays.as_ref().map_or(0.0, |strays| strays.share);
+        found.doubtful = share > DOUBT && observations.n < MANY;
     }
     if inliers.len() >= LEAST {
         found.inliers = inliers;
@@ -201,28 +201,33 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     Some(found)
 }
 
-/// The motion among strays that so many of obey that least squares follow them, from all candidates and from directions all around, as their truncated costs tell little; with others that are about as likely.
+/// The motion among strays that so many of obey that least squares follow them, from all candidates; with others that are about as likely, or that about as many points obey.
 fn among_many_strays(
     observations: &Observations,
     on: &Observations,
     gate: &Gate<'_>,
     candidates: &[(Motion, f64)],
-    searched: Vec<(Motion, f64)>,
 ) -> Option<(Motion, Vec<Rival>)> {
     let own = Gate::new(on);
-    let mut starts = candidates.to_vec();
-    starts
-        .extend(apart(searched, AMONG_MANY_APART, AMONG_MANY).into_iter().map(|(motion, _)| cheaper_sign(on, motion)));
-    let softened = starts.par_iter().filter_map(|(motion, _)| mixture::softened(on, &own, *motion));
-    let mut found: Vec<(Motion, f64)> = softened.collect();
+    let softened = candidates.par_iter().filter_map(|(motion, _)| {
+        let (motion, cost) = mixture::softened(on, &own, *motion)?;
+        Some((motion, cost, obeying(on, &motion)))
+    });
+    let mut found: Vec<(Motion, f64, Vec<u32>)> = softened.collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let &(best, cost) = found.first()?;
-    let limit = cost + UNDECIDED * (on.n as f64).sqrt();
+    let majority = MAJORITY * on.n as f64;
+    // A thing may be the likeliest for what it is alone, but it is not the scene.
+    let most = found.iter().map(|(_, _, obeys)| obeys.len()).max()?;
+    let scene = found.iter().position(|(_, _, obeys)| obeys.len() as f64 > most as f64 - majority)?;
+    let (best, cost, own) = found.remove(scene);
     let mut rivals: Vec<Rival> = Vec::new();
-    for (motion, other) in found.iter().skip(1).take_while(|(_, other)| *other < limit) {
+    for (motion, other, obeys) in &found {
+        let alone = obeys.iter().filter(|k| own.binary_search(k).is_err()).count() as f64;
+        let as_many = alone > majority && obeys.len() as f64 > own.len() as f64 - majority;
+        let as_likely = *other < cost + UNDECIDED * (on.n as f64).sqrt();
         let same = |known: &Motion| known.angle_to(motion).to_degrees() < APART;
-        if !same(&best) && !rivals.iter().any(|rival| same(&rival.motion)) {
-            rivals.push(Rival { motion: *motion, excess: other - cost, others: true });
+        if (as_many || as_likely) && !same(&best) && !rivals.iter().any(|rival| same(&rival.motion)) {
+            rivals.push(Rival { motion: *motion, excess: (other - cost).max(0.0), others: true });
         }
     }
     let best = if on.n == observations.n { best } else { mixture::softened(observations, gate, best)?.0 };

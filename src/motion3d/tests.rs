@@ -6,6 +6,7 @@ mod dense;
 mod displaced;
 mod estimators;
 mod narrow;
+mod outliers;
 mod patches;
 mod published;
 pub(super) mod scenes;

@@ -126,7 +126,9 @@ impl Strays {
             dropped[place] = odd && explained || tail && count < 2.0 * expected;
             let inliers = (count - expected) / WITHIN;
             if !dropped[place] && inliers > 0.0 {
-                let strays = expected / (2.0 * INLIER) / inliers;
+                // Where none was seen there may be one.
+                let unseen = if any { wider } else { 0.0 };
+                let strays = (expected + unseen) / (2.0 * INLIER) / inliers;
                 odds[place] = Odds { strays, told: told(strays) };
             }
             if !dropped[place] {
