@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 /// Most Newton steps, and the square of one, in deviations, that is the last.
 const STEPS: usize = 10;
-const STEP: f64 = 1e-4;
+const STEP: f64 = 0.01;
 
 /// The square of all of them, in deviations, from which on they lead to something else.
 const FARTHEST: f64 = 11.0;
@@ -106,11 +106,14 @@ impl Among<'_> {
                 return None;
             }
             at.motion = at.motion.stepped(&at.tangent, &change);
+            let before = at.tangent;
             at.tangent = tangents(&at.motion.u());
-            sums = self.sums(&at, spread);
+            // So short a step changes the information by no more than it is known.
             if square < STEP {
+                sums.information = turned(&sums.information, &(at.tangent * before.transpose()));
                 return Some((at, sums));
             }
+            sums = self.sums(&at, spread);
         }
         None
     }
@@ -199,12 +202,16 @@ fn plain(all: &Observations, known: &Consensus, at: &Told, smooth: Option<&[f64]
     information.iter().all(|value| value.is_finite()).then_some(information)
 }
 
-/// The covariance after the information went from `before` to `after`, whatever else it accounts for in proportion; `axes` turn those of the direction.
-fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix2<f64>) -> Option<Matrix5> {
+/// A matrix of `(psi, w)` in other axes of `psi`.
+fn turned(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
     let mut into = Matrix5::identity();
     into.fixed_view_mut::<2, 2>(0, 0).copy_from(axes);
-    let before = into * before * into.transpose();
-    let covariance = into * covariance * into.transpose();
+    into * matrix * into.transpose()
+}
+
+/// The covariance after the information went from `before` to `after`, whatever else it accounts for in proportion; `axes` turn those of the direction.
+fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix2<f64>) -> Option<Matrix5> {
+    let (before, covariance) = (turned(before, axes), turned(covariance, axes));
     let grown = after.cholesky()?.l().transpose().try_inverse()? * before.cholesky()?.l().transpose();
     let covariance = grown * covariance * grown.transpose();
     Some(0.5 * (covariance + covariance.transpose()))
