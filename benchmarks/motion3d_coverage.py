@@ -1,6 +1,6 @@
-"""How often the stated covariances of 3-D motion hold where they are hardest to state: long lenses, a thing that moves, narrow fields and epipoles among the points, few points with outliers in unknown noise, few patches; and in fast turns.
+"""How often the stated covariances of 3-D motion hold where they are hardest to state: long lenses, narrow fields and epipoles among the points, a thing that moves, few points with outliers in unknown noise, many outliers, few near points before a far background, few patches; and in fast turns.
 
-    python benchmarks/motion3d_coverage.py [--trials 400] [--only long narrow around mover few patches turns]
+    python benchmarks/motion3d_coverage.py [--trials 400] [--only long narrow around mover few outliers patches turns]
 
 `ellipsoid`, `ellipse`: shares of the estimates with the status `ok` whose 95 % ellipsoid of all five unknowns, and whose 95 % ellipse of the direction, hold the truth. None of the layouts is one of the published tables.
 """
@@ -103,6 +103,70 @@ def few_points(seed: int) -> Estimated:
     return motion3d.estimate_motion(0.6 * shape, flow, placement="start", robust=True), u, w
 
 
+def outliers(seed: int, noise: float, share: float) -> Estimated:
+    """1000 points, of which a share has any flow up to four times the median translational flow, of which `noise` is a share, too."""
+    rng = np.random.default_rng((seed, 26))
+    (u, w), shape = _by_chance(rng), rng.uniform(-1, 1, (1000, 2))
+    nu = scenes.depths(("uniform", "smooth")[seed % 2], shape, rng)
+    size = float(np.median(np.linalg.norm(_flow(0.6 * shape, nu, u, 0 * w), axis=1)))
+    flow = _flow(0.6 * shape, nu, u, w) + noise * size * rng.normal(size=(1000, 2))
+    flow = np.where(rng.uniform(size=(1000, 1)) < share, rng.uniform(-4 * size, 4 * size, (1000, 2)), flow)
+    return motion3d.estimate_motion(0.6 * shape, flow, sigma=noise * size, placement="start", robust=True), u, w
+
+
+FAR_NOISE = 0.2
+"""Noise of two views of a far background, px."""
+
+
+def _far_background(seed: int, wrong: float) -> tuple[Array, Array, Array, Array]:
+    """Points, flow and motion of two views: a twentieth of 600 points moves by 20 px, the others, far away, by 1 to 2; of all, a share is `wrong`."""
+    rng = np.random.default_rng((seed, 27))
+    u, w = _by_chance(rng, 0.02)
+    pixels = rng.uniform([0, 0], [640, 480], (600, 2))
+    near = rng.uniform(size=600) < 0.05
+    nu = np.where(near, rng.uniform(0.8, 1.2, 600), rng.uniform(0.05, 0.1, 600))
+    g, _ = scenes.rows((pixels - [320, 240]) / 500)
+    nu *= 20 / np.median(500 * np.linalg.norm(nu[near, None] * (g[near] @ u), axis=1))
+    flow = scenes.displaced(pixels, nu, u, w) - pixels + FAR_NOISE * rng.normal(size=(600, 2))
+    return pixels, np.where(rng.uniform(size=(600, 1)) < wrong, rng.uniform(-80, 80, (600, 2)), flow), u, w
+
+
+def far_background(seed: int, wrong: float) -> Estimated:
+    """Few near points before a far background."""
+    pixels, flow, u, w = _far_background(seed, wrong)
+    return motion3d.estimate_motion(pixels, flow, scenes.K, sigma=FAR_NOISE, robust=True), u, w
+
+
+def far_row(name: str, trials: int, wrong: float) -> Row:
+    """The row of few near points before a far background, with errors beside those of OpenCV's MAGSAC where that is installed."""
+    errors: list[float] = []
+    theirs: list[float] = []
+
+    def estimated() -> Iterator[Estimated]:
+        for seed in range(trials):
+            found, u, w = far_background(seed, wrong)
+            errors.append(angle(found.translation, u))
+            magsac = _magsac(*_far_background(seed, wrong)[:2])
+            theirs.extend([] if magsac is None else [angle(magsac, u)])
+            yield found, u, w
+
+    told = row(name, estimated())
+    rms = lambda values: round(float(np.sqrt(np.mean(np.square(values)))), 2) if values else float("nan")
+    return told | {"rms, deg": rms(errors), "rms of MAGSAC, deg": rms(theirs)}
+
+
+def _magsac(pixels: Array, flow: Array) -> Array | None:
+    """The direction by OpenCV's MAGSAC; None where OpenCV is not installed or finds none."""
+    try:
+        import cv2
+    except ImportError:
+        return None
+    essential, mask = cv2.findEssentialMat(pixels, pixels + flow, scenes.K, cv2.USAC_MAGSAC, 0.999, 2 * FAR_NOISE)
+    if essential is None:
+        return None
+    return np.ravel(cv2.recoverPose(essential[:3], pixels, pixels + flow, scenes.K, distanceThresh=1e7, mask=mask)[2])
+
+
 def patches(seed: int, n: int = 6) -> Estimated:
     """Patches of half size 60 px with flow and Jacobian, f = 500 px, noise of .02 to .15 px, half width .2 to .6."""
     rng = np.random.default_rng((seed, 24))
@@ -130,6 +194,7 @@ CASES: dict[str, dict[str, Callable[[int], Estimated]]] = {
     "around": {f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=True)) for depth, u, half, n, sigma in AROUND},
     "mover": {"a thing that moves by itself, robust": mover},
     "few": {"20 to 60 points, outliers, noise not told": few_points},
+    "outliers": {f"{share:.0%} outliers, noise {noise:g} of the flow": (lambda seed, n=noise, s=share: outliers(seed, n, s)) for share in (0.4, 0.6) for noise in (0.05, 0.1, 0.2, 0.3)},
     "patches": {"6 patches with Jacobians": patches, "10 patches with Jacobians": lambda seed: patches(seed, 10), "30 patches with Jacobians": lambda seed: patches(seed, 30)},
     "turns": {f"two views that turn by {turn:g} rad{', 30 % outliers' if robust else ''}": (lambda seed, t=turn, r=robust: turns(seed, t, r)) for turn in (0.05, 0.12, 0.17, 0.25) for robust in (False, True)},
 }  # fmt: skip
@@ -156,7 +221,10 @@ def row(name: str, estimated: Iterator[Estimated]) -> Row:
 
 def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
     """One row for each kind of scene."""
-    return [row(name, map(make, range(trials))) for part, kinds in CASES.items() if only is None or part in only for name, make in kinds.items()]
+    rows = [row(name, map(make, range(trials))) for part, kinds in CASES.items() if only is None or part in only for name, make in kinds.items()]
+    if only is None or "outliers" in only:
+        rows += [far_row(f"5 % near points before a far background, {wrong:.0%} outliers", trials, wrong) for wrong in (0.0, 0.2)]
+    return rows
 
 
 def main() -> None:

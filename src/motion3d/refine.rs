@@ -15,6 +15,8 @@ pub(super) struct Effort {
 }
 
 impl Effort {
+    /// To leave a motion as it is.
+    pub const NONE: Self = Self { steps: 0, tolerance: 0.0 };
     /// For a start that will be refined again.
     pub const ROUGH: Self = Self { steps: 15, tolerance: 1e-4 };
     /// To the minimum.

@@ -10,6 +10,7 @@ use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use super::robust::{Consensus, Told, among_strays};
 use super::special::RotationOnly;
 use super::together::{Weighted, together};
 use super::turned::HalfWay;
@@ -63,6 +64,16 @@ impl Solution {
             Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
             None => plain,
         }
+    }
+
+    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the weights, which may be wrong, the motion stays.
+    pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
+        let Some(covariance) = self.covariance else { return };
+        let from = Told { motion: self.motion, tangent: self.tangent, covariance };
+        let smooth = self.smooth.as_deref().filter(|_| !given);
+        let Some(told) = among_strays(all, known, &from, smooth, !given) else { return };
+        (self.motion, self.tangent) = (told.motion, told.tangent);
+        self.covariance = Some(told.covariance);
     }
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.

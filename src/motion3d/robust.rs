@@ -3,7 +3,10 @@
 mod coherence;
 mod gate;
 mod hanging;
+mod mixture;
+mod rivals;
 mod search;
+mod strays;
 mod unknown;
 mod whole;
 
@@ -15,8 +18,11 @@ use super::observations::Observations;
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use gate::Gate;
-pub(super) use hanging::{hangs_on_few, with_strays};
+pub(super) use hanging::hangs_on_few;
+pub(super) use mixture::{Told, among_strays};
 use rayon::prelude::*;
+use rivals::{among_many_strays, rivals, second};
+use strays::Strays;
 pub(super) use whole::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
@@ -41,6 +47,12 @@ const ROUNDS: usize = 10;
 
 /// Times that the depth gate closes.
 const GATES: usize = 2;
+
+/// The share of strays among those that obey from which on they matter for the search.
+const MATTER: f64 = 0.03;
+
+/// From which share on the motions of few points are not known: which of them are strays decides between directions far apart, whose residuals and depths are as likely.
+const DOUBT: f64 = 0.1;
 
 /// Fewest points that a motion is found from.
 const LEAST: usize = 5;
@@ -79,11 +91,27 @@ pub(super) struct Consensus {
     pub doubtful: bool,
     /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
     pub whole: bool,
+    /// Whether so many strays obey that least squares on all that obey would follow them.
+    pub many: bool,
+    /// How likely points are strays that obey by chance; `None` where nothing is known of that.
+    pub strays: Option<Strays>,
+    /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
+    pub quiet: Option<Vec<bool>>,
 }
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self { motion, inliers, inner: Vec::new(), rivals: Vec::new(), doubtful: false, whole: false }
+        Self {
+            motion,
+            inliers,
+            inner: Vec::new(),
+            rivals: Vec::new(),
+            doubtful: false,
+            whole: false,
+            many: false,
+            strays: None,
+            quiet: None,
+        }
     }
 }
 
@@ -112,9 +140,9 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     if shorter < WORTH {
         scaled.take(sigma);
         let found = in_known_noise(&scaled.observations, rng)?;
-        return Some(Consensus { doubtful, whole: shorter < -LONGER, ..found });
+        return Some(Consensus { doubtful: doubtful || found.doubtful, whole: shorter < -LONGER, ..found });
     }
-    Some(Consensus { doubtful, ..found })
+    Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
@@ -130,12 +158,14 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     let narrowed: Vec<Motion> = starts.into_par_iter().map(|(start, _)| narrow(on, start, bound)).collect();
     let mut candidates: Vec<(Motion, f64)> = narrowed.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
     candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    candidates.extend(second(on, candidates.first()?.0, bound, rng.stream(10)));
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
     let &(best, _) = candidates.first()?;
-    let rivals = rivals(on, &candidates);
+    let mut rivals = rivals(on, &candidates);
     let mut found = settle(observations, best)?;
     let gate = Gate::new(observations);
     for _ in 0..GATES {
-        let kept = gate.passed(&found);
+        let (kept, _) = gate.passed(&found);
         if kept.len() < LEAST {
             break;
         }
@@ -143,9 +173,18 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         let obeying = obeying(observations, &motion);
         found = Consensus::new(motion, obeying);
     }
-    let inliers = gate.passed(&found);
+    let (mut inliers, mut strays) = gate.passed(&found);
+    let many = strays.as_ref().is_some_and(|strays| strays.share > MATTER);
+    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates) {
+        found = Consensus { many, ..Consensus::new(motion, obeying(observations, &motion)) };
+        (inliers, strays) = gate.passed(&found);
+        rivals = others;
+        let share = strays.as_ref().map_or(0.0, |strays| strays.share);
+        found.doubtful = share > DOUBT && observations.n < MANY;
+    }
     if inliers.len() >= LEAST {
         found.inliers = inliers;
+        found.strays = strays;
     }
     found.rivals = rivals;
     if found.inliers.len() < LEAST {
@@ -154,27 +193,10 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     found.inner.clone_from(&found.inliers);
     if let Some(inner) = coherence::inner(observations, &found) {
         found.inner = inner.inliers;
+        found.quiet = inner.quiet;
         found.rivals.extend(inner.rival);
     }
     Some(found)
-}
-
-/// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey only because others do.
-fn rivals(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<Rival> {
-    let (n, best) = (observations.n as f64, candidates[0]);
-    let obeys_best = obeying(observations, &best.0);
-    let limit = best.1 + INLIER * INLIER * MAJORITY * n;
-    let mut found: Vec<Rival> = Vec::new();
-    for (motion, cost) in candidates.iter().skip(1).take_while(|(_, cost)| *cost < limit) {
-        let same = |other: &Motion| other.angle_to(motion).to_degrees() < APART;
-        if same(&best.0) || found.iter().any(|rival| same(&rival.motion)) {
-            continue;
-        }
-        let obeys = obeying(observations, motion);
-        let new = obeys.iter().filter(|k| obeys_best.binary_search(k).is_err()).count();
-        found.push(Rival { motion: *motion, excess: cost - best.1, others: new as f64 > MAJORITY * n });
-    }
-    found
 }
 
 /// Refines with Tukey's weights, which narrow from `bound` to the inliers'.

@@ -13,7 +13,7 @@ use super::options::{Method, MotionOptions};
 use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
-use super::robust::{self, Consensus, Rival};
+use super::robust::{Consensus, Rival};
 use super::selected::of_estimated_noise;
 use super::smoothing::DepthSmoother;
 use super::special::{by_chance, turning, turning_in_unknown_noise};
@@ -66,7 +66,7 @@ impl Task<'_, '_> {
         }
         let (candidates, made) = self.chosen(scaled, &mut inliers, found);
         let mut solved = self.solved(&inliers, &candidates, made);
-        self.widen(&mut solved.solution, &inliers, scaled.unknown, candidates[0].minimum.equations.cost);
+        self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         solved.solution.alternatives = close(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
@@ -186,12 +186,19 @@ impl Task<'_, '_> {
         Solved { solution, deviation, low, undecided }
     }
 
-    /// Takes into the covariance what a linear theory of independent points of known noise leaves out. `cost`: what maximum likelihood leaves.
-    fn widen(&self, solution: &mut Solution, inliers: &Observations, unknown: bool, cost: f64) {
+    /// Takes into account what a linear theory of independent points of known noise that all obey leaves out. `cost`: what maximum likelihood leaves.
+    fn widen(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
+        if let Some(known) = self.known {
+            solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
+        }
         solution.go_together(inliers, self.intake.flow, self.options.correlation_length);
-        let strays = self.known.map_or(1.0, |known| robust::with_strays(inliers, known, &solution.motion));
-        let noise = if unknown { of_estimated_noise(inliers.n, self.known.is_some()) } else { misfit(inliers, cost) };
-        solution.covariance = solution.covariance.map(|covariance| covariance * (strays * noise));
+        let wider = match (scaled.unknown, self.known) {
+            (true, known) => of_estimated_noise(inliers.n, known.is_some()),
+            (false, None) => misfit(inliers, cost),
+            // Residuals were cut off, and what strays leave among them is accounted for.
+            (false, Some(_)) => 1.0,
+        };
+        solution.covariance = solution.covariance.map(|covariance| covariance * wider);
     }
 }
 
@@ -210,7 +217,12 @@ fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>)
 }
 
 /// The minimum that a robust search led to, and those that other minima for the same points lead to.
+///
+/// Among many strays that motion is the likeliest as it is.
 fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    if known.many {
+        return vec![refine(inliers, known.motion, None, Effort::NONE)];
+    }
     let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
     let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
     different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())

@@ -15,4 +15,5 @@ pub(super) mod scenes;
 mod sideways;
 mod silent;
 mod statuses;
+mod strays;
 mod together;

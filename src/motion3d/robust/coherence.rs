@@ -75,6 +75,8 @@ pub(super) struct Inner {
     pub inliers: Vec<u32>,
     /// The motion of all inliers (where few would be left: of those few), if it is another one: then points on the border of a thing belong to that.
     pub rival: Option<Rival>,
+    /// Points with hardly a rejected neighbour; `None` where few would be left.
+    pub quiet: Option<Vec<bool>>,
 }
 
 /// The share of the inliers that must be left.
@@ -86,7 +88,7 @@ pub(super) fn inner(observations: &Observations, found: &Consensus) -> Option<In
         return None;
     }
     let around = Around::new(observations);
-    let (motion, fewer) = without(observations, found, &around);
+    let (motion, fewer, quiet) = without(observations, found, &around);
     if fewer.len() == found.inliers.len() {
         return None;
     }
@@ -95,12 +97,13 @@ pub(super) fn inner(observations: &Observations, found: &Consensus) -> Option<In
     let other = if enough { found.motion } else { motion };
     let rival = differ.then_some(Rival { motion: other, excess: 0.0, others: true });
     let inliers = if enough { fewer } else { found.inliers.clone() };
-    Some(Inner { inliers, rival })
+    Some(Inner { inliers, rival, quiet: enough.then_some(quiet) })
 }
 
-/// The motion and the inliers without those that have a larger share of rejected neighbours than is usual.
-fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>) {
+/// The motion and the inliers without those that have a larger share of rejected neighbours than is usual, and which points have no larger one.
+fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>, Vec<bool>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
+    let mut quiet = vec![true; observations.n];
     for _ in 0..ROUNDS {
         let obeying = obeying(observations, &motion);
         let obeying: Vec<u32> = obeying.into_iter().filter(|k| found.inliers.binary_search(k).is_ok()).collect();
@@ -119,8 +122,9 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
         }
         motion = refine(&observations.subset(&kept), motion, None, effort(observations)).motion;
         inliers = kept;
+        quiet = rejected.iter().map(|&share| share <= limit).collect();
     }
-    (motion, inliers)
+    (motion, inliers, quiet)
 }
 
 /// Whether the motion of `fewer` points differs from that of all inliers by more than their lower number explains (J. Hausman 1978: the difference has the difference of the covariances); `None` where that is not known.

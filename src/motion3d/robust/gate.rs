@@ -1,9 +1,14 @@
 //! Outliers along their epipolar line obey any motion, but not with the depth of their neighbours.
+//!
+//! A depth that differs from its neighbours' is no proof: few near things before a far background are as rare, and carry all of the translation. What tells strays is how many there are: spread evenly, as many obey a motion with such a depth as miss its epipolar line by a little more and have the same
+//! depth. Points whose depths are as odd are strays as far as that many explain them (the local false discovery rate; B. Efron 2001).
 
 use super::super::kernels::{Depths, depths};
+use super::super::motion::Motion;
 use super::super::neighbours::Tree;
 use super::super::observations::{Observations, median, quantile};
-use super::Consensus;
+use super::strays::{BAND, Bin, DOUBLING, Strays};
+use super::{Consensus, INLIER};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -21,8 +26,14 @@ const TOGETHER: usize = 64;
 const SHARE: f64 = 0.85;
 const SHARE_DEVIATION: f64 = 1.44;
 
-/// How many of their deviations differences may be.
-const GATE: f64 = 4.0;
+/// What is told of points at a motion.
+pub(super) struct Judged {
+    pub strays: Strays,
+    /// Depths drawn to the median of the neighbours', as far as that can be trusted; 0 of points far from their lines.
+    pub smooth: Vec<f64>,
+    /// Minus twice by how much, in nats, residuals and depths are likelier than those of strays alone.
+    pub cost: f64,
+}
 
 /// Tells depths that do not fit among their neighbours'.
 pub(super) struct Gate<'a> {
@@ -42,54 +53,93 @@ impl<'a> Gate<'a> {
         Self { observations, cells }
     }
 
-    /// The inliers whose depth differs from the median of their neighbours' among them by what the scene and the noise allow.
-    pub fn passed(&self, found: &Consensus) -> Vec<u32> {
+    /// The inliers without those that strays explain, and how likely each of the others is one.
+    pub fn passed(&self, found: &Consensus) -> (Vec<u32>, Option<Strays>) {
         let inliers = &found.inliers;
+        let Some(Judged { strays, .. }) = self.judged(&found.motion, inliers) else { return (inliers.clone(), None) };
+        let kept = inliers.iter().copied().filter(|&k| strays.keeps(k)).collect();
+        (kept, Some(strays))
+    }
+
+    /// Who of those that obey a motion may be strays; `None` where these are too few to have neighbours.
+    pub fn judged(&self, motion: &Motion, inliers: &[u32]) -> Option<Judged> {
         if inliers.len() <= NEAREST {
-            return inliers.clone();
+            return None;
         }
-        let seen = depths(self.observations, &found.motion);
+        let seen = depths(self.observations, motion);
+        let near = near(self.observations, &seen);
+        let mut obeys = vec![false; self.observations.n];
+        for &k in inliers {
+            obeys[k as usize] = true;
+        }
         let differences = match &self.cells {
-            Some((tree, cells)) => within_cells(tree, cells, inliers, &seen),
-            None => from_nearest(self.observations, inliers, &seen),
+            Some((tree, cells)) => within_cells(tree, cells, &near, &obeys, &seen),
+            None => from_nearest(self.observations, &near, &obeys, &seen),
         };
-        let known = |k: u32| seen.s2[k as usize] > 0.0;
-        let mut sizes: Vec<f64> =
-            inliers.iter().zip(&differences).filter(|(k, _)| known(**k)).map(|(_, d)| d.abs()).collect();
-        let mut variances: Vec<f64> =
-            inliers.iter().filter(|k| known(**k)).map(|&k| 1.0 / seen.s2[k as usize]).collect();
-        let tau = quantile(&mut sizes, SHARE) / SHARE_DEVIATION;
-        let scene = (tau * tau - median(&mut variances)).max(0.0);
-        let allowed = |k: u32| GATE * (scene + 1.0 / seen.s2[k as usize]).sqrt().max(tau);
-        // At the epipole the depth is not known and cannot speak against the point.
-        let keeps = |(k, difference): (&u32, &f64)| !known(*k) || difference.abs() <= allowed(*k);
-        inliers.iter().zip(&differences).filter(|pair| keeps(*pair)).map(|(&k, _)| k).collect()
+        let (deviations, scene) = deviations(&near, &differences, &obeys, &seen);
+        let strays = Strays::new(
+            self.observations.n,
+            near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
+                point: k,
+                deviation,
+                obeys: obeys[k as usize],
+                residual: seen.e[k as usize],
+            }),
+        );
+        let mut smooth = vec![0.0; self.observations.n];
+        for ((&k, difference), deviation) in near.iter().zip(&differences).zip(&deviations) {
+            let k = k as usize;
+            let wide = scene * seen.s2[k];
+            let share = if deviation.abs() < DOUBLING { wide / (wide + 1.0) } else { 1.0 };
+            smooth[k] = seen.nu[k] - (1.0 - share) * difference;
+        }
+        let cost = -inliers.iter().map(|&k| strays.gain(k as usize, seen.e[k as usize])).sum::<f64>();
+        Some(Judged { strays, smooth, cost })
     }
 }
 
-/// Differences of the inliers' depths from the median of their nearest inliers'.
-fn from_nearest(observations: &Observations, inliers: &[u32], seen: &Depths) -> Vec<f64> {
-    let sites: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.site[k as usize]).collect();
+/// Points before the camera that miss their epipolar line by no more than those from which strays are counted.
+fn near(observations: &Observations, seen: &Depths) -> Vec<u32> {
+    let near = |&k: &u32| {
+        let k = k as usize;
+        seen.e[k].abs() < BAND.end && seen.nu[k] * seen.s2[k].sqrt() > -INLIER
+    };
+    (0..observations.n as u32).filter(near).collect()
+}
+
+/// Differences in units of what the scene and the noise allow, and the variance that is the scene's; 0 at the epipole, where the depth is not known and cannot speak against the point.
+fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) -> (Vec<f64>, f64) {
+    let known = |k: u32| seen.s2[k as usize] > 0.0;
+    let obeying = || near.iter().zip(differences).filter(|(k, _)| obeys[**k as usize] && known(**k));
+    let mut sizes: Vec<f64> = obeying().map(|(_, difference)| difference.abs()).collect();
+    let mut variances: Vec<f64> = obeying().map(|(&k, _)| 1.0 / seen.s2[k as usize]).collect();
+    let tau = quantile(&mut sizes, SHARE) / SHARE_DEVIATION;
+    let scene = (tau * tau - median(&mut variances)).max(0.0);
+    let unit = |k: u32| (scene + 1.0 / seen.s2[k as usize]).sqrt().max(tau);
+    let deviation = |(&k, difference): (&u32, &f64)| if known(k) { difference / unit(k) } else { 0.0 };
+    (near.iter().zip(differences).map(deviation).collect(), scene)
+}
+
+/// Differences of depths from the median of the inliers among their nearest points.
+fn from_nearest(observations: &Observations, near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<f64> {
+    let sites: Vec<[f64; 3]> = near.iter().map(|&k| observations.site[k as usize]).collect();
     let tree = Tree::new(&sites);
-    let places: Vec<u32> = (0..inliers.len() as u32).collect();
+    let places: Vec<u32> = (0..near.len() as u32).collect();
     let lists = tree.nearest(&places, NEAREST);
-    let depth = |place: u32| seen.nu[inliers[tree.order()[place as usize] as usize] as usize];
-    let mut differences = vec![0.0; inliers.len()];
+    let point = |place: u32| near[tree.order()[place as usize] as usize] as usize;
+    let mut differences = vec![0.0; near.len()];
     let mut around = Vec::with_capacity(NEAREST);
-    for place in 0..inliers.len() {
+    for place in 0..near.len() {
         around.clear();
-        around.extend(lists.of(place).iter().map(|&near| depth(near)));
-        differences[tree.order()[place] as usize] = depth(place as u32) - median(&mut around);
+        let inliers = lists.of(place).iter().map(|&other| point(other)).filter(|&other| obeys[other]);
+        around.extend(inliers.map(|other| seen.nu[other]));
+        differences[tree.order()[place] as usize] = seen.nu[point(place as u32)] - median(&mut around);
     }
     differences
 }
 
-/// Differences of the inliers' depths from the median of the inliers in their cell.
-fn within_cells(tree: &Tree, cells: &[Range<usize>], inliers: &[u32], seen: &Depths) -> Vec<f64> {
-    let mut obeys = vec![false; tree.order().len()];
-    for &k in inliers {
-        obeys[k as usize] = true;
-    }
+/// Differences of depths from the median of the inliers in their cell.
+fn within_cells(tree: &Tree, cells: &[Range<usize>], near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<f64> {
     let medians: Vec<Vec<f64>> = cells
         .par_chunks(TOGETHER)
         .map(|cells| {
@@ -109,5 +159,5 @@ fn within_cells(tree: &Tree, cells: &[Range<usize>], inliers: &[u32], seen: &Dep
             middle[k as usize] = median;
         }
     }
-    inliers.iter().map(|&k| seen.nu[k as usize] - middle[k as usize]).collect()
+    near.iter().map(|&k| seen.nu[k as usize] - middle[k as usize]).collect()
 }

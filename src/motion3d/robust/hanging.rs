@@ -5,7 +5,7 @@ use super::super::kernels::depths;
 use super::super::motion::Motion;
 use super::super::observations::{Observations, median};
 use super::super::result::MotionEstimate;
-use super::{Consensus, INLIER};
+use super::INLIER;
 use nalgebra::{Matrix2x3, SMatrix, Vector3};
 
 /// From so many inliers on no few of them decide.
@@ -40,19 +40,6 @@ fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) ->
     let mut sizes: Vec<f64> =
         (0..observations.n).filter(|&k| !obeys(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
     INLIER / (2.0 * median(&mut sizes).max(INLIER))
-}
-
-/// What outliers that obey by chance add to the variance of the inliers' residuals, as a factor.
-///
-/// Spread evenly over three deviations they have three times the variance of noise; half of them are behind the camera and were found.
-pub(in super::super) fn with_strays(observations: &Observations, known: &Consensus, motion: &Motion) -> f64 {
-    let rejected = observations.n - known.inliers.len();
-    if rejected == 0 {
-        return 1.0;
-    }
-    let chance = chance(observations, motion, |k| known.inliers.binary_search(&(k as u32)).is_ok());
-    let share = (0.5 * chance * rejected as f64 / known.inliers.len() as f64).min(1.0);
-    1.0 + share * (INLIER * INLIER / 3.0 - 1.0)
 }
 
 /// The number that a Poisson variable of this mean exceeds in no more than 5 % of all cases.
