@@ -184,7 +184,12 @@ fn known_sandwich(
 }
 
 /// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
-fn damping(observations: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: &[f64]) -> Option<f64> {
+pub(super) fn damping(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> Option<f64> {
     inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
 }
 

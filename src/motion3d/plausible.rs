@@ -8,7 +8,6 @@ use super::kernels::{Bilinear, best_rotation, depths, equations, information};
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use super::smoothing::{DepthSmoother, Smoother};
-use super::trial::UNDECIDED;
 use crate::math::random::CounterRng;
 use nalgebra::Vector3;
 
@@ -20,6 +19,9 @@ const CONSISTENT: f64 = 5.99;
 
 /// Deviations that chance may add to a difference of `J`.
 const CHANCE: f64 = 2.0;
+
+/// Depth maps whose costs differ by less than this times `sqrt(n)` are as smooth.
+const AS_SMOOTH: f64 = 1.0;
 
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
 const COMPARED: usize = 12;
@@ -101,7 +103,7 @@ fn as_likely(observations: &Observations, known: &[Asked], doubts: &[Asked], rng
     }
     let mut smoother = DepthSmoother::new(observations, Smoother::Auto, rng);
     let cost = |asked: &Asked| asked.cost + smoother.cost(&depths(observations, &asked.motion));
-    let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + UNDECIDED * (observations.n as f64).sqrt();
+    let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (observations.n as f64).sqrt();
     let smooth: Vec<&Asked> = doubts.iter().filter(|asked| cost(asked) < limit).collect();
     smooth.into_iter().any(|asked| consistent(observations, &asked.motion, &mut smoother))
 }

@@ -6,6 +6,7 @@
 
 use super::covariance::{Matrix5, direction_block, direction_deviation, inverse};
 use super::departure::among;
+use super::efficient::damping;
 use super::kernels::{Bilinear, information};
 use super::motion::Motion;
 use super::observations::Observations;
@@ -47,6 +48,13 @@ pub(super) struct Valley<'a> {
     pub observations: &'a Observations,
     pub motion: &'a Motion,
     pub tangent: &'a Matrix2x3<f64>,
+}
+
+/// Where a valley is gone along from: the axes, the first of which is the valley's, the line that the others follow by the covariance, and what damps weights near the epipole.
+struct From<'a> {
+    axes: &'a Matrix2x3<f64>,
+    slope: Vector4,
+    damped: f64,
 }
 
 /// One end of the confidence interval along an axis, in units of the axes there.
@@ -104,8 +112,10 @@ impl Valley<'_> {
         let variance = covariance[(0, 0)];
         let slope: Vector4 = covariance.fixed_view::<4, 1>(1, 0) / variance;
         let nu = weights(self.motion);
-        let here = others(&information(self.observations, self.motion, &along, &nu, 0.0))?;
-        let mut ends = [1.0, -1.0].map(|sign| self.end(&along, &slope, sign * variance.sqrt(), weights));
+        let damped = damping(self.observations, self.motion, &along, &nu)?;
+        let here = others(&information(self.observations, self.motion, &along, &nu, damped))?;
+        let from = From { axes: &along, slope, damped };
+        let mut ends = [1.0, -1.0].map(|sign| self.end(&from, sign * variance.sqrt(), weights));
         let found: Vec<End> = ends.iter_mut().filter_map(Option::take).collect();
         if found.is_empty() {
             return None;
@@ -130,17 +140,12 @@ impl Valley<'_> {
     }
 
     /// Where the score along the first axis is [`END`], on the side of `deviation`.
-    fn end(
-        &self,
-        axes: &Matrix2x3<f64>,
-        slope: &Vector4,
-        deviation: f64,
-        weights: &mut impl FnMut(&Motion) -> Vec<f64>,
-    ) -> Option<End> {
+    fn end(&self, from: &From<'_>, deviation: f64, weights: &mut impl FnMut(&Motion) -> Vec<f64>) -> Option<End> {
+        let slope = &from.slope;
         let mut psi = deviation * END.sqrt();
         let mut rest = slope * psi;
         for place in 1.. {
-            let (there, score) = self.at(axes, psi, rest, weights)?;
+            let (there, score) = self.at(from, psi, rest, weights)?;
             let longer = (END / score).sqrt().clamp(1.0 / LONGEST, LONGEST);
             let next = (psi * longer).clamp(-FARTHEST, FARTHEST);
             // The bend is carried on as a square.
@@ -148,7 +153,7 @@ impl Valley<'_> {
             let settled = (longer - 1.0).abs() < NEAR || next == psi;
             if settled || place == PLACES {
                 // An error of the direction is told as its part along the axes.
-                let scale = 1.0 / self.off(axes, next, rest[0]).norm();
+                let scale = 1.0 / self.off(from.axes, next, rest[0]).norm();
                 rest[0] *= scale;
                 return Some(End { psi: next * scale, rest, ..there });
             }
@@ -165,7 +170,7 @@ impl Valley<'_> {
     /// The other unknowns and the score, chi squared with one degree of freedom, where the direction is off by `psi`.
     fn at(
         &self,
-        axes: &Matrix2x3<f64>,
+        &From { axes, damped, .. }: &From<'_>,
         psi: f64,
         guess: Vector4,
         weights: &mut impl FnMut(&Motion) -> Vec<f64>,
@@ -178,10 +183,10 @@ impl Valley<'_> {
         let start = moved(&guess).normalized();
         let there = carried(axes, &start.u());
         let nu = weights(&start);
-        let equation = Bilinear::new(self.observations, &start, &there, &nu, 0.0);
+        let equation = Bilinear::new(self.observations, &start, &there, &nu, damped);
         let rest = floor(&equation, axes, guess, &moved)?;
         let motion = moved(&rest).normalized();
-        let squares = information(self.observations, &motion, &there, &nu, 0.0);
+        let squares = information(self.observations, &motion, &there, &nu, damped);
         let (value, _) = equation.at(&motion, &there);
         let score = value[0] * value[0] * inverse(&squares)?[(0, 0)];
         (score > 0.0 && score.is_finite()).then_some((End { psi, rest, covariance: others(&squares)? }, score))

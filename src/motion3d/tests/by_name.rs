@@ -19,7 +19,7 @@ fn maximum_likelihood_tells_of_other_minima_too() {
             sure += u32::from(status(Method::MaximumLikelihood) == Status::Ok);
         }
     }
-    assert!(undecided >= 12 && sure <= 2, "{sure} of {undecided}");
+    assert!(undecided >= 8 && sure <= 2, "{sure} of {undecided}");
 }
 
 /// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the epipole may lie among noisy points it is told how far it is from the better solution.
