@@ -193,11 +193,13 @@ impl Valley<'_> {
     }
 }
 
-/// The axes where the direction is `u`.
+/// The axes where the direction is `u`, each on the side where it was.
 fn carried(axes: &Matrix2x3<f64>, u: &Vector3<f64>) -> Matrix2x3<f64> {
-    let first = axes.row(0).transpose();
+    let [first, second] = [0, 1].map(|row| axes.row(row).transpose());
     let first = (first - u * u.dot(&first)).normalize();
-    Matrix2x3::from_rows(&[first.transpose(), u.cross(&first).transpose()])
+    let across = u.cross(&first);
+    let second = across * second.dot(&across).signum();
+    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
 }
 
 /// The covariance of the others where the first unknown is given.
