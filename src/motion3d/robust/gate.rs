@@ -77,8 +77,10 @@ impl<'a> Gate<'a> {
             None => from_nearest(self.observations, &near, &obeys, &seen),
         };
         let (deviations, scene) = deviations(&near, &differences, &obeys, &seen);
+        let n = self.observations.n;
         let strays = Strays::new(
-            self.observations.n,
+            n,
+            seen.e[..n].iter().filter(|e| e.abs() >= BAND.start).count(),
             near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
                 point: k,
                 deviation,
