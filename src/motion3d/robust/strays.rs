@@ -38,6 +38,8 @@ pub(super) struct Bin {
     /// Of its depth, in units of what is usual.
     pub deviation: f64,
     pub obeys: bool,
+    /// Whether it lies among points that do not obey.
+    pub among: bool,
     /// Across the epipolar line, in units of noise.
     pub residual: f64,
 }
@@ -101,7 +103,7 @@ fn bin(deviation: f64) -> usize {
         FIRST.iter().rposition(|&from| from <= size).unwrap_or(0)
     } else {
         // An infinite deviation is in the last bin.
-        (FIRST.len() + (size / DOUBLING).log2() as usize).min(SIZES - 1)
+        FIRST.len() + ((size / DOUBLING).log2() as usize).min(SIZES - 1 - FIRST.len())
     };
     if deviation < 0.0 { SIZES + place } else { place }
 }
@@ -113,6 +115,10 @@ impl Strays {
         let (mut obeying, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
+            // Those of a thing that moves by itself, which is whole, and not of a near one.
+            if point.among && place % SIZES >= FIRST.len() {
+                continue;
+            }
             bins[point.point as usize] = place as u8;
             obeying[place] += usize::from(point.obeys);
             beside[place] += usize::from(BAND.contains(&point.residual.abs()));
@@ -209,6 +215,7 @@ mod tests {
                     point,
                     deviation,
                     obeys,
+                    among: false,
                     residual: if obeys { 0.5 } else { 7.0 },
                 }),
             );
