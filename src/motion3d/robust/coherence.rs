@@ -100,6 +100,13 @@ pub(super) fn inner(observations: &Observations, found: &Consensus) -> Option<In
     Some(Inner { inliers, rival, quiet: enough.then_some(quiet) })
 }
 
+/// From which share of rejected neighbours on there are more than is usual among these; reorders them.
+pub(super) fn more_than_usual(shares: &mut [f64]) -> f64 {
+    let usual = median(shares);
+    let deviation = (usual.max(1.0 / NEAREST as f64) * (1.0 - usual) / NEAREST as f64).sqrt();
+    usual + MORE * deviation
+}
+
 /// The motion and the inliers without those that have a larger share of rejected neighbours than is usual, and which points have no larger one.
 fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>, Vec<bool>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
@@ -113,9 +120,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
         }
         let rejected = around.rejected(&obeys);
         let mut shares: Vec<f64> = obeying.iter().map(|&k| rejected[k as usize]).collect();
-        let usual = median(&mut shares);
-        let deviation = (usual.max(1.0 / NEAREST as f64) * (1.0 - usual) / NEAREST as f64).sqrt();
-        let limit = usual + MORE * deviation;
+        let limit = more_than_usual(&mut shares);
         let kept: Vec<u32> = obeying.into_iter().filter(|&k| rejected[k as usize] <= limit).collect();
         if kept == inliers || kept.len() < LEAST {
             break;

@@ -7,6 +7,7 @@ use super::super::kernels::{Depths, depths};
 use super::super::motion::Motion;
 use super::super::neighbours::Tree;
 use super::super::observations::{Observations, median, quantile};
+use super::coherence::more_than_usual;
 use super::strays::{BAND, Bin, DOUBLING, Strays};
 use super::{Consensus, INLIER};
 use rayon::prelude::*;
@@ -72,17 +73,24 @@ impl<'a> Gate<'a> {
         for &k in inliers {
             obeys[k as usize] = true;
         }
-        let differences = match &self.cells {
+        let around = match &self.cells {
             Some((tree, cells)) => within_cells(tree, cells, &near, &obeys, &seen),
             None => from_nearest(self.observations, &near, &obeys, &seen),
         };
+        let (differences, rejected): (Vec<f64>, Vec<f64>) = around.into_iter().unzip();
+        let mut shares: Vec<f64> =
+            near.iter().zip(&rejected).filter(|(k, _)| obeys[**k as usize]).map(|(_, share)| *share).collect();
+        let limit = more_than_usual(&mut shares);
         let (deviations, scene) = deviations(&near, &differences, &obeys, &seen);
+        let n = self.observations.n;
         let strays = Strays::new(
-            self.observations.n,
-            near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
+            n,
+            seen.e[..n].iter().filter(|e| e.abs() >= BAND.start).count(),
+            near.iter().zip(&deviations).zip(&rejected).map(|((&k, &deviation), &rejected)| Bin {
                 point: k,
                 deviation,
                 obeys: obeys[k as usize],
+                among: obeys[k as usize] && rejected > limit,
                 residual: seen.e[k as usize],
             }),
         );
@@ -120,27 +128,30 @@ fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) 
     (near.iter().zip(differences).map(deviation).collect(), scene)
 }
 
-/// Differences of depths from the median of the inliers among their nearest points.
-fn from_nearest(observations: &Observations, near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<f64> {
+/// Differences of depths from the median of the inliers among their nearest points, and the share of the others there.
+fn from_nearest(observations: &Observations, near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
     let sites: Vec<[f64; 3]> = near.iter().map(|&k| observations.site[k as usize]).collect();
     let tree = Tree::new(&sites);
     let places: Vec<u32> = (0..near.len() as u32).collect();
     let lists = tree.nearest(&places, NEAREST);
     let point = |place: u32| near[tree.order()[place as usize] as usize] as usize;
-    let mut differences = vec![0.0; near.len()];
+    let mut differences = vec![(0.0, 0.0); near.len()];
     let mut around = Vec::with_capacity(NEAREST);
     for place in 0..near.len() {
         around.clear();
         let inliers = lists.of(place).iter().map(|&other| point(other)).filter(|&other| obeys[other]);
         around.extend(inliers.map(|other| seen.nu[other]));
-        differences[tree.order()[place] as usize] = seen.nu[point(place as u32)] - median(&mut around);
+        differences[tree.order()[place] as usize] = {
+            let rejected = 1.0 - around.len() as f64 / NEAREST as f64;
+            (seen.nu[point(place as u32)] - median(&mut around), rejected)
+        };
     }
     differences
 }
 
-/// Differences of depths from the median of the inliers in their cell.
-fn within_cells(tree: &Tree, cells: &[Range<usize>], near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<f64> {
-    let medians: Vec<Vec<f64>> = cells
+/// Differences of depths from the median of the inliers in their cell, and the share of the others there.
+fn within_cells(tree: &Tree, cells: &[Range<usize>], near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
+    let medians: Vec<Vec<(f64, f64)>> = cells
         .par_chunks(TOGETHER)
         .map(|cells| {
             let mut depths = Vec::with_capacity(CELL);
@@ -148,16 +159,17 @@ fn within_cells(tree: &Tree, cells: &[Range<usize>], near: &[u32], obeys: &[bool
                 depths.clear();
                 let members = tree.order()[cell.clone()].iter().map(|&k| k as usize);
                 depths.extend(members.filter(|&k| obeys[k]).map(|k| seen.nu[k]));
-                median(&mut depths)
+                (median(&mut depths), 1.0 - depths.len() as f64 / cell.len() as f64)
             };
             cells.iter().map(middle).collect()
         })
         .collect();
-    let mut middle = vec![0.0; obeys.len()];
+    let mut middle = vec![(0.0, 0.0); obeys.len()];
     for (cell, median) in cells.iter().zip(medians.into_iter().flatten()) {
         for &k in &tree.order()[cell.clone()] {
             middle[k as usize] = median;
         }
     }
-    near.iter().map(|&k| seen.nu[k as usize] - middle[k as usize]).collect()
+    let difference = |&k: &u32| (seen.nu[k as usize] - middle[k as usize].0, middle[k as usize].1);
+    near.iter().map(difference).collect()
 }

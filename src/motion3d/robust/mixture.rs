@@ -94,8 +94,8 @@ impl Among<'_> {
     }
 
     /// Newton's steps to the root; `None` where they lead to something else.
-    fn root(&self, from: &Told, first: Sums, spread: f64, farthest: f64) -> Option<(Told, Sums)> {
-        let (mut at, mut sums, mut moved) = (*from, first, 0.0);
+    fn root(&self, from: &Told, first: &Sums, spread: f64, farthest: f64) -> Option<(Told, Sums)> {
+        let (mut at, mut sums, mut moved) = (*from, *first, 0.0);
         for _ in 0..STEPS {
             let change = sums.slope.cholesky()?.solve(&sums.force);
             let change = change * (LONGEST / change.norm()).min(1.0);
@@ -157,7 +157,7 @@ pub(in super::super) fn among_strays(
     let among = Among::new(all, known, strays, smooth);
     let first = among.sums(from, spread);
     let (at, sums) =
-        if moves { among.root(from, first, spread, FARTHEST).unwrap_or((*from, first)) } else { (*from, first) };
+        if moves { among.root(from, &first, spread, FARTHEST).unwrap_or((*from, first)) } else { (*from, first) };
     let axes = at.tangent * from.tangent.transpose();
     Some(Told { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
 }
@@ -176,7 +176,7 @@ pub(super) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Op
         let among = Among { all, strays: &strays, quiet: None, smooth: Some(smooth), usual: 0.0 };
         let at = Told { motion, tangent: tangents(&motion.u()), covariance: Matrix5::zeros() };
         let spread = direction_spread(&inverse(&among.sums(&at, 0.0).information)?);
-        let Some((next, _)) = among.root(&at, among.sums(&at, spread), spread, f64::INFINITY) else {
+        let Some((next, _)) = among.root(&at, &among.sums(&at, spread), spread, f64::INFINITY) else {
             return Some((motion, cost));
         };
         let change = next.motion.angle_to(&motion);

@@ -9,6 +9,9 @@ use std::ops::Range;
 /// Residuals, in units of noise, from which strays are counted: hardly an inlier has so large a one.
 pub(super) const BAND: Range<f64> = 4.0..10.0;
 
+/// The share of inliers that have residuals beyond that, and a margin.
+const BEYOND: f64 = 1e-4;
+
 /// Sizes of deviations at which bins begin; from the last one on they double.
 const FIRST: [f64; 6] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0];
 pub(super) const DOUBLING: f64 = 4.0;
@@ -35,6 +38,8 @@ pub(super) struct Bin {
     /// Of its depth, in units of what is usual.
     pub deviation: f64,
     pub obeys: bool,
+    /// Whether it lies among points that do not obey.
+    pub among: bool,
     /// Across the epipolar line, in units of noise.
     pub residual: f64,
 }
@@ -98,23 +103,27 @@ fn bin(deviation: f64) -> usize {
         FIRST.iter().rposition(|&from| from <= size).unwrap_or(0)
     } else {
         // An infinite deviation is in the last bin.
-        (FIRST.len() + (size / DOUBLING).log2() as usize).min(SIZES - 1)
+        FIRST.len() + ((size / DOUBLING).log2() as usize).min(SIZES - 1 - FIRST.len())
     };
     if deviation < 0.0 { SIZES + place } else { place }
 }
 
 impl Strays {
-    /// Counts points with residuals up to the end of the band.
-    pub fn new(n: usize, points: impl Iterator<Item = Bin>) -> Self {
+    /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier has.
+    pub fn new(n: usize, far: usize, points: impl Iterator<Item = Bin>) -> Self {
         let mut bins = vec![NONE; n];
         let (mut obeying, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
+            // Those of a thing that moves by itself, which is whole, and not of a near one.
+            if point.among && place % SIZES >= FIRST.len() {
+                continue;
+            }
             bins[point.point as usize] = place as u8;
             obeying[place] += usize::from(point.obeys);
             beside[place] += usize::from(BAND.contains(&point.residual.abs()));
         }
-        let any = beside.iter().any(|&count| count > 0);
+        let any = far as f64 > BEYOND * n as f64;
         let wider = INLIER / (BAND.end - BAND.start);
         let (mut odds, mut dropped) = ([Odds { strays: f64::INFINITY, told: 0.0 }; BINS], [false; BINS]);
         let (mut left, mut left_strays) = (0.0, 0.0);
@@ -197,14 +206,16 @@ mod tests {
         let run = |odd: u32, beside: u32| {
             let usual = (0..500).map(|k| (k, 0.1, true));
             let odd = (500..500 + odd).map(|k| (k, 20.0, true));
-            let beside = (700..700 + beside).map(|k| (k, 20.0, false));
-            let all = usual.chain(odd).chain(beside);
+            let others = (700..700 + beside).map(|k| (k, 20.0, false));
+            let all = usual.chain(odd).chain(others);
             let strays = Strays::new(
                 1000,
+                beside as usize,
                 all.map(|(point, deviation, obeys)| Bin {
                     point,
                     deviation,
                     obeys,
+                    among: false,
                     residual: if obeys { 0.5 } else { 7.0 },
                 }),
             );
