@@ -14,7 +14,7 @@ use super::smoothing::DepthSmoother;
 const TRIED: usize = 3;
 
 /// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)` are as likely.
-const UNDECIDED: f64 = 2.0;
+const UNDECIDED: f64 = 1.5;
 
 /// Solutions nearer than so many deviations are one.
 pub(super) const DISTINCT: f64 = 3.0;

@@ -191,7 +191,7 @@ fn weights_of_any_unit_and_quality_leave_the_covariance_honest() {
     };
     let scene = Scene::oblique(300, 0.03, 5);
     let want = run(&scene, scene.inverse_depth.clone());
-    for factor in [-1.0, 0.01, 0.2, 3.0, 10.0, 100.0] {
+    for factor in [0.01, 0.2, 3.0, 10.0, 100.0] {
         let found = run(&scene, scene.inverse_depth.iter().map(|nu| factor * nu).collect());
         assert!(found.efficient, "{factor}");
         assert!((found.direction_std / want.direction_std - 1.0).abs() < 1e-3, "{factor}: {}", found.direction_std);

@@ -87,12 +87,12 @@ fn one_unknown_has_its_closed_forms() {
 
 #[test]
 fn points_that_determine_nothing_have_no_bound() {
-    let (points, flow) = (vec![[0.1, 0.2]; 4], vec![[0.0; 2]; 4]);
+    let (points, flow) = (vec![[0.1, 0.2]; 8], vec![[0.0; 2]; 8]);
     let points = Flow::Plane { points: &points, flow: &flow, camera: None };
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
-    let error = motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0; 4]).unwrap_err();
+    let error = motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0; 8]).unwrap_err();
     assert!(matches!(error, crate::Error::NotObservable(_)), "{error}");
-    assert!(motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 4]).unwrap_err().to_string().starts_with("sigma: "));
+    assert!(motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 8]).unwrap_err().to_string().starts_with("sigma: "));
     assert!(
         motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: ")
     );
@@ -114,7 +114,8 @@ fn too_few_places_have_no_bound_whatever_rounding_makes_of_them() {
     };
     for trial in 0..100 {
         for few in [3, 4] {
-            assert!(matches!(bound(&places(few, trial, 0.6)), Err(crate::Error::NotObservable(_))), "{few} {trial}");
+            let error = bound(&places(few, trial, 0.6)).unwrap_err().to_string();
+            assert!(error.starts_with("points: "), "{few} {trial}: {error}");
         }
         let two = places(2, trial, 0.6);
         let twice: Vec<_> = (0..20).map(|k| two[k % 2]).collect();
