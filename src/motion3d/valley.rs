@@ -230,10 +230,13 @@ fn floor(
     None
 }
 
+/// Points that tell how far all of them spread.
+const ENOUGH: usize = 1000;
+
 /// Root mean square distance of points from their middle.
 pub(super) fn spread(points: &[[f64; 3]]) -> f64 {
-    let n = points.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&[f64; 3]) -> f64| points.iter().map(of).sum::<f64>() / n;
-    let square: f64 = (0..3).map(|axis| mean(&|at| at[axis] * at[axis]) - mean(&|at| at[axis]).powi(2)).sum();
-    square.max(0.0).sqrt()
+    let few = || points.iter().step_by(points.len().div_ceil(ENOUGH).max(1)).map(|at| Vector3::from(*at));
+    let n = few().count().max(1) as f64;
+    let middle: Vector3<f64> = few().sum::<Vector3<f64>>() / n;
+    (few().map(|at| (at - middle).norm_squared()).sum::<f64>() / n).sqrt()
 }

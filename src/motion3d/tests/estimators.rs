@@ -1,7 +1,6 @@
 //! Estimates against the truth and against what their covariances promise.
 
 use super::super::*;
-use super::scenes::mahalanobis;
 use super::scenes::{Held, Scene, W, oblique, smooth};
 use crate::math::random::CounterRng;
 use crate::parallel::Threads;
