@@ -35,8 +35,8 @@ pub(super) struct Efficient {
 }
 
 impl Efficient {
-    /// The covariance with what a valley that bends and widens adds.
-    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> Matrix5 {
+    /// The covariance with what a valley that bends and widens adds, and whether it tells the valley.
+    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> (Matrix5, bool) {
         let valley = Valley { observations, motion: &self.motion, tangent: &self.tangent };
         let mut made = None;
         valley.lengthened(&self.covariance, |motion: &Motion| {

@@ -17,7 +17,7 @@ pub enum Status {
     RotationOnly,
     /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite direction where depths do not exclude it, another minimum, that of other points in a robust search.
     Ambiguous,
-    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees, or directions farther than the covariance has it explain the flow as well.
+    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or directions farther than the covariance has it explain the flow as well.
     IllConditioned,
     /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed weights is given.
     LowSnr,

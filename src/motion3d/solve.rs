@@ -44,6 +44,8 @@ struct Solved {
     /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
     deviation: f64,
     low: bool,
+    /// Whether the covariance tells the shape of what is not known.
+    told: bool,
     undecided: Option<Alternative>,
 }
 
@@ -72,9 +74,9 @@ impl Task<'_, '_> {
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
             .collect();
         let rivals: &[Rival] = self.known.map_or(&[], |known| &known.rivals);
-        let Solved { mut solution, deviation, low, undecided } = solved;
+        let Solved { mut solution, deviation, low, told, undecided } = solved;
         let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
-        let evidence = Evidence { likelihood, deviation, low, rivals, undecided };
+        let evidence = Evidence { likelihood, deviation, low, told, rivals, undecided };
         judge(self.intake, &inliers, &mut solution, &evidence, self.rng.stream(4));
         report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
     }
@@ -172,8 +174,10 @@ impl Task<'_, '_> {
             undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
         }
         let mut improved = improved.filter(|_| wanted || low || astray);
+        // Of maximum likelihood alone nothing is told beyond its theory.
+        let mut told = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
         if let Some(best) = &mut improved {
-            best.covariance = best.lengthened(inliers, || self.smoother(inliers));
+            (best.covariance, told) = best.lengthened(inliers, || self.smoother(inliers));
         }
         let unknown = low && improved.is_none();
         let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
@@ -183,7 +187,7 @@ impl Task<'_, '_> {
             solution.covariance = at.map(|at| at.covariance);
         }
         let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
-        Solved { solution, deviation, low, undecided }
+        Solved { solution, deviation, low, told, undecided }
     }
 
     /// Takes into account what a linear theory of independent points of known noise that all obey leaves out. `cost`: what maximum likelihood leaves.

@@ -23,12 +23,15 @@ const ROUND: f64 = 6.0;
 const END: f64 = 3.841;
 
 /// Most places that an end is looked for at, how near its square deviation is to be, and the longest step from one to the next.
-const PLACES: usize = 6;
+const PLACES: usize = 12;
 const NEAR: f64 = 0.1;
 const LONGEST: f64 = 2.0;
 
 /// The farthest that is looked, rad: farther the direction is not known.
-const FARTHEST: f64 = 1.0;
+const FARTHEST: f64 = 1.5;
+
+/// The direction's deviation as a share of the field beyond which no covariance tells the shape of the valley, whose every bend counts.
+const BEYOND: f64 = 1.5;
 
 /// Most steps towards the valley's floor, and the length of one that is the last, rad.
 const STEPS: usize = 15;
@@ -86,20 +89,28 @@ impl Valley<'_> {
         }
     }
 
-    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion.
-    pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> Matrix5 {
-        let along = |out, rank| self.along(&out, covariance, rank, &mut weights).unwrap_or(out);
-        (0..self.bent(covariance)).fold(*covariance, along)
+    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion. And whether that tells the valley: it has ends, and is not so long that a covariance has none of its shape.
+    pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
+        let axes = self.bent(covariance);
+        let (mut out, mut told) = (*covariance, true);
+        for rank in 0..axes {
+            match self.along(&out, covariance, rank, &mut weights) {
+                Some((longer, ends)) => (out, told) = (longer, told && ends == 2),
+                None => told = false,
+            }
+        }
+        let share = direction_deviation(&out).to_radians() / spread(&self.observations.site);
+        (out, told && (axes == 0 || share < BEYOND))
     }
 
-    /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors the one with the larger value is number 0.
+    /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors the one with the larger value is number 0. And how many ends were found.
     fn along(
         &self,
         so_far: &Matrix5,
         first: &Matrix5,
         rank: usize,
         weights: &mut impl FnMut(&Motion) -> Vec<f64>,
-    ) -> Option<Matrix5> {
+    ) -> Option<(Matrix5, usize)> {
         let eigen = SymmetricEigen::new(direction_block(first));
         let mut axes = eigen.eigenvectors.transpose();
         if (eigen.eigenvalues.imax() == 1) != (rank == 1) {
@@ -136,7 +147,7 @@ impl Valley<'_> {
         }
         let out = into.transpose() * out * into;
         let out = 0.5 * (out + out.transpose());
-        inverse(&out).map(|_| out)
+        inverse(&out).map(|_| (out, found.len()))
     }
 
     /// Where the score along the first axis is [`END`], on the side of `deviation`.
@@ -144,18 +155,33 @@ impl Valley<'_> {
         let slope = &from.slope;
         let mut psi = deviation * END.sqrt();
         let mut rest = slope * psi;
-        for place in 1.. {
+        // The farthest place whose score is too small, and the nearest beyond it whose score is too large.
+        let (mut inner, mut outer) = (0.0, f64::INFINITY);
+        for _ in 0..PLACES {
             let (there, score) = self.at(from, psi, rest, weights)?;
+            if score < END {
+                inner = psi.abs();
+                outer = if outer > inner { outer } else { f64::INFINITY };
+            } else {
+                outer = psi.abs();
+                inner = if inner < outer { inner } else { 0.0 };
+            }
             let longer = (END / score).sqrt().clamp(1.0 / LONGEST, LONGEST);
-            let next = (psi * longer).clamp(-FARTHEST, FARTHEST);
+            let settled = (longer - 1.0).abs() < NEAR;
+            let mut next = psi * longer;
+            if !settled && !(inner..outer).contains(&next.abs()) {
+                next = (0.5 * (inner + outer)).copysign(psi);
+            }
             // The bend is carried on as a square.
             rest = slope * next + (there.rest - slope * psi) * (next / psi).powi(2);
-            let settled = (longer - 1.0).abs() < NEAR || next == psi;
-            if settled || place == PLACES {
+            if settled {
                 // An error of the direction is told as its part along the axes.
                 let scale = 1.0 / self.off(from.axes, next, rest[0]).norm();
                 rest[0] *= scale;
                 return Some(End { psi: next * scale, rest, ..there });
+            }
+            if next.abs() > FARTHEST {
+                return None;
             }
             psi = next;
         }

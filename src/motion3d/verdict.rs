@@ -52,6 +52,8 @@ pub(super) struct Evidence<'a> {
     pub deviation: f64,
     /// Whether the depths are mostly noise.
     pub low: bool,
+    /// Whether the covariance tells the shape of what is not known.
+    pub told: bool,
     /// Motions that other points obey.
     pub rivals: &'a [Rival],
     /// Another solution that is about as likely.
@@ -93,7 +95,8 @@ pub(super) fn judge(
         Status::IllConditioned
     } else if planar || others.count() > 0 {
         Status::Ambiguous
-    } else if deviation.is_nan()
+    } else if !evidence.told
+        || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
     {
