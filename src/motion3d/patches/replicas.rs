@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 /// Patches from which on the linear theory does, where the direction is known well beside the field; and the deviation up to which it is, as a share of the field.
 const MANY: usize = 30;
-const STRAIGHT: f64 = 0.08;
+const STRAIGHT: f64 = 0.3;
 
 /// Repetitions, and the share of them that a region of that probability is to hold.
 const REPETITIONS: u64 = 200;
