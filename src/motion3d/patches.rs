@@ -12,7 +12,7 @@ mod verdict;
 use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined, too_few};
 use super::camera::Intrinsics;
-use super::covariance::{determined, direction_deviation, inverse, plugged_in};
+use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
@@ -180,9 +180,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         Some(surfaces) => surfaces.clone(),
         None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
     };
-    let deviation = covariance.map_or(f64::INFINITY, |covariance| direction_deviation(&covariance).to_radians());
-    let wider =
-        if plugged.is_some() { wider(system, &motion, &told, out.efficient, deviation, rng.stream(2)) } else { 1.0 };
+    let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
     covariance = covariance.map(|covariance| covariance * wider);
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());

@@ -260,7 +260,7 @@ fn floor(
 const ENOUGH: usize = 1000;
 
 /// Root mean square distance of points from their middle.
-pub(super) fn spread(points: &[[f64; 3]]) -> f64 {
+fn spread(points: &[[f64; 3]]) -> f64 {
     let few = || points.iter().step_by(points.len().div_ceil(ENOUGH).max(1)).map(|at| Vector3::from(*at));
     let n = few().count().max(1) as f64;
     let middle: Vector3<f64> = few().sum::<Vector3<f64>>() / n;

@@ -7,32 +7,28 @@ use super::super::covariance::{Matrix5, inverse, plugged_in};
 use super::super::motion::{Motion, tangents};
 use super::super::observations::quantile;
 use super::super::plausible::PLAUSIBLE;
-use super::super::valley::spread;
 use super::shrink::shrunk;
 use super::system::System;
 use crate::math::random::CounterRng;
 use nalgebra::{SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
-/// Patches from which on the linear theory does, where the direction is known well beside the field; and the deviation up to which it is, as a share of the field.
+/// Patches from which on the linear theory does.
 const MANY: usize = 30;
-const STRAIGHT: f64 = 0.3;
 
 /// Repetitions, and the share of them that a region of that probability is to hold.
 const REPETITIONS: u64 = 200;
 const SHARE: f64 = 0.95;
 
-/// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 % ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights; `deviation`: the direction's, rad.
+/// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 % ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights.
 pub(super) fn wider(
     system: &System,
     motion: &Motion,
     surfaces: &[Vector3<f64>],
     weighted: bool,
-    deviation: f64,
     rng: CounterRng,
 ) -> f64 {
-    let places: Vec<[f64; 3]> = system.patches.iter().map(|patch| [patch.point[0], patch.point[1], 0.0]).collect();
-    if system.patches.len() >= MANY && deviation < STRAIGHT * spread(&places) {
+    if system.patches.len() >= MANY {
         return 1.0;
     }
     let repeated = |i: u64| distance(&again(system, motion, surfaces, rng.stream(i)), motion, weighted);

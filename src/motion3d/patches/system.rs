@@ -18,7 +18,7 @@ const STEP: f64 = 1e-10;
 /// One patch: `f = A(u) lambda + R w + noise` with unit covariance, `A` linear in `u`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Patch {
-    pub point: [f64; 2],
+    point: [f64; 2],
     rows: AffineRows,
     /// `V'` of the rotation that was taken out of displacements, else the identity.
     mean: Matrix3<f64>,
