@@ -3,7 +3,7 @@
 use super::super::*;
 use super::scenes::{Scene, W, oblique, smooth};
 
-/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others.
+/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others. (The direction's confidence interval may have no end in such noise: `ill_conditioned`.)
 #[test]
 fn depths_that_are_mostly_noise_are_low_snr() {
     let forward = Motion::new([0.05, -0.03, 1.0], W);
@@ -14,10 +14,12 @@ fn depths_that_are_mostly_noise_are_low_snr() {
     for seed in 0..40 {
         let found = Scene::new(forward, 300, 0.6, 0.6, seed, |x, y, _| smooth(x, y)).run(&options);
         let nothing_left = found.likelihood.covariance[0][0].is_nan();
-        assert_eq!(found.status, if nothing_left { Status::LowSnr } else { Status::Ok }, "{seed}");
+        let endless = found.status == Status::IllConditioned;
+        assert!(endless || (found.status == Status::LowSnr) == nothing_left, "{seed}: {:?}", found.status);
+        assert!(endless || nothing_left || found.status == Status::Ok, "{seed}: {:?}", found.status);
         // What is told instead, that of the smoothed weights, holds all the same.
         assert!(found.direction_std > 2.0 && found.motion.angle_to(&forward).to_degrees() < 4.0 * found.direction_std);
-        low += u32::from(nothing_left);
+        low += u32::from(found.status == Status::LowSnr);
     }
     assert!((4..=36).contains(&low), "{low} of 40");
 }
