@@ -65,7 +65,7 @@ def test_smoothed_weights_are_worth_their_while(case):
     """1.3 times below maximum likelihood on the same noise, within a fifth of the published figure, and honest."""
     depth, name, n, sigma, h, asked = scores.PRACTICAL[case]
     errors, plain, inside = [], [], []
-    for seed in range(150):
+    for seed in range(300):
         make = scenes.differential(depth, name, n, sigma, seed, h)
         found = start(make)
         errors.append(scores.angle(found.translation, make.u))
