@@ -43,12 +43,12 @@ fn an_approach_gives_direction_focus_and_time_to_contact() {
     assert_eq!(rows.len(), 3);
     for row in &rows {
         let number = |name: &str| row[name].parse::<f64>().unwrap();
-        // The epipole sits among the points, where little is known of their depths; that may be told.
-        assert!(["ok", "low_snr"].contains(&row["status"].as_str()), "{row:?}");
+        // The epipole sits among the points, where little is known of their depths, and errors of a small picture go together; that may be told.
+        assert!(["ok", "low_snr", "ill_conditioned"].contains(&row["status"].as_str()), "{row:?}");
         assert!(number("u_z") < -0.97, "{row:?}");
         for (name, truth) in [("foe_x", 64.0), ("foe_y", 48.0)] {
             let deviation = number(&format!("{name}_std"));
-            assert!((number(name) - truth).abs() < 4.0 * deviation && deviation < 20.0, "{row:?}");
+            assert!((number(name) - truth).abs() < f64::min(4.0 * deviation, 10.0) && deviation < 60.0, "{row:?}");
         }
         let contact = 1.0 / (GROWTH.ln());
         assert!((number("time_to_contact") / contact - 1.0).abs() < 0.1, "{row:?}");
