@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
 pub enum Status {
     /// A motion with its covariance.
     Ok,
-    /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly. Also too few to tell outliers from large noise, where that is not known.
+    /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly. Also too few to tell outliers from inliers: from large noise that is not known, or where a tenth of what obeys does so by chance.
     FewPoints,
     /// Fewer than 5 points (or 2 patches): no motion.
     TooFewPoints,

@@ -54,7 +54,7 @@ pub(super) struct Valley<'a> {
 }
 
 /// Where a valley is gone along from: the axes, the first of which is the valley's, the line that the others follow by the covariance, and what damps weights near the epipole.
-struct From<'a> {
+struct Course<'a> {
     axes: &'a Matrix2x3<f64>,
     slope: Vector4,
     damped: f64,
@@ -125,7 +125,7 @@ impl Valley<'_> {
         let nu = weights(self.motion);
         let damped = damping(self.observations, self.motion, &along, &nu)?;
         let here = others(&information(self.observations, self.motion, &along, &nu, damped))?;
-        let from = From { axes: &along, slope, damped };
+        let from = Course { axes: &along, slope, damped };
         let mut ends = [1.0, -1.0].map(|sign| self.end(&from, sign * variance.sqrt(), weights));
         let found: Vec<End> = ends.iter_mut().filter_map(Option::take).collect();
         if found.is_empty() {
@@ -151,7 +151,7 @@ impl Valley<'_> {
     }
 
     /// Where the score along the first axis is [`END`], on the side of `deviation`.
-    fn end(&self, from: &From<'_>, deviation: f64, weights: &mut impl FnMut(&Motion) -> Vec<f64>) -> Option<End> {
+    fn end(&self, from: &Course<'_>, deviation: f64, weights: &mut impl FnMut(&Motion) -> Vec<f64>) -> Option<End> {
         let slope = &from.slope;
         let mut psi = deviation * END.sqrt();
         let mut rest = slope * psi;
@@ -196,7 +196,7 @@ impl Valley<'_> {
     /// The other unknowns and the score, chi squared with one degree of freedom, where the direction is off by `psi`.
     fn at(
         &self,
-        &From { axes, damped, .. }: &From<'_>,
+        &Course { axes, damped, .. }: &Course<'_>,
         psi: f64,
         guess: Vector4,
         weights: &mut impl FnMut(&Motion) -> Vec<f64>,
