@@ -92,15 +92,19 @@ class Verdict:
     holds: bool
 
 
+def far_off(found: motion3d.MotionEstimate, u: Array) -> bool:
+    """Whether a direction said to be `ok` is beyond both limits."""
+    return angle(found.translation, u) > max(FAR_OFF, DEVIATIONS * found.direction_std)
+
+
 def verdict(each: Trial, robust: bool) -> Verdict:
     """Estimates; noise is told."""
     make = each.scene
     found = motion3d.estimate_motion(make.points, make.flow, sigma=make.sigma, placement="start", robust=robust)
     if found.status != "ok":
         return Verdict(found.status, False, False)
-    off = angle(found.translation, make.u)
     distance = squared(found.tangent @ make.u, found.covariance[:2, :2])
-    return Verdict("ok", off > max(FAR_OFF, DEVIATIONS * found.direction_std), off < 90 and distance < ELLIPSE)
+    return Verdict("ok", far_off(found, make.u), angle(found.translation, make.u) < 90 and distance < ELLIPSE)
 
 
 def table(trials: int = TRIALS, robust: bool = False) -> list[Row]:

@@ -1,0 +1,108 @@
+"""Where the points lie and what shape their noise has: how often an estimate of 3-D motion that says `ok` is wrong and how often its covariance holds, of scenes by chance.
+
+    python benchmarks/motion3d_layouts.py [--trials 400] [--only layouts noise]
+
+Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a street or a wall with a relief
+of 3 %. The columns are those of `motion3d_coverage.py`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+import motion3d_scenes as scenes
+from jacoflow import motion3d
+from motion3d_coverage import Estimated, Row, row
+from motion3d_honesty import DEPTHS
+
+Array = NDArray[np.float64]
+TRIALS = 400
+
+
+def _wall(shape: Array, rng: np.random.Generator) -> Array:
+    """Nearly a plane: a slanted wall and what stands out of it by 3 %."""
+    return (1 + shape @ rng.uniform(-0.4, 0.4, 2)) * (1 + 0.03 * rng.normal(size=len(shape)))
+
+
+SURFACES = [*DEPTHS.values(), _wall]
+
+
+def _ring(n: int, rng: np.random.Generator) -> Array:
+    """Along the edge of the picture only."""
+    angle, radius = rng.uniform(0, 2 * np.pi, n), rng.uniform(0.85, 1, n)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1)
+
+
+def _rows(n: int, rng: np.random.Generator) -> Array:
+    """On three lines of the picture."""
+    return np.stack([rng.uniform(-1, 1, n), rng.choice([-0.5, 0.1, 0.6], n)], 1)
+
+
+LAYOUTS: dict[str, Callable[[int, np.random.Generator], Array]] = {
+    "all over the picture": lambda n, rng: rng.uniform(-1, 1, (n, 2)),
+    "a corner": lambda n, rng: rng.uniform(0.4, 1, (n, 2)),
+    "a cluster anywhere": lambda n, rng: rng.uniform(-0.7, 0.7, 2) + rng.normal(0, 0.15, (n, 2)),
+    "two clusters": lambda n, rng: rng.choice([-0.7, 0.7], (n, 1)) + rng.normal(0, 0.1, (n, 2)),
+    "a ring": _ring,
+    "three lines": _rows,
+}  # fmt: skip
+"""Places in [-1, 1]^2."""
+
+RATIOS = (5.0, 20.0, 50.0, 200.0)
+"""Longest over shortest axis of the noise of a point."""
+
+
+def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
+    """A scene by chance with points of one layout, noise of one shape and of any orientation, told."""
+    rng = np.random.default_rng((seed, 31))
+    half, n = rng.uniform(0.2, 1), int(np.exp(rng.uniform(np.log(20), np.log(1000))))
+    u, w = rng.normal(size=3), rng.normal(size=3)
+    u, w = u / np.linalg.norm(u), rng.uniform(0, 0.05) * w / np.linalg.norm(w)
+    shape = LAYOUTS[layout](n, rng)
+    nu = np.maximum(SURFACES[seed % len(SURFACES)](shape, rng), 0.02)
+    g, r = scenes.rows(half * shape)
+    moved = nu[:, None] * (g @ u)
+    sigma = np.exp(rng.uniform(np.log(0.003), np.log(0.2))) * np.median(np.linalg.norm(moved, axis=1))
+    roots = _roots(n, ratio, float(sigma), rng)
+    flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
+    return motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"), u, w
+
+
+def _roots(n: int, ratio: float, sigma: float, rng: np.random.Generator) -> Array:
+    """Roots of covariances with `sigma` as the geometric mean of their axes."""
+    angle = rng.uniform(0, np.pi, n)
+    turned = np.stack([np.stack([np.cos(angle), -np.sin(angle)], 1), np.stack([np.sin(angle), np.cos(angle)], 1)], 1)
+    return turned * (sigma * np.array([ratio**0.5, ratio**-0.5]))
+
+
+def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]]:
+    """What is tried, by the name of its row."""
+    parts: dict[str, dict[str, Callable[[int], Estimated]]] = {
+        "layouts": {name: (lambda seed, name=name: estimated(seed, name)) for name in LAYOUTS},
+        "noise": {f"all over the picture, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: estimated(seed, "all over the picture", ratio)) for ratio in RATIOS},
+    }  # fmt: skip
+    return {name: make for part, kinds in parts.items() if only is None or part in only for name, make in kinds.items()}
+
+
+def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
+    """One row for each layout and each shape of noise."""
+    return [row(name, map(make, range(trials))) for name, make in cases(only).items()]
+
+
+def main() -> None:
+    """Prints the table."""
+    from compare import table_lines
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--trials", type=int, default=TRIALS)
+    parser.add_argument("--only", nargs="+", choices=["layouts", "noise"])
+    options = parser.parse_args()
+    print("\n".join(table_lines(table(options.trials, options.only))))
+
+
+if __name__ == "__main__":
+    main()
