@@ -42,6 +42,9 @@ const APART: f64 = 12.0;
 /// Most times that rows are turned about what they gave.
 const ROUNDS: usize = 6;
 
+/// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are followed, too.
+const WANDERED: f64 = 0.1;
+
 /// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and rounds of weights.
 const PAIRS: usize = 32;
 const SHARE: f64 = 0.3;
@@ -147,7 +150,7 @@ fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
 
 /// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all points, and refines `found`. `unknown`: the noise is what the lead leaves.
 ///
-/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn out to be much larger once its own rotation is taken out, the other minima are followed, too, and only those stay that are as good as the best.
+/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn out to be much larger once its own rotation is taken out, or that is quite another one, the other minima are followed, too, and only those stay that are as good as the best.
 pub(super) fn settle(
     intake: &Intake<'_>,
     all: &mut Observations,
@@ -160,7 +163,9 @@ pub(super) fn settle(
     let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
     let own = follow(lead);
     let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
-    if others.is_empty() || own.cost <= limit(lead.equations.cost) {
+    let before = inliers.turn.map_or_else(Vector3::zeros, |turn| turn.rotation);
+    let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
+    if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
         let Some(turned) = own.turned else { return };
         let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, Effort::ROUGH);
         *found = different(others.par_iter().map(again).chain([own.minimum]).collect());
@@ -193,7 +198,7 @@ fn noise(cost: f64, n: usize, unknown: bool) -> f64 {
 struct Followed {
     minimum: Minimum,
     turned: Option<Observations>,
-    /// What it leaves; infinite where points are led behind the camera, which then do not count.
+    /// What it leaves; infinite where points are led behind the camera, which then do not count, or by more than half a turn.
     cost: f64,
 }
 
@@ -215,7 +220,9 @@ fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unkn
         turned = Some(next);
         negligible = settled;
     }
-    let lost = turned.as_ref().is_some_and(|turned| turned.unseen() > points.unseen());
+    // More than half a turn is less of one the other way round.
+    let whole = minimum.motion.w().norm() > std::f64::consts::PI;
+    let lost = whole || turned.as_ref().is_some_and(|turned| turned.unseen() > points.unseen());
     Followed { minimum, turned, cost: if lost { f64::INFINITY } else { minimum.equations.cost } }
 }
 

@@ -48,6 +48,7 @@ mod neighbours;
 mod observations;
 mod options;
 mod patches;
+mod plane_flow;
 mod plausible;
 mod refine;
 mod regression;

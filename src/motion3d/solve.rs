@@ -2,7 +2,7 @@
 
 use super::covariance::{Plugged, direction_deviation, plugged};
 use super::departure::beyond_theory;
-use super::displaced::{matters, settle};
+use super::displaced::{matters, settle, shift};
 use super::efficient::{Efficient, WeightDepths, unsolved};
 use super::estimate::Scaled;
 use super::intake::Intake;
@@ -28,6 +28,10 @@ const SMOOTHED: usize = 30;
 
 /// Times that a minimum is chosen anew once its own rotation is taken out of displacements.
 const CHOICES: usize = 4;
+
+/// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by which a motion is another one than that whose rotation is taken out.
+const AGAIN: usize = 2;
+const ASTRAY: f64 = 1.0;
 
 /// The points that obey one motion, and what is asked of them.
 pub(super) struct Task<'a, 'b> {
@@ -66,8 +70,19 @@ impl Task<'_, '_> {
             rescaled(scaled, &mut inliers, sigma);
             found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::FULL)).collect();
         }
-        let (candidates, made) = self.chosen(scaled, &mut inliers, found);
+        let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
         let mut solved = self.solved(&inliers, &candidates, made);
+        for round in 0..=AGAIN {
+            if shift(self.intake, &inliers, &solved.solution.motion) <= ASTRAY {
+                break;
+            }
+            // Of what has another rotation taken out nothing is told.
+            if round == AGAIN {
+                solved.told = false;
+                break;
+            }
+            (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
+        }
         self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         solved.solution.alternatives = close(&candidates, inliers.n)[1..]
             .iter()
@@ -133,6 +148,24 @@ impl Task<'_, '_> {
             candidates[..=own].rotate_right(1);
         }
         (candidates, made)
+    }
+
+    /// Solves once more with the rotation taken out of the minimum that smoothed weights preferred to the first of the `candidates`.
+    fn solved_there(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        candidates: &[Candidate],
+        preferred: &Motion,
+    ) -> (Vec<Candidate>, Solved) {
+        let mut found: Vec<Minimum> = candidates.iter().map(|candidate| candidate.minimum).collect();
+        let away = |minimum: &&Minimum| minimum.motion.angle_to(preferred);
+        if let Some(lead) = found.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied() {
+            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+        }
+        let (candidates, made) = self.chosen(scaled, inliers, found);
+        let solved = self.solved(inliers, &candidates, made);
+        (candidates, solved)
     }
 
     fn preferred(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {

@@ -4,6 +4,7 @@ use super::intake::Intake;
 use super::kernels::{Depths, depths};
 use super::motion::{Motion, Rows};
 use super::observations::{Observations, ROUNDING};
+use super::plane_flow::PlaneFlow;
 use super::refine::{Effort, refine};
 use super::turned::HalfTurn;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -120,10 +121,14 @@ pub(super) struct Twin {
     pub behind: f64,
 }
 
-/// The other motion where the depths at `motion` are one plane as far as their noise lets tell; `None` where they are not, or where both motions are the same.
+/// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is not, or where both motions are the same.
 ///
 /// `distinct`: least angle between both directions, rad, that is no mere error of the estimate.
 pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
+    let plane = PlaneFlow::fit(observations)?;
+    if !by_chance(plane.chi2, plane.free / observations.shared) {
+        return None;
+    }
     let Depths { mut nu, s2, .. } = depths(observations, motion);
     if let Some(turn) = &observations.turn {
         let middle = turn.middle(&motion.u());
@@ -131,24 +136,19 @@ pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Mo
             *nu = middle.depth(*nu);
         }
     }
-    let (mut normal, mut right, mut used) = (Matrix3::zeros(), Vector3::zeros(), 0usize);
-    let eta = |k: usize| place(observations, motion, k, nu[k]);
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
-        let eta = eta(k);
+        let eta = place(observations, motion, k, nu[k]);
         normal += s2[k] * eta * eta.transpose();
         right += s2[k] * nu[k] * eta;
-        used += 1;
-    }
-    if used < 4 {
-        return None;
     }
     let n = normal.cholesky()?.solve(&right);
-    let rest = |k: usize| nu[k] - n.dot(&eta(k));
-    let chi2: f64 = (0..observations.n).map(|k| s2[k] * rest(k).powi(2)).sum();
-    if !by_chance(chi2, (used - 3) as f64) || n.norm() <= 0.0 || bent(observations, &s2, rest) {
+    let u = motion.u();
+    // What a plane leaves of each depth.
+    let rest = |k: usize| (observations.row(k).g * u).dot(&plane.rest[k]) / s2[k];
+    if n.norm() <= 0.0 || bent(observations, &s2, rest) {
         return None;
     }
-    let u = motion.u();
     let (other, seen) = other_motion(intake, observations, motion, &n)?;
     let behind = |motion: &Motion| -> f64 {
         let at = depths(&seen, motion);
@@ -182,6 +182,8 @@ fn other_motion<'a>(
 ) -> Option<(Motion, Cow<'a, Observations>)> {
     let Some(turn) = observations.turn else {
         let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
+        // What the estimate is off by is in the plane, too.
+        let other = refine(observations, other, None, Effort::FULL).motion;
         return Some((other, Cow::Borrowed(observations)));
     };
     // In the axes half way the translation is V' u and rotations are V' w.
