@@ -43,7 +43,7 @@ const APART: f64 = 12.0;
 const ROUNDS: usize = 6;
 
 /// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are followed, too.
-const WANDERED: f64 = 0.1;
+pub(super) const WANDERED: f64 = 0.1;
 
 /// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and rounds of weights.
 const PAIRS: usize = 32;
@@ -137,6 +137,16 @@ pub(super) fn beforehand(
         turned = intake.turned(few, HalfTurn::new(&w));
     }
     Some(intake.turned(points, HalfTurn::new(&w)))
+}
+
+/// The points with the rotation taken out that explains most of their flow by itself, whatever was taken out before; `None` where there is none.
+pub(super) fn afresh(intake: &Intake<'_>, points: &Observations) -> Option<Observations> {
+    let mut turned = intake.turned(points, HalfTurn::new(&Vector3::zeros()));
+    for _ in 0..=TURNS {
+        let w = least_squares(&turned, |_| 1.0)?;
+        turned = intake.turned(points, HalfTurn::new(&w));
+    }
+    Some(turned)
 }
 
 /// The mean square of what turning changes in the flow that a rotation leaves.

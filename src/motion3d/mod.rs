@@ -42,6 +42,7 @@ mod field_patches;
 mod grid;
 mod intake;
 mod kernels;
+mod less_turned;
 mod likelihood;
 mod motion;
 mod neighbours;

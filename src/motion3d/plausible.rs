@@ -18,13 +18,13 @@ pub(super) const PLAUSIBLE: f64 = 11.07;
 const CONSISTENT: f64 = 5.99;
 
 /// Deviations that chance may add to a difference of `J`.
-const CHANCE: f64 = 2.0;
+pub(super) const CHANCE: f64 = 2.0;
 
 /// Depth maps whose costs differ by less than this times `sqrt(n)` are as smooth.
 const AS_SMOOTH: f64 = 1.0;
 
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
-const COMPARED: usize = 12;
+pub(super) const COMPARED: usize = 12;
 
 /// Angles to the estimate, degrees, beyond which a direction is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -36,10 +36,11 @@ pub(super) struct Farther {
 }
 
 /// A direction with the rotation and the sign that suit it best.
-struct Asked {
-    motion: Motion,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    pub motion: Motion,
     /// `J` and the depths behind the camera.
-    cost: f64,
+    pub cost: f64,
     /// From the estimate's, whatever the sign, degrees.
     angle: f64,
 }
@@ -72,10 +73,11 @@ pub(super) fn plausible_beyond(
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     doubts.truncate(COMPARED);
-    as_likely(searched, &known, &doubts, rng.stream(1))
+    let among = |asked: &[Asked]| asked.iter().map(|asked| (searched, *asked)).collect::<Vec<_>>();
+    as_likely(&among(&known), &among(&doubts), rng.stream(1))
 }
 
-fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<Asked> {
+pub(super) fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<Asked> {
     let (w, cost) = best_rotation(observations, u)?;
     let signs = [Motion::of(u, &w), Motion::of(&-u, &w)];
     let behind = signs.map(|motion| equations(observations, &motion, &tangents(&motion.u()), None).behind);
@@ -85,7 +87,7 @@ fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> O
 }
 
 /// Standard deviation of the difference of two directions' `J` by chance, `2 sqrt(sum sin^2 phi)`.
-fn fluctuation(observations: &Observations, one: &Motion, other: &Motion) -> f64 {
+pub(super) fn fluctuation(observations: &Observations, one: &Motion, other: &Motion) -> f64 {
     let turned = |k: usize| {
         let g = observations.row(k).g;
         let (a, b) = (g * one.u(), g * other.u());
@@ -96,16 +98,14 @@ fn fluctuation(observations: &Observations, one: &Motion, other: &Motion) -> f64
     2.0 * (0..observations.n).map(turned).sum::<f64>().sqrt()
 }
 
-/// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is consistent with the estimating equation.
-fn as_likely(observations: &Observations, known: &[Asked], doubts: &[Asked], rng: CounterRng) -> bool {
-    if doubts.is_empty() {
-        return false;
-    }
-    let mut smoother = DepthSmoother::new(observations, Smoother::Auto, rng);
-    let cost = |asked: &Asked| asked.cost + smoother.cost(&depths(observations, &asked.motion));
-    let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (observations.n as f64).sqrt();
-    let smooth: Vec<&Asked> = doubts.iter().filter(|asked| cost(asked) < limit).collect();
-    smooth.into_iter().any(|asked| consistent(observations, &asked.motion, &mut smoother))
+/// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is consistent with the estimating equation; each with the points as it sees them.
+pub(super) fn as_likely(known: &[(&Observations, Asked)], doubts: &[(&Observations, Asked)], rng: CounterRng) -> bool {
+    let Some((points, _)) = known.first().filter(|_| !doubts.is_empty()) else { return false };
+    let mut smoother = DepthSmoother::new(points, Smoother::Auto, rng);
+    let cost = |(points, asked): &(&Observations, Asked)| asked.cost + smoother.cost(&depths(points, &asked.motion));
+    let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (points.n as f64).sqrt();
+    let smooth: Vec<_> = doubts.iter().filter(|doubt| cost(doubt) < limit).collect();
+    smooth.into_iter().any(|(points, asked)| consistent(points, &asked.motion, &mut smoother))
 }
 
 /// Whether the estimating equation holds at a motion but for chance: of `g = sum W^t e` with weights from smoothed depths, `g^t (sum W^t W)^-1 g` is chi-squared with the two unknowns of the direction, as the rotation is the best.

@@ -84,6 +84,7 @@ impl Task<'_, '_> {
             (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
         }
         self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
+        solved.undecided = solved.undecided.or_else(|| contested(&candidates));
         solved.solution.alternatives = close(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
@@ -237,6 +238,12 @@ impl Task<'_, '_> {
         };
         solution.covariance = solution.covariance.map(|covariance| covariance * wider);
     }
+}
+
+/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with its own.
+fn contested(candidates: &[Candidate]) -> Option<Alternative> {
+    let preferred = candidates.get(1).filter(|other| other.cost < candidates[0].cost)?;
+    Some(Alternative { motion: *preferred.motion(), excess: preferred.cost - candidates[0].cost })
 }
 
 /// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it: whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was missed), the motion is off by as much (R. Birge 1932).

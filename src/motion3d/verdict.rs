@@ -4,6 +4,7 @@ use super::covariance::direction_deviation;
 use super::grid::SEARCHED;
 use super::intake::Intake;
 use super::kernels::equations;
+use super::less_turned::plausible_less_turned;
 use super::likelihood::SAME;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
@@ -99,6 +100,13 @@ pub(super) fn judge(
         || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
+        || plausible_less_turned(
+            intake,
+            inliers,
+            &solution.motion,
+            farther(deviation, evidence.deviation, 1.0),
+            rng.stream(2),
+        )
     {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
@@ -131,11 +139,7 @@ fn planar(intake: &Intake<'_>, inliers: &Observations, solution: &mut Solution, 
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
-        let farther = Farther {
-            residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
-            chance: CONSISTENT * own * fewer + SPACING,
-        };
-        plausible_beyond(inliers, motions, farther, most, rng)
+        plausible_beyond(inliers, motions, farther(own, likelihood, fewer), most, rng)
     };
     if inliers.n <= SEARCHED {
         return beyond(SEARCHED);
@@ -143,6 +147,14 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
     // Where the deviation of few is too large for anything to lie beyond it, these tell nothing.
     let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
     (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
+}
+
+/// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
+fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
+    Farther {
+        residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
+        chance: CONSISTENT * own * fewer + SPACING,
+    }
 }
 
 /// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.
