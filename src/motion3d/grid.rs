@@ -29,6 +29,9 @@ const APART_WITHIN: f64 = 0.25;
 const FURTHER: usize = 16;
 const APART_FURTHER: f64 = 4.0;
 
+/// How far, degrees, the nearest directions are from each other.
+const NEIGHBOURS: f64 = 9.0;
+
 /// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
 const TOGETHER: usize = 20;
 
@@ -118,11 +121,20 @@ impl Searched {
         all.chain(within).map(|(motion, _)| motion).collect()
     }
 
-    /// More of them, where none of those led to the flow's noise.
+    /// More of them, where none of those led to the flow's noise: the best, and every direction that none near it is better than, lest all lie in one long valley.
     pub fn further(&self) -> Vec<Motion> {
         let all = apart(self.all.clone(), APART_FURTHER, FURTHER).into_iter();
         let within = apart(self.within.clone(), 0.5 * self.apart, FURTHER);
-        all.chain(within).map(|(motion, _)| motion).collect()
+        all.chain(within).chain(self.lowest_about()).map(|(motion, _)| motion).collect()
+    }
+
+    /// Directions that none within [`NEIGHBOURS`] degrees is better than.
+    fn lowest_about(&self) -> impl Iterator<Item = (Motion, f64)> {
+        let limit = NEIGHBOURS.to_radians().cos();
+        let lower = move |one: &(Motion, f64), other: &(Motion, f64)| {
+            other.1 < one.1 && other.0.u().dot(&one.0.u()).abs() > limit
+        };
+        self.all.iter().filter(move |one| !self.all.iter().any(|other| lower(one, other))).copied()
     }
 }
 

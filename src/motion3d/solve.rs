@@ -213,6 +213,8 @@ impl Task<'_, '_> {
         if let Some(best) = &mut improved {
             (best.covariance, told) = best.lengthened(inliers, || self.smoother(inliers));
         }
+        // From where they lead nowhere the minimum is a spurious one.
+        told &= improved.is_some() || !wanted;
         let unknown = low && improved.is_none();
         let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
         if unknown {
