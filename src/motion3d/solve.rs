@@ -92,7 +92,8 @@ impl Task<'_, '_> {
         let rivals: &[Rival] = self.known.map_or(&[], |known| &known.rivals);
         let Solved { mut solution, deviation, low, told, undecided } = solved;
         let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
-        let evidence = Evidence { likelihood, deviation, low, told, rivals, undecided };
+        let unknown = scaled.unknown;
+        let evidence = Evidence { likelihood, deviation, low, told, unknown, rivals, undecided };
         judge(self.intake, &inliers, &mut solution, &evidence, self.rng.stream(4));
         report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
     }

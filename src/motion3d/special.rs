@@ -123,10 +123,18 @@ pub(super) struct Twin {
 
 /// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is not, or where both motions are the same.
 ///
-/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate.
-pub(super) fn twin(intake: &Intake<'_>, observations: &Observations, motion: &Motion, distinct: f64) -> Option<Twin> {
+/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate; `unknown`: the noise is what the motion leaves.
+pub(super) fn twin(
+    intake: &Intake<'_>,
+    observations: &Observations,
+    motion: &Motion,
+    distinct: f64,
+    unknown: bool,
+) -> Option<Twin> {
     let plane = PlaneFlow::fit(observations)?;
-    if !by_chance(plane.chi2, plane.free / observations.shared) {
+    // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much more than one alone.
+    let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
+    if chi2_deviation(plane.chi2, plane.free / observations.shared) > usual * RARE {
         return None;
     }
     let Depths { mut nu, s2, .. } = depths(observations, motion);

@@ -55,6 +55,8 @@ pub(super) struct Evidence<'a> {
     pub low: bool,
     /// Whether the covariance tells the shape of what is not known.
     pub told: bool,
+    /// Whether the noise is what the motion leaves.
+    pub unknown: bool,
     /// Motions that other points obey.
     pub rivals: &'a [Rival],
     /// Another solution that is about as likely.
@@ -72,7 +74,7 @@ pub(super) fn judge(
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
     // Where even that is not finite, no other motion is distinct.
     let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
-    let planar = planar(intake, inliers, solution, evidence.likelihood.1, distinct);
+    let planar = planar(intake, inliers, solution, evidence, distinct);
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
@@ -119,9 +121,15 @@ pub(super) fn judge(
 }
 
 /// Whether the points are one plane that has another motion, too; that is then the first alternative.
-fn planar(intake: &Intake<'_>, inliers: &Observations, solution: &mut Solution, behind: f64, distinct: f64) -> bool {
-    let Some(twin) = twin(intake, inliers, &solution.motion, distinct) else { return false };
-    let excess = twin.behind - behind;
+fn planar(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &mut Solution,
+    evidence: &Evidence<'_>,
+    distinct: f64,
+) -> bool {
+    let Some(twin) = twin(intake, inliers, &solution.motion, distinct, evidence.unknown) else { return false };
+    let excess = twin.behind - evidence.likelihood.1;
     if excess >= EXCLUDED {
         return false;
     }

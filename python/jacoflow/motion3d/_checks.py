@@ -17,6 +17,11 @@ def word(name: str, value: object) -> None:
         raise TypeError(f"{name}: expected a word, got {value!r}")
 
 
+def kind(name: str, value: object, *kinds: type) -> None:
+    if not isinstance(value, kinds):
+        raise TypeError(f"{name}: expected a {' or a '.join(kind.__name__ for kind in kinds)}, got {type(value).__name__}")
+
+
 def pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLike, ArrayLike] | None:
     if given is None:
         return None

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from .._jacoflow import _motion3d_beside, _motion3d_contact_map, _motion3d_field_patches, _motion3d_field_points
-from ._checks import Array, count, number, word
+from .._jacoflow import FlowField, _motion3d_beside, _motion3d_contact_map, _motion3d_field_patches, _motion3d_field_points
+from ._checks import Array, count, kind, number, word
 from ._estimate import estimate_motion
 from ._results import MotionEstimate
-
-if TYPE_CHECKING:
-    from .. import FlowField
 
 OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
 """What may be said of the estimate; what a field tells itself is refused by name."""
@@ -67,8 +64,9 @@ def estimate_field_motion(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` without a `region` or whose rotation is not known, for no `K`, and for options that do not fit.
     TypeError
-        For a `scene` that is none, and for options that are not known.
+        For a `field` or `scene` that is none, and for options that are not known.
     """
+    kind("field", field, FlowField)
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
     options = _own(options)
@@ -142,5 +140,7 @@ def time_to_contact_map(
     ValueError
         For a stack, a field without a covariance or with a `pixel_pitch`, and for a matrix that is none of a camera.
     """
+    kind("field", field, FlowField)
+    kind("result", result, MotionEstimate)
     word("placement", placement)
     return _motion3d_contact_map(field, K, (result.translation, result.rotation, result.tangent, result.covariance), placement)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._jacoflow import _motion3d_focus
-from ._checks import Array
+from ._checks import Array, kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +96,17 @@ def estimate_of(told: dict[str, Any]) -> MotionEstimate:
 
 def time_to_contact(result: MotionEstimate) -> Array:
     """Frames until each point (N,) reaches the camera's plane, `-1 / (nu u_z)`: positive when approaching, infinite when `u_z = 0`. On the sphere, where inverse depths are inverse ranges, times and their deviations are to be multiplied by the bearings' z: `result.time_to_contact * points[:, 2]`."""
+    kind("result", result, MotionEstimate)
     return result.time_to_contact
 
 
 def time_to_contact_std(result: MotionEstimate) -> Array:
     """Standard deviations (N,) of `time_to_contact`, frames, to first order: of the smoothed depth (its posterior deviation given its neighbours; the point's own where nothing was smoothed) and of the motion."""
+    kind("result", result, MotionEstimate)
     return result.time_to_contact_std
 
 
 def focus_of_expansion(result: MotionEstimate, K: ArrayLike | None = None) -> tuple[Array, Array] | None:
     """The point `K (u / u_z)` that the flow comes from or goes to: its place (2,), px with K, and its covariance (2, 2), px^2; None when `|u_z| < 1e-9`."""
+    kind("result", result, MotionEstimate)
     return _motion3d_focus(result.translation, result.tangent, result.covariance, K)

@@ -7,7 +7,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from .._jacoflow import _motion3d_essential, _motion3d_predict
-from ._checks import Array, switch
+from ._checks import Array, kind, switch
 from ._results import MotionEstimate, MotionSolution
 
 
@@ -54,4 +54,5 @@ def predict_flow(
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:
     """The essential matrix `[t]x Rot` (3, 3), no unit, of the two views: `eta_2 @ E @ eta_1 = 0`, with `Rot = exp([w]x)` and `t = V(w) u`, as the motion is steady over the frame."""
+    kind("result", result, MotionEstimate, MotionSolution)
     return _motion3d_essential(result.translation, result.rotation)
