@@ -99,12 +99,17 @@ impl HalfTurn {
         if towards.iter().all(|value| value.is_finite()) { Self { towards, ..turn } } else { turn }
     }
 
-    /// `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which the depth of a displacement `left` changes the rows of `w`: rather less than by far too much, where noise has it.
-    fn nearer(&self, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> f64 {
+    /// The rows of `w` for a displacement `left` from `from` with the rows `g` of `u`: at its middle, times `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which its depth changes them.
+    ///
+    /// Of the displacement only what lies along the epipolar line of the direction that is known counts: what is across is the noise of the residual, and rows that go with it would not leave the sum of their products zero. Depths that noise has change the rows rather by less than by far too much.
+    fn turning(&self, from: &Vector2<f64>, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> Matrix2x3<f64> {
         let t = g * self.towards;
         let square = t.norm_squared();
-        let change = if square > 0.0 { 0.5 * self.towards.z * t.dot(left) / square } else { 0.0 };
-        1.0 - change.clamp(-CHANGE, CHANGE)
+        let known = square > 0.0;
+        let along = if known { t.dot(left) / square } else { 0.0 };
+        let way = if known { t * along } else { *left };
+        let change = (0.5 * self.towards.z * along).clamp(-CHANGE, CHANGE);
+        Rows::plane((from + 0.5 * way).into()).r * (1.0 - change)
     }
 
     /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation; `None` where that leads behind the camera.
@@ -113,7 +118,7 @@ impl HalfTurn {
         let (to, spread) = pictured(&self.half.transpose(), second)?;
         let middle: [f64; 2] = (0.5 * (from + to)).into();
         let (left, g) = (to - from, Rows::plane(from.into()).g);
-        let turning = Rows::plane(middle).r * self.nearer(&g, &left);
+        let turning = self.turning(&from, &g, &left);
         let rows = Rows { g: g * self.mean, r: turning * self.mean };
         let flow = left + turning * self.rotation;
         Some(Turned { middle, rows, left, flow, spread, first: at_first })
