@@ -1,9 +1,10 @@
-"""Where the points lie and what shape their noise has: how often an estimate of 3-D motion that says `ok` is wrong and how often its covariance holds, of scenes by chance.
+"""Where the points lie, what shape their noise has, planes, and long displacements in large noise: how often an estimate of 3-D motion that says `ok` is wrong and how often its covariance holds, of scenes by chance.
 
-    python benchmarks/motion3d_layouts.py [--trials 400] [--only layouts noise]
+    python benchmarks/motion3d_layouts.py [--trials 400] [--only layouts noise planes band views]
 
 Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a street or a wall with a relief
-of 3 %. The columns are those of `motion3d_coverage.py`.
+of 3 %. Planes are exact ones with noise of 1 % of the flow, which another motion explains as well unless it has points behind the camera. The band is a tenth as high as it is wide and up to 160 degrees of it are seen. In two views the camera moves by a tenth of the depth, and noise is
+of the displacements, of 30 px and more. The columns are those of `motion3d_coverage.py`.
 """
 
 from __future__ import annotations
@@ -60,8 +61,7 @@ def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
     """A scene by chance with points of one layout, noise of one shape and of any orientation, told."""
     rng = np.random.default_rng((seed, 31))
     half, n = rng.uniform(0.2, 1), int(np.exp(rng.uniform(np.log(20), np.log(1000))))
-    u, w = rng.normal(size=3), rng.normal(size=3)
-    u, w = u / np.linalg.norm(u), rng.uniform(0, 0.05) * w / np.linalg.norm(w)
+    u, w = _unit(rng), rng.uniform(0, 0.05) * _unit(rng)
     shape = LAYOUTS[layout](n, rng)
     nu = np.maximum(SURFACES[seed % len(SURFACES)](shape, rng), 0.02)
     g, r = scenes.rows(half * shape)
@@ -70,6 +70,58 @@ def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
     roots = _roots(n, ratio, float(sigma), rng)
     flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
     return motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"), u, w
+
+
+def plane(seed: int, ratio: float) -> Estimated:
+    """300 points of a wall."""
+    rng = np.random.default_rng((seed, 32))
+    points = rng.uniform(-0.5, 0.5, (300, 2))
+    nu = 1 + points @ rng.uniform(-0.8, 0.8, 2)
+    u, w = _unit(rng), 0.03 * _unit(rng)
+    g, r = scenes.rows(points)
+    moved = nu[:, None] * (g @ u)
+    roots = _roots(300, ratio, 0.01 * float(np.median(np.linalg.norm(moved, axis=1))), rng)
+    flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(300, 2)))
+    return motion3d.estimate_motion(points, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"), u, w
+
+
+def band(seed: int) -> Estimated:
+    """A band across a wide picture of something nearly flat, which the camera moves along."""
+    rng = np.random.default_rng((seed, 33))
+    n, half = int(np.exp(rng.uniform(np.log(30), np.log(2000)))), np.tan(np.radians(rng.uniform(55, 80)))
+    shape = rng.uniform([-1, -0.1], [1, 0.1], (n, 2))
+    phases = rng.uniform(0, 2 * np.pi, 2)
+    nu = 1 + 0.1 * np.sin(2 * shape[:, 0] + phases[0]) * np.cos(2 * shape[:, 1] + phases[1])
+    u, w = np.append(_unit(rng)[:2], 0.0), rng.uniform(0, 0.05) * _unit(rng)
+    u /= np.linalg.norm(u)
+    g, r = scenes.rows(half * shape)
+    moved = nu[:, None] * (g @ u)
+    sigma = float(np.exp(rng.uniform(np.log(0.002), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
+    return motion3d.estimate_motion(half * shape, moved + r @ w + sigma * rng.normal(size=(n, 2)), sigma=sigma, placement="start"), u, w
+
+
+def views(seed: int, depth: str, noise: float) -> Estimated:
+    """Two exact views in pixels, f = 500, of a field of 15 to 70 degrees; the camera moves by a tenth of the depth and turns by .03 rad."""
+    rng = np.random.default_rng((seed, 34))
+    n, half = int(np.exp(rng.uniform(np.log(50), np.log(3000)))), np.tan(np.radians(rng.uniform(7.5, 35)))
+    shape = LAYOUTS[("all over the picture", "a corner", "a cluster anywhere")[seed % 3]](n, rng)
+    nu = 0.1 * np.maximum(1 + 0.5 * shape @ rng.uniform(-1, 1, 2) if depth == "plane" else DEPTHS[depth](shape, rng), 0.05)
+    u, w = _unit(rng), 0.03 * _unit(rng)
+    pixels = [320, 240] + 500 * half * shape
+    still = scenes.displaced(pixels, 0 * nu, u, w)
+    moved = scenes.displaced(pixels, nu, u, w)
+    sigma = noise * float(np.median(np.linalg.norm(moved - still, axis=1)))
+    flow = moved - pixels + sigma * rng.normal(size=(n, 2))
+    return motion3d.estimate_motion(pixels, flow, scenes.K, sigma=sigma), u, w
+
+
+VIEWS = (("waves", 0.03), ("waves", 0.1), ("cloud", 0.1), ("cloud", 0.3), ("plane", 0.01), ("plane", 0.05))
+"""Depths and noise, as a share of the displacement, of two views."""
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
 
 
 def _roots(n: int, ratio: float, sigma: float, rng: np.random.Generator) -> Array:
@@ -84,6 +136,9 @@ def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]
     parts: dict[str, dict[str, Callable[[int], Estimated]]] = {
         "layouts": {name: (lambda seed, name=name: estimated(seed, name)) for name in LAYOUTS},
         "noise": {f"all over the picture, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: estimated(seed, "all over the picture", ratio)) for ratio in RATIOS},
+        "planes": {f"a plane, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: plane(seed, ratio)) for ratio in (1.0, 10.0, 30.0, 100.0)},
+        "band": {"a band of something nearly flat, 110 to 160 degrees wide": band},
+        "views": {f"two views, {depth}, noise {noise:g} of the displacement": (lambda seed, depth=depth, noise=noise: views(seed, depth, noise)) for depth, noise in VIEWS},
     }  # fmt: skip
     return {name: make for part, kinds in parts.items() if only is None or part in only for name, make in kinds.items()}
 
@@ -99,7 +154,7 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--only", nargs="+", choices=["layouts", "noise"])
+    parser.add_argument("--only", nargs="+", choices=["layouts", "noise", "planes", "band", "views"])
     options = parser.parse_args()
     print("\n".join(table_lines(table(options.trials, options.only))))
 
