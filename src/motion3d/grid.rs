@@ -3,6 +3,7 @@
 use super::kernels::best_rotation;
 use super::motion::{Motion, tangents};
 use super::observations::Observations;
+use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
@@ -29,8 +30,10 @@ const APART_WITHIN: f64 = 0.25;
 const FURTHER: usize = 16;
 const APART_FURTHER: f64 = 4.0;
 
-/// How far, degrees, the nearest directions are from each other.
-const NEIGHBOURS: f64 = 9.0;
+/// Starts among what a few steps on a few points lead to.
+const BASINS: usize = 4;
+const FEW: usize = 128;
+const STEPS: Effort = Effort { steps: 4, tolerance: 1e-2 };
 
 /// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
 const TOGETHER: usize = 20;
@@ -100,6 +103,7 @@ pub(super) fn at_most(observations: &Observations, most: usize, rng: CounterRng)
 /// Directions that were looked at, each with the rotation that suits it best and what that leaves.
 pub(super) struct Searched {
     all: Vec<(Motion, f64)>,
+    basins: Vec<(Motion, f64)>,
     within: Vec<(Motion, f64)>,
     /// Least angle between starts within the picture, degrees.
     apart: f64,
@@ -111,31 +115,47 @@ impl Searched {
         let searched = &*at_most(observations, SEARCHED, rng);
         let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
         let (within, width) = within(searched);
-        Self { all: evaluate(best), within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
+        let all = evaluate(best);
+        let basins = basins(searched, &all, rng.stream(7));
+        Self { all, basins, within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
     }
 
-    /// The most promising motions.
+    /// The most promising motions: the best, and those in whose neighbourhood the least is left, lest all lie in one long valley.
     pub fn starts(&self) -> Vec<Motion> {
         let all = apart(self.all.clone(), APART, STARTS).into_iter();
+        let basins = apart(self.basins.clone(), APART, BASINS);
         let within = apart(self.within.clone(), self.apart, STARTS_WITHIN);
-        all.chain(within).map(|(motion, _)| motion).collect()
+        different(all.chain(basins).chain(within))
     }
 
-    /// More of them, where none of those led to the flow's noise: the best, and every direction that none near it is better than, lest all lie in one long valley.
+    /// More of them, where none of those led to the flow's noise.
     pub fn further(&self) -> Vec<Motion> {
         let all = apart(self.all.clone(), APART_FURTHER, FURTHER).into_iter();
+        let basins = apart(self.basins.clone(), APART_FURTHER, FURTHER);
         let within = apart(self.within.clone(), 0.5 * self.apart, FURTHER);
-        all.chain(within).chain(self.lowest_about()).map(|(motion, _)| motion).collect()
+        different(all.chain(basins).chain(within))
     }
+}
 
-    /// Directions that none within [`NEIGHBOURS`] degrees is better than.
-    fn lowest_about(&self) -> impl Iterator<Item = (Motion, f64)> {
-        let limit = NEIGHBOURS.to_radians().cos();
-        let lower = move |one: &(Motion, f64), other: &(Motion, f64)| {
-            other.1 < one.1 && other.0.u().dot(&one.0.u()).abs() > limit
-        };
-        self.all.iter().filter(move |one| !self.all.iter().any(|other| lower(one, other))).copied()
+/// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow that the nearest direction looks worse than hundreds of others.
+fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -> Vec<(Motion, f64)> {
+    let few = &*at_most(observations, FEW, rng);
+    let led = |&(motion, _): &(Motion, f64)| {
+        let minimum = refine(few, motion, None, STEPS);
+        (minimum.motion, minimum.equations.cost)
+    };
+    apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(led).collect()
+}
+
+/// The motions, each once.
+fn different(motions: impl Iterator<Item = (Motion, f64)>) -> Vec<Motion> {
+    let mut kept: Vec<Motion> = Vec::new();
+    for (motion, _) in motions {
+        if !kept.contains(&motion) {
+            kept.push(motion);
+        }
     }
+    kept
 }
 
 /// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half width, rad.
