@@ -1,5 +1,6 @@
 //! Scenes that do not determine a motion: no translation, one plane.
 
+use super::grid::at_most;
 use super::intake::Intake;
 use super::kernels::{Depths, depths};
 use super::motion::{Motion, Rows};
@@ -7,6 +8,7 @@ use super::observations::{Observations, ROUNDING};
 use super::plane_flow::PlaneFlow;
 use super::refine::{Effort, refine};
 use super::turned::HalfTurn;
+use crate::math::random::CounterRng;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::borrow::Cow;
 
@@ -33,6 +35,9 @@ const DETERMINED: f64 = 1e-12;
 
 /// Times that a plane's other rotation is taken out of displacements.
 const TURNS: usize = 5;
+
+/// Points that are asked first whether they are a plane.
+const FEW: usize = 1000;
 
 /// Deviations of a standard normal that a share of 0.001 lies beyond.
 const RARE: f64 = 3.0902;
@@ -131,12 +136,14 @@ pub(super) fn twin(
     distinct: f64,
     unknown: bool,
 ) -> Option<Twin> {
-    let plane = PlaneFlow::fit(observations)?;
     // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much more than one alone.
     let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
-    if chi2_deviation(plane.chi2, plane.free / observations.shared) > usual * RARE {
-        return None;
+    let fits = |plane: &PlaneFlow| chi2_deviation(plane.chi2, plane.free / observations.shared) < usual * RARE;
+    // What is far from a plane is so for few points already.
+    if observations.n > FEW {
+        PlaneFlow::fit(&at_most(observations, FEW, CounterRng::new(0))).filter(fits)?;
     }
+    let plane = PlaneFlow::fit(observations).filter(fits)?;
     let Depths { mut nu, s2, .. } = depths(observations, motion);
     if let Some(turn) = &observations.turn {
         let middle = turn.middle(&motion.u());
