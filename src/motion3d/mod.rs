@@ -54,6 +54,7 @@ mod regression;
 mod report;
 mod result;
 mod robust;
+mod scale;
 mod selected;
 mod sideways;
 mod signs;
