@@ -183,8 +183,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
     let scale = options.flow_scale.unwrap_or_default();
-    covariance =
-        covariance.map(|covariance| covariance * wider + scale::added(&covariance, &motion, None, scale));
+    covariance = covariance.map(|covariance| covariance * wider + scale::added(&covariance, &motion, None, scale));
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {

@@ -10,7 +10,8 @@ use nalgebra::{Matrix2, SVector, Vector2};
 
 /// How far the scale of flow may be off, as far as its covariances tell: by what would be the whole error of half the points. Of each, its flow and the covariance of that.
 pub(super) fn told(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> f64 {
-    let square = |(flow, covariance): (Vector2<f64>, Matrix2<f64>)| Some(flow.dot(&covariance.cholesky()?.solve(&flow)));
+    let square =
+        |(flow, covariance): (Vector2<f64>, Matrix2<f64>)| Some(flow.dot(&covariance.cholesky()?.solve(&flow)));
     let mut squares: Vec<f64> = points.filter_map(square).filter(|square| square.is_finite()).collect();
     let median = median(&mut squares);
     // An error has two components. Flow that may be twice as long or none has no scale.

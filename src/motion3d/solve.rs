@@ -197,9 +197,11 @@ impl Task<'_, '_> {
             solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
         }
         let known = inliers.prior.as_ref();
-        let scale = self.options.flow_scale.zip(solution.covariance).map(|(deviation, covariance)| {
-            scale::added(&covariance, &solution.motion, known, deviation)
-        });
+        let scale = self
+            .options
+            .flow_scale
+            .zip(solution.covariance)
+            .map(|(deviation, covariance)| scale::added(&covariance, &solution.motion, known, deviation));
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
         solution.go_together(inliers, self.intake.flow, length);
         let wider = match (scaled.unknown, self.known) {
