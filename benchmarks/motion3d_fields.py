@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from typing import Any, Literal
 
 import jacoflow
 import motion3d_rooms as rooms
@@ -16,16 +17,17 @@ from jacoflow import motion3d
 from motion3d_coverage import Estimated, Row, row
 
 TRIALS = 60
-METHODS = ("coarse_to_fine", "windowed")
+Method = Literal["coarse_to_fine", "windowed"]
+METHODS: tuple[Method, ...] = ("coarse_to_fine", "windowed")
 NOISES = (1.5, 5.0)
 STEPS = {"quick": 0.02, "slow": 0.005}
 """How far the camera moves between both frames, in units of which walls are 1.2 to 3 away."""
 TURN = 0.3
 """Most that it turns, in shares of that."""
-WAYS: dict[str, dict[str, bool | int]] = {"default": {}, "robust=False": {"robust": False}, "patches=48": {"patches": 48}}
+WAYS: dict[str, dict[str, Any]] = {"default": {}, "robust=False": {"robust": False}, "patches=48": {"patches": 48}}
 
 
-def fields(method: str, noise: float, step: float, trials: int) -> list[tuple[jacoflow.FlowField, rooms.Room]]:
+def fields(method: Method, noise: float, step: float, trials: int) -> list[tuple[jacoflow.FlowField, rooms.Room]]:
     """Flow fields of rooms, and these."""
     made = [rooms.room(seed, step, TURN * step) for seed in range(trials)]
     return [(jacoflow.estimate(rooms.frames(one, noise, seed), method=method), one) for seed, one in enumerate(made)]
@@ -37,7 +39,7 @@ def estimated(seen: list[tuple[jacoflow.FlowField, rooms.Room]], way: str) -> It
         yield motion3d.estimate_field_motion(field, rooms.K, **WAYS[way])[0], made.u, made.w
 
 
-def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
+def table(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
     """One row for each method, noise, speed and way."""
     rows: list[Row] = []
     for method in only or METHODS:

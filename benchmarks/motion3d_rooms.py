@@ -60,7 +60,7 @@ class Room:
         rays = _rays(points)
         along, _ = self._hits(rays, np.zeros(3))
         seen = (along[:, None] * rays @ self.rotation.T + self.shift) @ K.T
-        return seen[:, :2] / seen[:, 2:] - points
+        return np.asarray(seen[:, :2] / seen[:, 2:] - points)
 
 
 def _pixels() -> Array:
