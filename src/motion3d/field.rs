@@ -1,8 +1,10 @@
 //! Points of a flow field that share no window.
 
+use super::scale;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites, Status};
+use nalgebra::Matrix2;
 
 /// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of them goes together still (`benchmarks/motion3d_drive.py`), which the motion's covariance sums (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
@@ -43,6 +45,8 @@ pub struct FieldPoints {
     pub shared: f64,
     /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
     pub correlation_length: f64,
+    /// How far the flow of all of them may be too short or too long by one factor, as far as their covariances tell. For [`MotionOptions::flow_scale`](super::MotionOptions).
+    pub scale: f64,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
@@ -55,6 +59,7 @@ impl FieldPoints {
             spacing: self.spacing,
             shared: self.shared,
             correlation_length: self.correlation_length,
+            scale: self.scale,
             ..Self::default()
         };
         for (k, &[x, y]) in self.points.iter().enumerate() {
@@ -117,7 +122,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             }
             let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
             // Rounded, that of an edge may be none.
-            if nalgebra::Matrix2::new(uu, 0.5 * (uv + vu), 0.5 * (uv + vu), vv).cholesky().is_none() {
+            if Matrix2::new(uu, 0.5 * (uv + vu), 0.5 * (uv + vu), vv).cholesky().is_none() {
                 continue;
             }
             out.points.push([x as f64, y as f64]);
@@ -125,6 +130,8 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
         }
     }
+    let own = |(flow, covariance): (&[f64; 2], &[f64])| ((*flow).into(), Matrix2::from_row_slice(covariance) / shared);
+    out.scale = scale::told(out.flow.iter().zip(out.covariances.chunks_exact(4)).map(own));
     Ok(out)
 }
 

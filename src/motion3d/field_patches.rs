@@ -3,11 +3,12 @@
 use super::camera::Intrinsics;
 use super::field::{measured, within};
 use super::patches::AffinePatches;
+use super::scale;
 use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, Sites, Status};
-use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Matrix2, Matrix6, SMatrix, SVector, Vector2, Vector6};
 use rayon::prelude::*;
 
 /// Least side of a window, px: six numbers of less are hardly more than those of its pixels.
@@ -28,6 +29,8 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
+    /// How far the flow of all of them may be too short or too long by one factor, as far as the pixels' covariances tell. For [`MotionOptions::flow_scale`](super::MotionOptions).
+    pub scale: f64,
 }
 
 impl FieldPatches {
@@ -61,7 +64,13 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.sites(field, region);
     let fitted: Vec<_> = sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect();
-    let mut out = FieldPatches::default();
+    let pixel = |&site: &usize| {
+        let covariance = field.covariance_at(site)?;
+        let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+        Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
+    };
+    let scale = scale::told(sites.iter().flatten().filter_map(pixel));
+    let mut out = FieldPatches { scale, ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());

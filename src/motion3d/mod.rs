@@ -56,6 +56,7 @@ mod regression;
 mod report;
 mod result;
 mod robust;
+mod scale;
 mod selected;
 mod sideways;
 mod signs;

@@ -111,6 +111,8 @@ pub struct MotionOptions {
     pub shared: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the sphere), as those of windowed flow do: the covariance is then that of the sums over points whose errors correlate (`together`), in no direction smaller than that of independent points. Default: not at all.
     pub correlation_length: Option<f64>,
+    /// Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients has one: no residual tells it, and it is one of the rotation's length. Default: 0.
+    pub flow_scale: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.
@@ -163,6 +165,9 @@ impl MotionOptions {
     fn check_correlation(&self, noise: &Noise<'_>) -> Result<()> {
         if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(Error::argument("correlation_length", "a number of at least 0", length));
+        }
+        if let Some(deviation) = self.flow_scale.filter(|deviation| !(deviation.is_finite() && *deviation >= 0.0)) {
+            return Err(Error::argument("flow_scale", "a number of at least 0", deviation));
         }
         match self.shared {
             Some(shared) if !(shared.is_finite() && shared >= 1.0) => {

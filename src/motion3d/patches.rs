@@ -17,6 +17,7 @@ use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use super::scale;
 use super::special::{RotationOnly, by_chance};
 use super::turned::HalfTurn;
 use crate::error::{Error, Result};
@@ -181,7 +182,8 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
-    covariance = covariance.map(|covariance| covariance * wider);
+    let scale = options.flow_scale.unwrap_or_default();
+    covariance = covariance.map(|covariance| covariance * wider + scale::added(&covariance, &motion, None, scale));
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {

@@ -78,7 +78,7 @@ impl Solution {
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.
     pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
-        let (Some(covariance), Some(length)) = (self.covariance, length.filter(|length| *length > 0.0)) else { return };
+        let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
         let own;
         let nu = if let Some(smooth) = &self.smooth {
             smooth

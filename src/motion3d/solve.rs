@@ -14,6 +14,7 @@ use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
 use super::robust::{Consensus, Rival};
+use super::scale;
 use super::selected::of_estimated_noise;
 use super::smoothing::DepthSmoother;
 use super::special::{by_chance, turning, turning_in_unknown_noise};
@@ -232,14 +233,24 @@ impl Task<'_, '_> {
         if let Some(known) = self.known {
             solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        solution.go_together(inliers, self.intake.flow, self.options.correlation_length);
+        let known = inliers.prior.as_ref();
+        let scale = self
+            .options
+            .flow_scale
+            .zip(solution.covariance)
+            .map(|(deviation, covariance)| scale::added(&covariance, &solution.motion, known, deviation));
+        let length = self.options.correlation_length.filter(|length| *length > 0.0);
+        solution.go_together(inliers, self.intake.flow, length);
         let wider = match (scaled.unknown, self.known) {
             (true, known) => of_estimated_noise(inliers.n, known.is_some()),
+            // The residuals tell how large errors are that go together.
+            (false, _) if length.is_some() => 1.0,
             (false, None) => misfit(inliers, cost),
             // Residuals were cut off, and what strays leave among them is accounted for.
             (false, Some(_)) => 1.0,
         };
-        solution.covariance = solution.covariance.map(|covariance| covariance * wider);
+        let scale = scale.unwrap_or_default();
+        solution.covariance = solution.covariance.map(|covariance| covariance * wider + scale);
     }
 }
 

@@ -1,15 +1,17 @@
 //! What errors that go together over some distance do to a covariance.
 //!
 //! Sums over points that are taken for independent make the covariance too small where neighbours err alike. With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the covariance
-//! `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows agree, so that points which decide alone are hardly touched.
+//! `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows agree, so that points which decide alone are hardly touched. How far errors go together beyond the length that is told, and how large they are, the residuals tell ([`Errors`]).
+
+mod errors;
 
 use super::covariance::{Matrix5, inverse};
 use super::kernels::information;
 use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
-use nalgebra::{Matrix2x3, SMatrix, SymmetricEigen, Vector3};
-use rayon::prelude::*;
+use errors::{Errors, Neighbourhood};
+use nalgebra::{Matrix2x3, SMatrix, SymmetricEigen};
 
 /// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows stop sharing pixels, the rest over so many correlation lengths.
 const QUICK: f64 = 0.4;
@@ -49,10 +51,11 @@ pub(super) fn together(
     length: f64,
 ) -> Option<Matrix5> {
     let squares = information(inliers, at.motion, at.tangent, at.nu, 0.0);
-    let excess = excess(inliers, at, flow, length);
+    let points = Neighbourhood::new(inliers, at, flow, length);
+    let errors = Errors::told_by_residuals(&points, &inverse(&squares)?, inliers.own());
     let l = squares.cholesky()?.l();
     let back = l.try_inverse()?;
-    let relative = back * excess * back.transpose();
+    let relative = back * excess(&points, &errors) * back.transpose();
     let eigen = SymmetricEigen::new(0.5 * (relative + relative.transpose()));
     // Below 1 the points would tell more than independent ones.
     let sizes = eigen.eigenvalues.map(|size| 1.0 + size.max(0.0));
@@ -67,25 +70,8 @@ pub(super) fn together(
 }
 
 /// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told has too much for each point's own where several share one error.
-fn excess(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f64) -> Matrix5 {
-    let mut points: Vec<(Vector3<f64>, Vector5)> = (0..inliers.n)
-        .map(|k| (flow.place(inliers.source[k] as usize) / length, slopes(inliers, at.motion, at.tangent, at.nu[k], k)))
-        .collect();
-    // From top to bottom, so that only a band of them is near.
-    points.sort_by(|a, b| a.0.y.total_cmp(&b.0.y));
-    let own = inliers.own() * inliers.own();
-    let of_point = |k: usize| {
-        let (here, row) = &points[k];
-        let near = points[k + 1..].iter().take_while(|(place, _)| place.y - here.y < REACH);
-        let neighbours = near
-            .filter(|(place, _)| (place.x - here.x).abs() < REACH)
-            .fold(Vector5::zeros(), |sum, (place, row)| sum + row * (own * correlation((place - here).norm())));
-        let product = row * neighbours.transpose();
-        product + product.transpose() + row * row.transpose() * (own - 1.0)
-    };
-    // Added up in one order, whoever computes them.
-    let parts: Vec<Matrix5> = (0..points.len()).into_par_iter().map(of_point).collect();
-    parts.iter().sum()
+fn excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
+    points.different(errors.stretch) * errors.variance + points.squares() * (errors.variance - 1.0)
 }
 
 /// The row `D(nu)` of point `k`, 0 at the epipole.

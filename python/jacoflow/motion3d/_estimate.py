@@ -29,6 +29,7 @@ def estimate_motion(
     initial: tuple[ArrayLike, ArrayLike] | None = None,
     shared: float = 1.0,
     correlation_length: float = 0.0,
+    flow_scale: float = 0.0,
     seed: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
@@ -71,7 +72,9 @@ def estimate_motion(
     shared : float, no unit
         How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
     correlation_length : float, px with K, else units of points; rad on the sphere
-        How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. 0: errors are independent.
+        How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
+    flow_scale : float, no unit
+        Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
     seed : int
         Seed of the random choices.
     threads : int or None
@@ -87,7 +90,7 @@ def estimate_motion(
     given = layout(K, sigma, cov, projection, jacobian is not None)
     options = {
         "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": besides(0, number("flow_scale", flow_scale)), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = six(flow, jacobian)

@@ -24,6 +24,7 @@ pub struct Options<'py> {
     initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     shared: Option<f64>,
     correlation_length: Option<f64>,
+    flow_scale: Option<f64>,
     seed: Integer,
     threads: Option<usize>,
 }
@@ -45,6 +46,7 @@ impl Options<'_> {
             rotation_prior: self.rotation_prior()?,
             shared: self.shared,
             correlation_length: self.correlation_length,
+            flow_scale: self.flow_scale,
             seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
             threads: Threads::new(self.threads)?,
         })
