@@ -1,6 +1,6 @@
 """Every published table of 3-D motion beside our figures and OpenCV's on the same flow, and recordings from files to numbers.
 
-    python benchmarks/motion3d.py [--only fixed theory weights one practical pixels six claims honesty coverage layouts speed recordings] [--trials 1.0] [--data FOLDER]
+    python benchmarks/motion3d.py [--only fixed theory weights one practical pixels six claims honesty coverage layouts fields speed recordings] [--trials 1.0] [--data FOLDER]
 
 `--trials` multiplies the number of trials of each table. Figures that are asked of us are typed from the specification; all others are computed here.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 import motion3d_claims as further
 import motion3d_coverage as coverage
 import motion3d_drive as driving
+import motion3d_fields as fields
 import motion3d_fixed as fixed
 import motion3d_honesty as honesty
 import motion3d_layouts as layouts
@@ -31,7 +32,7 @@ SPEED_ASKED = {1000: (5, 5, 15), 100_000: (80, 300, 200)}
 
 TABLES = scores.TABLES | {"six": ("Six numbers a patch against flow", six.six_numbers, 240)}
 """Tables of random scenes by name: title, what makes it, trials."""
-NAMES = ["fixed", *TABLES, "claims", "honesty", "coverage", "layouts", "speed", "recordings"]
+NAMES = ["fixed", *TABLES, "claims", "honesty", "coverage", "layouts", "fields", "speed", "recordings"]
 """Sections of the tables."""
 
 
@@ -80,6 +81,8 @@ def sections(only: list[str] | None = None, factor: float = 1.0, data: Path | No
         out["3-D motion: where covariances are hardest to state"] = coverage.table(max(12, round(factor * coverage.TRIALS)))
     if wanted("layouts"):
         out["3-D motion: where the points lie, what shape their noise has, planes and long displacements"] = layouts.table(max(12, round(factor * layouts.TRIALS)))
+    if wanted("fields"):
+        out["3-D motion: flow fields of rendered rooms"] = fields.table(max(4, round(factor * fields.TRIALS)))
     if wanted("speed"):
         out["3-D motion: speed"] = speed(rounds)
     if data is not None and wanted("recordings"):

@@ -1,6 +1,6 @@
 """How often the stated covariances of the motion of a flow field hold: rendered rooms of chance with exact truth (`motion3d_rooms`), two frames of 320 x 240 px, f = 300 px.
 
-    python benchmarks/motion3d_fields.py [--trials 60] [--only coarse_to_fine windowed]
+    python benchmarks/motion3d_fields.py [--trials 40] [--only coarse_to_fine windowed]
 
 Flow by both methods that have a field of windows, in noise of 1.5 and 5 grey levels, each estimated robustly (the default), from all points, and from patches of 48 px. `quick`: translational flow of some 2 px, beyond what the windowed method is made for; `slow`: a quarter of it. Columns as in `motion3d_coverage`.
 """
@@ -16,7 +16,7 @@ import motion3d_rooms as rooms
 from jacoflow import motion3d
 from motion3d_coverage import Estimated, Row, row
 
-TRIALS = 60
+TRIALS = 40
 Method = Literal["coarse_to_fine", "windowed"]
 METHODS: tuple[Method, ...] = ("coarse_to_fine", "windowed")
 NOISES = (1.5, 5.0)

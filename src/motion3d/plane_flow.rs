@@ -112,3 +112,63 @@ fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize)
     let change = change.component_mul(&scale);
     (Matrix3::from_fn(|i, j| if i == 2 && j == 2 { 0.0 } else { change[3 * i + j] }), rank)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::intake::Intake;
+    use super::super::motion::Motion;
+    use super::super::options::{Flow, Noise, Placement};
+    use super::super::tests::scenes::{Scene, W};
+    use super::super::turned::HalfTurn;
+    use super::*;
+
+    const SLANT: [f64; 3] = [0.9, 0.3, -0.2];
+
+    fn along(x: f64, y: f64) -> f64 {
+        SLANT[0] + SLANT[1] * x + SLANT[2] * y
+    }
+
+    #[test]
+    fn eight_numbers_are_the_flow_of_a_plane_and_not_of_a_bend() {
+        let motion = Motion::new([0.6, 0.2, 0.75], W);
+        for bend in [0.0, 0.1] {
+            let scene = Scene::new(motion, 400, 0.6, 1e-3, 3, |x, y, _| along(x, y) + bend * x * x);
+            let fit = PlaneFlow::fit(&scene.observations()).unwrap();
+            assert_eq!(fit.free, 792.0);
+            assert_eq!((0.85..1.15).contains(&(fit.chi2 / fit.free)), bend == 0.0, "{bend}: {}", fit.chi2);
+        }
+    }
+
+    /// Without noise, over a whole frame, whichever rotation was taken out.
+    #[test]
+    fn a_homography_is_the_displacement_of_a_plane() {
+        let motion = Motion::new([0.6, 0.2, 0.75], [0.1, -0.05, 0.2]);
+        let turn = HalfTurn::new(&motion.w());
+        let points: Vec<[f64; 2]> =
+            (0..100).map(|k| [f64::from(k % 10) * 0.1 - 0.45, f64::from(k / 10) * 0.1 - 0.45]).collect();
+        let seen = |&[x, y]: &[f64; 2]| {
+            let before = Vector3::new(x, y, 1.0) / (0.1 * along(x, y));
+            let after = nalgebra::Rotation3::new(motion.w()) * before + Vector3::from(motion.displacement());
+            [after.x / after.z - x, after.y / after.z - y]
+        };
+        let flow: Vec<[f64; 2]> = points.iter().map(seen).collect();
+        let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
+        let intake = Intake::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
+        let start = intake.whitened();
+        for taken in [turn, HalfTurn::of(&motion), HalfTurn::new(&Vector3::new(0.0, 0.1, -0.1))] {
+            let fit = PlaneFlow::fit(&intake.turned(&start, taken)).unwrap();
+            assert!(fit.chi2 < 1e-12 && fit.free == 192.0, "{}", fit.chi2);
+        }
+    }
+
+    /// On a line fewer numbers than eight are determined, and what is left has so many more freedoms.
+    #[test]
+    fn points_on_a_line_determine_fewer_numbers() {
+        let motion = Motion::new([0.6, 0.2, 0.75], W);
+        let mut scene = Scene::new(motion, 50, 0.6, 1e-3, 3, |x, y, _| along(x, y));
+        scene.points.iter_mut().for_each(|point| point[1] = 0.0);
+        scene.flow = scene.points.iter().map(|&point| motion.plane_flow(point, along(point[0], 0.0))).collect();
+        let fit = PlaneFlow::fit(&scene.observations()).unwrap();
+        assert!(fit.free > 92.0 && fit.chi2 < 1e-6, "{} {}", fit.free, fit.chi2);
+    }
+}

@@ -10,12 +10,13 @@ import motion3d_claims as claims
 import motion3d_coverage as coverage
 import motion3d_fixed as fixed
 import motion3d_honesty as honesty
+import motion3d_layouts as layouts
 import motion3d_rivals as rivals
 import motion3d_scenes as scenes
 import motion3d_scores as scores
 import motion3d_six as six
 
-__all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "rivals", "scenes", "scores", "scene", "six", "start"]
+__all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "layouts", "rivals", "scenes", "scores", "scene", "six", "start"]
 
 U, W = scenes.motion("oblique")
 

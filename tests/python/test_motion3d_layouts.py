@@ -1,0 +1,42 @@
+"""Layouts, shapes of noise, planes and long displacements: what says `ok` is right, and as far off as it says."""
+
+import pytest
+
+from motion3d_support import layouts
+
+TRIALS = 300
+ROWS = {part: list(layouts.cases([part])) for part in ("layouts", "noise", "planes", "views")}
+
+
+def told(name: str) -> dict:
+    return layouts.coverage_row(name, TRIALS)
+
+
+@pytest.mark.parametrize("name", ROWS["layouts"] + ROWS["noise"])
+def test_points_and_noise_of_any_layout_and_shape(name):
+    row = told(name)
+    assert row["ok"] >= 90 and row["wrong"] <= 2 and 0.89 <= row["ellipsoid"] <= 0.98, row
+
+
+@pytest.mark.parametrize("name", ROWS["planes"])
+def test_another_motion_of_a_plane_is_told_whatever_the_noise(name):
+    """About half of them have one."""
+    row = told(name)
+    assert row["ok"] >= 90 and row["wrong"] == 0 and 0.88 <= row["ellipsoid"] <= 0.98, row
+    assert "ambiguous" in row["others"]
+
+
+def test_minima_that_are_narrow_in_a_wide_picture_are_found():
+    """Two of three hundred toss a coin between motions that explain the flow alike."""
+    (name,) = layouts.cases(["band"])
+    row = told(name)
+    assert row["ok"] >= 200 and row["wrong"] <= 3 and 0.88 <= row["ellipsoid"] <= 0.97, row
+
+
+@pytest.mark.parametrize("name", ROWS["views"])
+def test_long_displacements_in_large_noise_are_not_explained_by_large_turns(name):
+    """Of a plane few motions are without another; their ellipsoids are too few to be counted."""
+    row = told(name)
+    assert row["wrong"] <= 3, row
+    if "plane" not in name:
+        assert row["ok"] >= 60 and 0.87 <= row["ellipsoid"] <= 0.98, row
