@@ -5,7 +5,7 @@ use super::kernels::depths;
 use super::motion::Motion;
 use super::observations::Observations;
 use super::refine::{Effort, Minimum, refine};
-use super::smoothing::DepthSmoother;
+use super::smoothing::{DepthSmoother, Smoother};
 use super::special::by_chance;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
@@ -74,9 +74,8 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
-        let mut rough: Vec<Candidate> =
-            different(rough).into_iter().map(|minimum| Candidate::signed(&fewer, &minimum)).collect();
-        rough.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
+        let (mut rough, _) = choose(&fewer, &different(rough), smoother);
         rough.truncate(FINALISTS);
         rough.iter().map(|candidate| refine(observations, *candidate.motion(), None, Effort::FULL)).collect()
     } else {
