@@ -4,7 +4,7 @@
 //! other directions are asked with the rotation taken out that explains most of the flow by itself, and those that might do each with its own.
 
 use super::displaced::{WANDERED, afresh};
-use super::grid::{SEARCHED, at_most, evaluate};
+use super::grid::{at_most, evaluate};
 use super::intake::Intake;
 use super::likelihood::minima;
 use super::motion::Motion;
@@ -17,15 +17,16 @@ use rayon::prelude::*;
 /// Times that a direction's own rotation is taken out.
 const ROUNDS: usize = 4;
 
-/// Whether a direction that is farther from the estimate's than that is certain is as plausible, each with its own rotation taken out.
+/// Whether, for `most` of the points, a direction that is `farther` from the estimate's is as plausible, each with its own rotation taken out.
 pub(super) fn plausible_less_turned(
     intake: &Intake<'_>,
     inliers: &Observations,
     motion: &Motion,
     farther: Farther,
+    most: usize,
     rng: CounterRng,
 ) -> bool {
-    let own = &*at_most(inliers, SEARCHED, rng.stream(0));
+    let own = &*at_most(inliers, most, rng.stream(0));
     if !own.displaced || own.turn.is_none() {
         return false;
     }

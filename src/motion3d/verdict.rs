@@ -102,13 +102,7 @@ pub(super) fn judge(
         || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
-        || plausible_less_turned(
-            intake,
-            inliers,
-            &solution.motion,
-            farther(deviation, evidence.deviation, 1.0),
-            rng.stream(2),
-        )
+        || otherwise_turned(intake, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
     {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
@@ -155,6 +149,19 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
     // Where the deviation of few is too large for anything to lie beyond it, these tell nothing.
     let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
     (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
+}
+
+/// The same for motions that turn quite otherwise.
+fn otherwise_turned(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &Solution,
+    (own, likelihood): (f64, f64),
+    rng: CounterRng,
+) -> bool {
+    let fewer = (inliers.n as f64 / inliers.n.min(ASKED_AGAIN) as f64).sqrt();
+    let farther = farther(own, likelihood, fewer);
+    plausible_less_turned(intake, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
 }
 
 /// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
