@@ -150,9 +150,9 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
             taken = [_motion3d_field_points(flow, float(spacing), None, None) for flow in fields]
             for name, split in HALVES.items():
                 correlated, independent = [], []
-                for points, vectors, covariances, (_, shared, _) in taken:
+                for points, vectors, covariances, (_, shared, _, scale) in taken:
                     first = split(*points.T)
-                    correlated.append(halves_apart(points, vectors, covariances, first, shared=shared, correlation_length=length))
+                    correlated.append(halves_apart(points, vectors, covariances, first, shared=shared, correlation_length=length, flow_scale=scale))
                     independent.append(halves_apart(points, vectors, covariances / shared, first))
                 row: Row = {"flow": preset, "spacing, px": spacing, "correlation lengths": round(spacing / length, 1), "halves": name, "pairs": len(taken)}
                 row |= told(correlated) | {f"{key}, taken for independent": value for key, value in told(independent).items()}
