@@ -4,7 +4,7 @@
 
 Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a street or a wall with a relief
 of 3 %. Planes are exact ones with noise of 1 % of the flow, which another motion explains as well unless it has points behind the camera. The band is a tenth as high as it is wide and up to 160 degrees of it are seen. In two views the camera moves by a tenth of the depth, and noise is
-of the displacements, of 30 px and more. The columns are those of `motion3d_coverage.py`.
+a share of the displacements. The columns are those of `motion3d_coverage.py`.
 """
 
 from __future__ import annotations

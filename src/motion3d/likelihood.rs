@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MANY: usize = 4000;
 const FEWER: usize = 2000;
 
-/// Starts that are then refined on all points.
+/// Minima that are then refined on all points, beside the one with the smoothest depths.
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.

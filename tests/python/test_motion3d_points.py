@@ -197,7 +197,7 @@ def test_covariances_hold_where_they_are_hard_to_state(part):
 
 @pytest.mark.parametrize("robust", [False, True])
 def test_what_is_said_of_scenes_by_chance_holds(robust):
-    """No published scene among them. Over 6000 of them 94 % of the ellipses hold, and four of 5427 `ok` are wrong."""
+    """No published scene among them."""
     rows = {row["scenes"]: row for row in honesty.table(1200, robust)}
     assert rows["all"]["ok"] > 1000 and rows["all"]["wrong"] <= 3
     for row in rows.values():
