@@ -42,14 +42,9 @@ impl Candidate {
     }
 }
 
-/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other, where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
-const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
-
 /// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the best minimum leaves more than that, it is looked for from more starts.
 pub(super) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
-    let longest = observations.longest();
-    let rounder: Vec<Observations> =
-        RATIOS.iter().filter(|ratio| **ratio < longest).map(|&ratio| observations.rounded(ratio)).collect();
+    let rounder = observations.rounder();
     let first = rounder.first().unwrap_or(observations);
     let searched = Searched::new(first, rng.stream(0));
     let led = |starts: Vec<Motion>| {

@@ -24,6 +24,12 @@ pub(super) const ROUNDING: f64 = 1e-11;
 const ENOUGH: usize = 1000;
 const FAR_FROM_ROUND: f64 = 0.9;
 
+/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other, where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
+const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
+
+/// By how much residuals may grow from one of these to the next.
+pub(super) const LESS_ROUND: f64 = 4.0;
+
 /// One point: `f = nu G u + R w + noise` with unit covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
@@ -54,6 +60,8 @@ pub(super) struct Observations {
     pub prior: Option<Known>,
     /// How many points share one error: their own has the variance `1 / shared`.
     pub shared: f64,
+    /// Whether errors of neighbours are independent.
+    pub independent: bool,
     /// Whether flow is a displacement over a whole frame.
     pub displaced: bool,
     /// The rotation that was taken out of displacements.
@@ -137,6 +145,7 @@ impl Observations {
             level: Level::detect(),
             prior: None,
             shared: 1.0,
+            independent: true,
             displaced: false,
             turn: None,
             units: 1.0,
@@ -146,6 +155,7 @@ impl Observations {
     /// Takes units and what is known beforehand from other observations; these have just been whitened.
     pub fn like(&mut self, other: &Self) {
         (self.prior, self.shared, self.displaced) = (other.prior, other.shared, other.displaced);
+        self.independent = other.independent;
         self.rescale(other.units);
     }
 
@@ -172,6 +182,7 @@ impl Observations {
             level: self.level,
             prior: self.prior,
             shared: self.shared,
+            independent: self.independent,
             displaced: self.displaced,
             turn: self.turn,
             units: self.units,
@@ -196,7 +207,7 @@ impl Observations {
     }
 
     /// The same points where no point's noise is more than `ratio` times as large along one axis as along the other: the smaller deviation is taken to be larger.
-    pub fn rounded(&self, ratio: f64) -> Self {
+    fn rounded(&self, ratio: f64) -> Self {
         let mut out = self.clone();
         for k in 0..self.n {
             let (stretch, axis) = self.stretch(k);
@@ -208,6 +219,12 @@ impl Observations {
             }
         }
         out
+    }
+
+    /// The same points in rounder noise, the roundest first; none where their own is round.
+    pub fn rounder(&self) -> Vec<Self> {
+        let longest = self.longest();
+        RATIOS.iter().filter(|ratio| **ratio < longest).map(|&ratio| self.rounded(ratio)).collect()
     }
 
     /// Measures in other units of noise: everything times `factor`.

@@ -1,9 +1,11 @@
 //! Points that obey one motion among points that do not.
 
+mod alike;
 mod coherence;
 mod gate;
 mod hanging;
 mod mixture;
+mod narrowing;
 mod rivals;
 mod search;
 mod strays;
@@ -11,7 +13,7 @@ mod unknown;
 mod whole;
 
 use super::estimate::Scaled;
-use super::grid::{apart, sample};
+use super::grid::sample;
 use super::kernels::{consensus as truncated, depths};
 use super::motion::Motion;
 use super::observations::Observations;
@@ -20,7 +22,7 @@ use crate::math::random::CounterRng;
 use gate::Gate;
 pub(super) use hanging::hangs_on_few;
 pub(super) use mixture::{Told, among_strays};
-use rayon::prelude::*;
+use narrowing::Narrowing;
 use rivals::{among_many_strays, rivals, second};
 use strays::Strays;
 pub(super) use whole::one_noise;
@@ -31,12 +33,6 @@ const INLIER: f64 = 3.0;
 /// Starts that are refined, and the least angle between them, degrees.
 const STARTS: usize = 5;
 const APART: f64 = 10.0;
-
-/// The bound of the search in shares of the flow: the spacing of the directions itself leaves residuals.
-const SPACING: f64 = 0.06;
-
-/// What the cut of Tukey's weights is divided by from one refinement to the next.
-const NARROWING: f64 = 1.6;
 
 /// From here on starts are refined on fewer points.
 const MANY: usize = 4000;
@@ -146,8 +142,6 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
-    let bound = INLIER.max(SPACING * observations.median_flow());
-    let starts = apart(search::search(observations, INLIER, SPACING, rng), APART, STARTS);
     let fewer;
     let on = if observations.n > MANY {
         fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
@@ -155,11 +149,17 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     } else {
         observations
     };
-    let narrowed: Vec<Motion> = starts.into_par_iter().map(|(start, _)| narrow(on, start, bound)).collect();
-    let mut candidates: Vec<(Motion, f64)> = narrowed.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
+    let found = Narrowing::new(on).motions(STARTS, rng);
+    let mut candidates: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
     candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
-    candidates.extend(second(on, candidates.first()?.0, bound, rng.stream(10)));
+    candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
     candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    // Errors that go together look like other motions everywhere.
+    if observations.independent
+        && let Some(first) = alike::like_noise(on, &candidates)
+    {
+        candidates.drain(..first);
+    }
     let &(best, _) = candidates.first()?;
     let mut rivals = rivals(on, &candidates);
     let mut found = settle(observations, best)?;
@@ -190,6 +190,12 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     if found.inliers.len() < LEAST {
         return None;
     }
+    let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inliers.clone() };
+    if observations.independent && alike::alike(on, &found.motion, &shown) {
+        let next = alike::next(&candidates, &found.motion);
+        found.doubtful |= next.is_none();
+        found.rivals.extend(next);
+    }
     found.inner.clone_from(&found.inliers);
     if let Some(inner) = coherence::inner(observations, &found) {
         found.inner = inner.inliers;
@@ -197,16 +203,6 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         found.rivals.extend(inner.rival);
     }
     Some(found)
-}
-
-/// Refines with Tukey's weights, which narrow from `bound` to the inliers'.
-fn narrow(observations: &Observations, start: Motion, bound: f64) -> Motion {
-    let (mut motion, mut cut) = (start, bound);
-    while cut > INLIER {
-        motion = refine(observations, motion, Some(cut), Effort::ROUGH).motion;
-        cut /= NARROWING;
-    }
-    refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7 }).motion
 }
 
 /// The sign with the lower truncated cost, and that.

@@ -1,10 +1,11 @@
 //! Motions beside the one that most points obey, and which of several it is among many strays.
 
-use super::super::grid::{apart, sample};
+use super::super::grid::sample;
 use super::super::motion::Motion;
 use super::super::observations::Observations;
 use super::gate::Gate;
-use super::{APART, FEWEST, INLIER, MAJORITY, Rival, SPACING, cheaper_sign, mixture, narrow, obeying, search};
+use super::narrowing::{Narrowing, narrow};
+use super::{APART, FEWEST, INLIER, MAJORITY, Rival, cheaper_sign, mixture, obeying};
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
 
@@ -48,7 +49,7 @@ pub(super) fn among_many_strays(
 }
 
 /// What most points obey that do not obey `best`, refined on all, where they are so many that they may be the scene: the search among all may see one thing's motion only, from five sides, which part of the other's points obey by chance.
-pub(super) fn second(observations: &Observations, best: Motion, bound: f64, rng: CounterRng) -> Option<(Motion, f64)> {
+pub(super) fn second(observations: &Observations, best: Motion, rng: CounterRng) -> Option<(Motion, f64)> {
     let obeys = obeying(observations, &best);
     let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| obeys.binary_search(k).is_err()).collect();
     if rejected.len() < FEWEST || (rejected.len() as f64) < MAJORITY * observations.n as f64 {
@@ -57,8 +58,8 @@ pub(super) fn second(observations: &Observations, best: Motion, bound: f64, rng:
     // What may be the scene is much of the rejected: few of them show it.
     let chosen = sample(rejected.len(), REJECTED, rng.stream(8));
     let rest = observations.subset(&chosen.iter().map(|&place| rejected[place as usize]).collect::<Vec<u32>>());
-    let (start, _) = apart(search::search(&rest, INLIER, SPACING, rng), APART, 1).pop()?;
-    let found = cheaper_sign(&rest, narrow(&rest, start, bound)).0;
+    let found = Narrowing::new(&rest).motions(1, rng).pop()?;
+    let found = cheaper_sign(&rest, found).0;
     Some(cheaper_sign(observations, narrow(observations, found, INLIER)))
 }
 

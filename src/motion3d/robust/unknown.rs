@@ -4,8 +4,7 @@
 
 use super::super::estimate::Scaled;
 use super::super::kernels::depths;
-use super::super::neighbours::Tree;
-use super::super::observations::Observations;
+use super::alike::alike;
 use super::{Consensus, UNKNOWNS, in_known_noise};
 use crate::math::random::CounterRng;
 
@@ -17,11 +16,6 @@ const CUT: f64 = 2.5;
 const CUT_VARIANCE: f64 = 0.911;
 const ROUNDS: usize = 4;
 const STEPS: usize = 50;
-
-/// Neighbours whose residuals are looked at, points from which on there are enough of them, and deviations by which they go together.
-const NEAREST: usize = 4;
-const ENOUGH: usize = 100;
-const TOGETHER: f64 = 5.0;
 
 /// The share of the inliers in larger noise that those in smaller noise must be.
 const MOST: f64 = 0.5;
@@ -35,7 +29,7 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
         let Some(found) = fixed_point(scaled, rng) else { break };
         let enough =
             larger.as_ref().is_none_or(|(one, _)| found.inliers.len() as f64 > MOST * one.inliers.len() as f64);
-        if enough && !together(&scaled.observations, &found) {
+        if enough && !alike(&scaled.observations, &found.motion, &found.inliers) {
             return Some(found);
         }
         if larger.is_none() {
@@ -82,27 +76,4 @@ fn noise(residuals: &[f64]) -> f64 {
         }
     }
     sigma
-}
-
-/// Whether the residuals of neighbours among the inliers have the same sign more often than noise does.
-fn together(observations: &Observations, found: &Consensus) -> bool {
-    let inliers = &found.inliers;
-    if inliers.len() < ENOUGH {
-        return false;
-    }
-    let seen = depths(observations, &found.motion).e;
-    let sites: Vec<[f64; 3]> = inliers.iter().map(|&k| observations.site[k as usize]).collect();
-    let tree = Tree::new(&sites);
-    let places: Vec<u32> = (0..inliers.len() as u32).collect();
-    let lists = tree.nearest(&places, NEAREST);
-    let residual = |place: usize| seen[inliers[tree.order()[place] as usize] as usize];
-    let (mut products, mut squares) = (0.0, 0.0);
-    for place in 0..inliers.len() {
-        let own = residual(place);
-        squares += own * own;
-        products += lists.of(place).iter().map(|&near| own * residual(near as usize)).sum::<f64>();
-    }
-    // Each of these pairs may come twice.
-    let pairs = (NEAREST * inliers.len()) as f64;
-    products / (squares / inliers.len() as f64) > TOGETHER * (2.0 * pairs).sqrt()
 }
