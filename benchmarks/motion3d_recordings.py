@@ -139,7 +139,7 @@ def told(given: list[float | None]) -> dict[str, float | str]:
 def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
     """Whether the covariance lies: motions of two halves of the picture should differ by what both covariances say, whatever the halves and however dense the points.
 
-    Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points taken for independent, whatever their distance. Halves of few points are often told as `few_points`; they do not count.
+    Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points taken for independent, whatever their distance. What all flow of a picture has in common is in both halves and left out. Halves of few points are often told as `few_points`; they do not count.
     """
     images = frames(data / "kitti_odometry" / "KITTI_sequence_1" / "image_l")
     rows: list[Row] = []
@@ -150,9 +150,9 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
             taken = [_motion3d_field_points(flow, float(spacing), None, None) for flow in fields]
             for name, split in HALVES.items():
                 correlated, independent = [], []
-                for points, vectors, covariances, (_, shared, _, scale) in taken:
+                for points, vectors, covariances, (_, shared, *_) in taken:
                     first = split(*points.T)
-                    correlated.append(halves_apart(points, vectors, covariances, first, shared=shared, correlation_length=length, flow_scale=scale))
+                    correlated.append(halves_apart(points, vectors, covariances, first, shared=shared, correlation_length=length))
                     independent.append(halves_apart(points, vectors, covariances / shared, first))
                 row: Row = {"flow": preset, "spacing, px": spacing, "correlation lengths": round(spacing / length, 1), "halves": name, "pairs": len(taken)}
                 row |= told(correlated) | {f"{key}, taken for independent": value for key, value in told(independent).items()}

@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
     degrees, rotation w and its deviations in rad/frame, focus of expansion in px with its deviations, and of all points together the rate nu u_z (1/frame) and the time to\n\
     contact (frames) with their deviations; the status of the scene around a --region, how many other motions explain the flow about as well (--alternatives writes them), and the\n\
     deviations of the Cramer-Rao bound of these points, estimated with the depths found (bound_..., nan where these are mostly noise). Points are taken twice as far apart as errors of the flow go together, in a small --region closer; the deviations heed what they share.\n\
+    They come from the flow's own covariance: that of the baseline lucas-kanade holds for motions well below a pixel only, and says nothing of larger ones.\n\
     Rows of a run that is stopped (Ctrl-C) are kept in name.partial.csv.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
     With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\

@@ -78,6 +78,11 @@ impl Intrinsics {
     }
 }
 
+/// What maps flow to the plane at distance 1, where it lies already without a camera.
+pub(super) fn to_plane(camera: Option<&Intrinsics>) -> Matrix2<f64> {
+    camera.map_or_else(Matrix2::identity, Intrinsics::scale)
+}
+
 /// `blockdiag(D_2, kron(D_1^-T, D_2))`, which maps `(u, v, u_x, v_x, u_y, v_y)` where flow is mapped by `D_2` and its place by `D_1`, that is invertible: what noise of the six numbers is multiplied with.
 pub(super) fn affine_map(flow: &Matrix2<f64>, place: &Matrix2<f64>) -> Matrix6<f64> {
     kronecker(flow, &place.try_inverse().unwrap_or_else(Matrix2::zeros))

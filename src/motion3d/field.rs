@@ -1,6 +1,6 @@
 //! Points of a flow field that share no window.
 
-use super::scale;
+use super::common::CommonErrors;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, Sites, Status};
@@ -45,8 +45,8 @@ pub struct FieldPoints {
     pub shared: f64,
     /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
     pub correlation_length: f64,
-    /// How far the flow of all of them may be too short or too long by one factor, as far as their covariances tell. For [`MotionOptions::flow_scale`](super::MotionOptions).
-    pub scale: f64,
+    /// What the flow of all of them may have in common, as far as their covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    pub common: CommonErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
@@ -59,7 +59,7 @@ impl FieldPoints {
             spacing: self.spacing,
             shared: self.shared,
             correlation_length: self.correlation_length,
-            scale: self.scale,
+            common: self.common,
             ..Self::default()
         };
         for (k, &[x, y]) in self.points.iter().enumerate() {
@@ -131,7 +131,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         }
     }
     let own = |(flow, covariance): (&[f64; 2], &[f64])| ((*flow).into(), Matrix2::from_row_slice(covariance) / shared);
-    out.scale = scale::told(out.flow.iter().zip(out.covariances.chunks_exact(4)).map(own));
+    out.common = CommonErrors::told(out.flow.iter().zip(out.covariances.chunks_exact(4)).map(own));
     Ok(out)
 }
 

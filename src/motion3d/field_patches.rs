@@ -1,9 +1,9 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
 use super::camera::Intrinsics;
+use super::common::CommonErrors;
 use super::field::{measured, within};
 use super::patches::AffinePatches;
-use super::scale;
 use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
@@ -29,8 +29,8 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
-    /// How far the flow of all of them may be too short or too long by one factor, as far as the pixels' covariances tell. For [`MotionOptions::flow_scale`](super::MotionOptions).
-    pub scale: f64,
+    /// What the flow of all of them may have in common, as far as the pixels' covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    pub common: CommonErrors,
 }
 
 impl FieldPatches {
@@ -69,8 +69,8 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
         let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
         Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
     };
-    let scale = scale::told(sites.iter().flatten().filter_map(pixel));
-    let mut out = FieldPatches { scale, ..FieldPatches::default() };
+    let common = CommonErrors::told(sites.iter().flatten().filter_map(pixel));
+    let mut out = FieldPatches { common, ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());

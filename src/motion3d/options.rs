@@ -1,6 +1,7 @@
 //! What is given and how it is worked on.
 
 use super::camera::Intrinsics;
+use super::common::CommonErrors;
 use super::motion::{Motion, Projection, tangents};
 use super::observations::Known;
 use super::result::MotionEstimate;
@@ -111,8 +112,8 @@ pub struct MotionOptions {
     pub shared: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the sphere), as those of windowed flow do: the covariance is then that of the sums over points whose errors correlate (`together`), in no direction smaller than that of independent points. Default: not at all.
     pub correlation_length: Option<f64>,
-    /// Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients has one: no residual tells it, and it is one of the rotation's length. Default: 0.
-    pub flow_scale: Option<f64>,
+    /// Errors that all flow has in common, as flow from gradients has them. Default: none.
+    pub common: CommonErrors,
     /// Seed of the random choices; default: 0.
     pub seed: u64,
     /// Number of threads; the result does not depend on it.
@@ -132,6 +133,7 @@ impl MotionOptions {
             return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
         }
         self.check_initial()?;
+        self.common.check(flow)?;
         self.check_correlation(noise)
     }
 
@@ -166,9 +168,6 @@ impl MotionOptions {
         if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(Error::argument("correlation_length", "a number of at least 0", length));
         }
-        if let Some(deviation) = self.flow_scale.filter(|deviation| !(deviation.is_finite() && *deviation >= 0.0)) {
-            return Err(Error::argument("flow_scale", "a number of at least 0", deviation));
-        }
         match self.shared {
             Some(shared) if !(shared.is_finite() && shared >= 1.0) => {
                 Err(Error::argument("shared", "a number of at least 1", shared))
@@ -199,6 +198,10 @@ impl Flow<'_> {
             Self::Plane { points, .. } => Vector3::new(points[k][0], points[k][1], 0.0),
             Self::Sphere { bearings, .. } => bearings[k].into(),
         }
+    }
+    /// The camera that saw it.
+    pub(super) fn camera(&self) -> Option<&Intrinsics> {
+        if let Self::Plane { camera, .. } = self { *camera } else { None }
     }
     /// The screen.
     pub fn projection(&self) -> Projection {

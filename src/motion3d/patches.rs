@@ -11,13 +11,12 @@ mod verdict;
 
 use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined, too_few};
-use super::camera::Intrinsics;
+use super::camera::{Intrinsics, to_plane};
 use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use super::scale;
 use super::special::{RotationOnly, by_chance};
 use super::turned::HalfTurn;
 use crate::error::{Error, Result};
@@ -182,8 +181,9 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
-    let scale = options.flow_scale.unwrap_or_default();
-    covariance = covariance.map(|covariance| covariance * wider + scale::added(&covariance, &motion, None, scale));
+    let moved = system.moved(&motion, &told) * to_plane(patches.camera);
+    let common = |covariance| options.common.added(&covariance, &motion, None, &moved);
+    covariance = covariance.map(|covariance| covariance * wider + common(covariance));
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {

@@ -1,5 +1,7 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
+use super::camera::to_plane;
+use super::common::{CommonErrors, Moved, moved};
 use super::contact::Rates;
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
@@ -15,6 +17,7 @@ use super::special::RotationOnly;
 use super::together::{Weighted, together};
 use super::turned::HalfWay;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
+use std::borrow::Cow;
 
 /// A motion found on the inliers.
 pub(super) struct Solution {
@@ -79,15 +82,28 @@ impl Solution {
     /// Takes errors into the covariance that go together over a length, in the unit of the points.
     pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
         let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
-        let own;
-        let nu = if let Some(smooth) = &self.smooth {
-            smooth
-        } else {
-            own = depths(inliers, &self.motion).nu;
-            &own
-        };
-        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu };
+        let nu = self.weights(inliers);
+        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
         self.covariance = together(&covariance, inliers, &at, flow, length);
+    }
+
+    /// What errors that all flow has in common add to the covariance.
+    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> Option<Matrix5> {
+        let covariance = self.covariance?;
+        let moved = if common.offset > 0.0 {
+            let nu = self.weights(inliers);
+            let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
+            moved(inliers, &at) * to_plane(flow.camera())
+        } else {
+            Moved::zeros()
+        };
+        Some(common.added(&covariance, &self.motion, inliers.prior.as_ref(), &moved))
+    }
+
+    /// The depths in the weights, as long as the planes.
+    fn weights(&self, inliers: &Observations) -> Cow<'_, [f64]> {
+        let own = || Cow::Owned(depths(inliers, &self.motion).nu);
+        self.smooth.as_deref().map_or_else(own, Cow::Borrowed)
     }
 }
 

@@ -14,7 +14,6 @@ use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
 use super::robust::{Consensus, Rival};
-use super::scale;
 use super::selected::of_estimated_noise;
 use super::smoothing::DepthSmoother;
 use super::special::{by_chance, turning, turning_in_unknown_noise};
@@ -233,12 +232,7 @@ impl Task<'_, '_> {
         if let Some(known) = self.known {
             solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        let known = inliers.prior.as_ref();
-        let scale = self
-            .options
-            .flow_scale
-            .zip(solution.covariance)
-            .map(|(deviation, covariance)| scale::added(&covariance, &solution.motion, known, deviation));
+        let common = solution.in_common(inliers, self.intake.flow, &self.options.common);
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
         solution.go_together(inliers, self.intake.flow, length);
         let wider = match (scaled.unknown, self.known) {
@@ -249,8 +243,8 @@ impl Task<'_, '_> {
             // Residuals were cut off, and what strays leave among them is accounted for.
             (false, Some(_)) => 1.0,
         };
-        let scale = scale.unwrap_or_default();
-        solution.covariance = solution.covariance.map(|covariance| covariance * wider + scale);
+        let common = common.unwrap_or_default();
+        solution.covariance = solution.covariance.map(|covariance| covariance * wider + common);
     }
 }
 

@@ -46,10 +46,39 @@ def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation():
     scale = np.sqrt(np.trace(added) / np.trace(along))
     np.testing.assert_allclose(added[2:, 2:], scale**2 * along, atol=1e-9 * np.trace(found.covariance))
     assert 0.05 < scale < 0.5
-    with pytest.raises(ValueError, match="^flow_scale"):
-        motion3d.estimate_field_motion(field, rooms.K, flow_scale=-1.0)
-    with pytest.raises(ValueError, match="^flow_scale"):
-        motion3d.estimate_motion([[0.0, 0.0]] * 20, [[0.0, 0.0]] * 20, flow_scale=float("nan"))
+    for name in ("flow_scale", "flow_offset"):
+        with pytest.raises(ValueError, match=f"^{name}"):
+            motion3d.estimate_field_motion(field, rooms.K, **{name: -1.0})
+        with pytest.raises(ValueError, match=f"^{name}"):
+            motion3d.estimate_motion([[0.0, 0.0]] * 20, [[0.0, 0.0]] * 20, **{name: float("nan")})
+    with pytest.raises(ValueError, match="^flow_offset"):
+        motion3d.estimate_motion([[0.0, 0.0, 1.0]] * 20, [[0.0, 0.0, 0.0]] * 20, projection="sphere", flow_offset=0.1)
+
+
+@pytest.mark.parametrize("six", [False, True])
+def test_a_displacement_that_all_flow_has_in_common_is_in_the_covariance(six):
+    """What it adds is what estimates of flow that is moved by it are off."""
+    rng = np.random.default_rng(2)
+    n = 12 if six else 400
+    pixels = rng.uniform([0, 0], [320, 240], (n, 2))
+    flow = motion3d.predict_flow(pixels, [0.6, 0.2, 0.75], [0.01, -0.01, 0.005], rng.uniform(0.005, 0.02, n), rooms.K)
+    given = {"placement": "start", "method": "ml"}
+    if six:
+        # Walls that face the camera, of the motion's slopes about the middle of each patch.
+        depths = rng.uniform(0.005, 0.02, n)
+        steps = [motion3d.predict_flow(pixels + step, [0.6, 0.2, 0.75], [0.01, -0.01, 0.005], depths, rooms.K) for step in np.array([[0, 0], [1e-3, 0], [0, 1e-3]])]
+        flow = steps[0]
+        jacobian = np.stack([(steps[1] - flow) / 1e-3, (steps[2] - flow) / 1e-3], axis=-1)
+        given |= {"jacobian": jacobian, "cov": np.diag([0.01**2] * 2 + [0.0003**2] * 4) + np.zeros((n, 1, 1))}
+    else:
+        given |= {"sigma": 0.01}
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_offset=offset, **given) for offset in (0.02, 0.0))
+    moved = []
+    for step in 1e-4 * np.eye(2):
+        other = motion3d.estimate_motion(pixels, flow + step, rooms.K, initial=(bare.translation, bare.rotation), **given)
+        moved.append(np.concatenate([bare.tangent @ other.translation, other.rotation - bare.rotation]) / 1e-4)
+    expected = 0.02**2 * np.transpose(moved) @ moved
+    np.testing.assert_allclose(found.covariance - bare.covariance, expected, rtol=0.02, atol=1e-3 * np.abs(expected).max())
 
 
 def test_the_truth_of_rooms_is_what_they_show():

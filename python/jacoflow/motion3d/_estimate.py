@@ -30,6 +30,7 @@ def estimate_motion(
     shared: float = 1.0,
     correlation_length: float = 0.0,
     flow_scale: float = 0.0,
+    flow_offset: float = 0.0,
     seed: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
@@ -75,6 +76,8 @@ def estimate_motion(
         How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
     flow_scale : float, no unit
         Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
+    flow_offset : float, units of flow
+        Standard deviation of each component of a displacement that all flow has in common (a field tells how large it may be). Most of it looks like a rotation, and no residual tells it; it widens the covariance along what it would make of the motion. Not on the sphere.
     seed : int
         Seed of the random choices.
     threads : int or None
@@ -90,7 +93,7 @@ def estimate_motion(
     given = layout(K, sigma, cov, projection, jacobian is not None)
     options = {
         "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": besides(0, number("flow_scale", flow_scale)), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": number("flow_scale", flow_scale), "flow_offset": number("flow_offset", flow_offset), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = six(flow, jacobian)

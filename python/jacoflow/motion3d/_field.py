@@ -44,7 +44,7 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what is a single point's whole error (`flow_scale`).
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what is a single point's whole error (`flow_scale`), and that it may be off by one displacement, of 0.4 of that (`flow_offset`).
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
@@ -72,15 +72,15 @@ def estimate_field_motion(
     options = _own(options)
     if patches is not None:
         _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
-        points, six, covariances, scale = _motion3d_field_patches(field, count("patches", patches), region)
+        points, six, covariances, (scale, offset) = _motion3d_field_patches(field, count("patches", patches), region)
         slopes = six[:, 2:].reshape(-1, 2, 2).transpose(0, 2, 1)
-        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **{"flow_scale": scale, **options}), points
+        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **{"flow_scale": scale, "flow_offset": offset, **options}), points
     if scene is not None:
         if options.get("rotation_prior") is not None:
             raise ValueError("rotation_prior: expected None with a scene, whose rotation it would be, got both")
         options["rotation_prior"] = _beside(scene, turning, region)
-    points, flow, covariances, (_, shared, length, scale) = _motion3d_field_points(field, None if spacing is None else number("spacing", spacing), None if max_points is None else count("max_points", max_points), region)
-    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, "flow_scale": scale, **options}), points
+    points, flow, covariances, (_, shared, length, scale, offset) = _motion3d_field_points(field, None if spacing is None else number("spacing", spacing), None if max_points is None else count("max_points", max_points), region)
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, "flow_scale": scale, "flow_offset": offset, **options}), points
 
 
 def _own(options: dict[str, Any]) -> dict[str, Any]:

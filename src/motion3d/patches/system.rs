@@ -1,6 +1,7 @@
 //! The equations of whitened patches.
 
-use super::super::covariance::Matrix5;
+use super::super::common::Moved;
+use super::super::covariance::{Matrix5, inverse};
 use super::super::motion::{AffineRows, Motion, tangents};
 use super::super::special::by_chance;
 use super::super::turned::HalfTurn;
@@ -176,6 +177,19 @@ impl System {
             sums.behind += seen.surface[0].min(0.0).powi(2) / seen.covariance[(0, 0)];
         }
         sums
+    }
+
+    /// What one displacement of all flow does to the motion, with these surfaces in the weights.
+    pub fn moved(&self, motion: &Motion, surfaces: &[Vector3<f64>]) -> Moved {
+        let tangent = tangents(&motion.u());
+        let (mut information, mut sum) = (Matrix5::zeros(), Moved::zeros());
+        for (patch, surface) in self.patches.iter().zip(surfaces) {
+            let slopes = patch.slopes(&tangent, surface);
+            let weighted = slopes.transpose() * patch.seen(motion).across;
+            information += weighted * slopes;
+            sum += weighted * patch.whiten.fixed_columns::<2>(0);
+        }
+        inverse(&information).map_or(Moved::zeros(), |inverse| inverse * sum)
     }
 
     /// The best rotation for a direction, and what it leaves.

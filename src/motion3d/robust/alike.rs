@@ -11,6 +11,9 @@ const NEAREST: usize = 8;
 const ENOUGH: usize = 50;
 const TOGETHER: f64 = 4.0;
 
+/// Residuals whose mean square, in units of noise, is less than this do not matter.
+const LITTLE: f64 = 0.25;
+
 /// The share of the points that obey the cheapest motion that another must have, to be the scene's.
 const MOST: f64 = 0.5;
 
@@ -31,9 +34,10 @@ pub(super) fn alike(observations: &Observations, motion: &Motion, points: &[u32]
         squares += own * own;
         products += lists.of(place).iter().map(|&near| own * residual(near as usize)).sum::<f64>();
     }
+    let variance = squares / points.len() as f64;
     // Each of these pairs may come twice.
     let pairs = (NEAREST * points.len()) as f64;
-    products / (squares / points.len() as f64) > TOGETHER * (2.0 * pairs).sqrt()
+    variance > LITTLE && products > TOGETHER * variance * (2.0 * pairs).sqrt()
 }
 
 /// The cheapest of the candidates, which are sorted, whose residuals are those of noise; of those that about as many points obey as the first.

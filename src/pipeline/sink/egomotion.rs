@@ -102,7 +102,7 @@ impl Egomotion {
             rotation_prior,
             shared: Some(points.shared),
             correlation_length: Some(points.correlation_length),
-            flow_scale: Some(points.scale),
+            common: points.common,
             ..self.plan.motion.clone()
         };
         estimate_motion(&flow, &Noise::Covariances(&points.covariances), &options)

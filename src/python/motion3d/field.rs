@@ -22,7 +22,7 @@ pub fn motion3d_field_points<'py>(
     spacing: Option<f64>,
     most: Option<usize>,
     region: Option<Region>,
-) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 4])> {
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 5])> {
     single(field)?;
     let chosen = FieldOptions { spacing, most, region: options::region(region)? };
     let found = each!(field.store(), packed => {
@@ -34,7 +34,7 @@ pub fn motion3d_field_points<'py>(
         matrix(py, &found.points)?.into_any(),
         matrix(py, &found.flow)?.into_any(),
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
-        [found.spacing, found.shared, found.correlation_length, found.scale],
+        [found.spacing, found.shared, found.correlation_length, found.common.scale, found.common.offset],
     ))
 }
 
@@ -45,7 +45,7 @@ pub fn motion3d_field_patches<'py>(
     field: &FlowField,
     size: usize,
     region: Option<Region>,
-) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, f64)> {
+) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 2])> {
     single(field)?;
     let region = options::region(region)?;
     let found = each!(field.store(), packed => {
@@ -57,7 +57,7 @@ pub fn motion3d_field_patches<'py>(
         matrix(py, &found.points)?.into_any(),
         matrix(py, &found.motion)?.into_any(),
         arrays::owned(py, &[n, 6, 6], found.covariances)?.into_any(),
-        found.scale,
+        [found.common.scale, found.common.offset],
     ))
 }
 

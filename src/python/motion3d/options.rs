@@ -2,7 +2,7 @@
 
 use super::given::{square, triple, word};
 use crate::error::Error;
-use crate::motion3d::{Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
+use crate::motion3d::{CommonErrors, Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
 use crate::parallel::Threads;
 use crate::python::arrays;
 use crate::python::options::Integer;
@@ -24,7 +24,8 @@ pub struct Options<'py> {
     initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     shared: Option<f64>,
     correlation_length: Option<f64>,
-    flow_scale: Option<f64>,
+    flow_scale: f64,
+    flow_offset: f64,
     seed: Integer,
     threads: Option<usize>,
 }
@@ -46,7 +47,7 @@ impl Options<'_> {
             rotation_prior: self.rotation_prior()?,
             shared: self.shared,
             correlation_length: self.correlation_length,
-            flow_scale: self.flow_scale,
+            common: CommonErrors { scale: self.flow_scale, offset: self.flow_offset },
             seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
             threads: Threads::new(self.threads)?,
         })
