@@ -54,7 +54,11 @@ impl CommonErrors {
             }
         }
         if matches!(flow, Flow::Sphere { .. }) && self.offset > 0.0 {
-            return Err(Error::argument("flow_offset", "0 on the sphere, where no displacement is common", self.offset));
+            return Err(Error::argument(
+                "flow_offset",
+                "0 on the sphere, where no displacement is common",
+                self.offset,
+            ));
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::{APART, LEAST, Rival, obeying};
 /// Neighbours whose residuals are looked at, points from which on there are enough of them, and deviations by which they go together.
 const NEAREST: usize = 8;
 const ENOUGH: usize = 50;
-const TOGETHER: f64 = 4.0;
+const TOGETHER: f64 = 3.0;
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;
