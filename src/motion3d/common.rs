@@ -8,15 +8,17 @@
 
 use super::covariance::{Matrix5, inverse};
 use super::kernels::information;
-use super::motion::Motion;
+use super::motion::{Motion, Projection};
 use super::observations::{Known, Observations, median};
-use super::options::Flow;
 use super::together::{Weighted, slopes};
 use crate::error::{Error, Result};
-use nalgebra::{Matrix2, RowVector2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2, Vector3};
 
 /// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it (`benchmarks/motion3d_fields.py --errors`).
 const SHARE: f64 = 0.4;
+
+/// The largest displacement: squares of larger ones are no numbers.
+const FARTHEST: f64 = 1e100;
 
 /// What one displacement of all flow, on the plane at distance 1, does to the equations' unknowns.
 pub(super) type Moved = SMatrix<f64, 5, 2>;
@@ -28,6 +30,18 @@ pub struct CommonErrors {
     pub scale: f64,
     /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not on the sphere.
     pub offset: f64,
+}
+
+/// What they do to a motion.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effect {
+    /// To its covariance.
+    pub added: Matrix5,
+    /// Of the factor.
+    pub scale: f64,
+    /// Displacements of one deviation along both axes, on the plane at distance 1, and what each does to the motion.
+    pub displaced: Matrix2<f64>,
+    pub moved: Moved,
 }
 
 impl CommonErrors {
@@ -47,13 +61,15 @@ impl CommonErrors {
         Self { scale, offset: SHARE * median(&mut variances).sqrt() }
     }
 
-    pub(super) fn check(&self, flow: &Flow<'_>) -> Result<()> {
-        for (name, deviation) in [("flow_scale", self.scale), ("flow_offset", self.offset)] {
-            if !(deviation.is_finite() && deviation >= 0.0) {
-                return Err(Error::argument(name, "a number of at least 0", deviation));
-            }
+    /// On the plane or the sphere.
+    pub(super) fn check(&self, projection: Projection) -> Result<()> {
+        if !(0.0..=1.0).contains(&self.scale) {
+            return Err(Error::argument("flow_scale", "a number from 0 to 1", self.scale));
         }
-        if matches!(flow, Flow::Sphere { .. }) && self.offset > 0.0 {
+        if !(0.0..=FARTHEST).contains(&self.offset) {
+            return Err(Error::argument("flow_offset", format!("a number from 0 to {FARTHEST:e}"), self.offset));
+        }
+        if projection == Projection::Sphere && self.offset > 0.0 {
             return Err(Error::argument(
                 "flow_offset",
                 "0 on the sphere, where no displacement is common",
@@ -63,18 +79,42 @@ impl CommonErrors {
         Ok(())
     }
 
-    /// What both add to the covariance of a motion; `moved`: what a displacement of 1 in the flow's unit does to it. Less what is known beforehand of the rotation.
-    pub(super) fn added(&self, covariance: &Matrix5, motion: &Motion, known: Option<&Known>, moved: &Moved) -> Matrix5 {
+    /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
+    pub(super) fn on(
+        &self,
+        covariance: &Matrix5,
+        motion: &Motion,
+        known: Option<&Known>,
+        (moved, unit): (&Moved, &Matrix2<f64>),
+    ) -> Effect {
         let w = motion.w();
         let mut scaled = SVector::<f64, 5>::new(0.0, 0.0, w.x, w.y, w.z);
         if let Some(known) = known {
             scaled -= covariance.fixed_columns::<3>(2) * (known.information * w);
         }
-        scaled * scaled.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
+        let displaced = unit * self.offset;
+        let moved = moved * displaced;
+        let added = scaled * scaled.transpose() * self.scale.powi(2) + moved * moved.transpose();
+        Effect { added, scale: self.scale, displaced, moved }
+    }
+
+    /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the flow do to it.
+    pub(super) fn added_to_rotation(&self, w: &Vector3<f64>, moved: &Matrix3x2<f64>) -> Matrix3<f64> {
+        w * w.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
     }
 }
 
-/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`, `L_k^-1` whitening point `k`, with what is known beforehand of the rotation. Nothing on the sphere, where flow at different places has no common direction.
+/// What one displacement of all flow does to a rotation alone, of this covariance.
+pub(super) fn turned(points: &Observations, covariance: &Matrix3<f64>) -> Matrix3x2<f64> {
+    let mut sum = Matrix3x2::zeros();
+    for k in (0..points.n).filter(|_| !points.spherical) {
+        let row = points.row(k);
+        sum += row.r.transpose() * row.g.fixed_columns::<2>(0);
+    }
+    covariance * sum
+}
+
+/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`, `L_k^-1` whitening point `k`; what is known beforehand of the rotation is in `W^t W`. Nothing on the sphere, where flow at different places has no common direction.
 pub(super) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
     let mut sum = Moved::zeros();
     if inliers.spherical {
@@ -87,11 +127,7 @@ pub(super) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
         // The first columns of `G` are those of the identity.
         sum += slopes(inliers, at.motion, at.tangent, at.nu[k], k) * (across * g.fixed_columns::<2>(0));
     }
-    let mut told = information(inliers, at.motion, at.tangent, at.nu, 0.0);
-    if let Some(known) = &inliers.prior {
-        let mut rotation = told.fixed_view_mut::<3, 3>(2, 2);
-        rotation += known.information;
-    }
+    let told = information(inliers, at.motion, at.tangent, at.nu, 0.0);
     inverse(&told).map_or(Moved::zeros(), |inverse| inverse * sum)
 }
 

@@ -1,6 +1,7 @@
 //! Time to contact: how fast points come nearer, with what is known of that.
 
 use super::camera::Intrinsics;
+use super::common::Effect;
 use super::covariance::Matrix5;
 use super::field::measured;
 use super::intake::{plane_row, turned_row};
@@ -11,7 +12,7 @@ use super::turned::{HalfTurn, HalfWay};
 use crate::error::Result;
 use crate::math::Real;
 use crate::types::{FlowField, Status};
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
@@ -19,35 +20,67 @@ pub(super) struct Rates {
     u: Vector3<f64>,
     w: Vector3<f64>,
     tangent: Matrix2x3<f64>,
+    /// Without what errors add that all flow has in common, where that is known.
     covariance: Matrix5,
+    common: Option<Effect>,
+}
+
+/// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance 1.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Slopes {
+    motion: SMatrix<f64, 5, 1>,
+    flow: RowVector2<f64>,
+}
+
+impl Slopes {
+    pub fn add(&mut self, other: &Self, weight: f64) {
+        self.motion += other.motion * weight;
+        self.flow += other.flow * weight;
+    }
+
+    pub fn times(&self, factor: f64) -> Self {
+        Self { motion: self.motion * factor, flow: self.flow * factor }
+    }
 }
 
 impl Rates {
-    /// Without a covariance, deviations are NaN.
-    pub fn new(motion: &Motion, tangent: &Matrix2x3<f64>, covariance: Option<&Matrix5>) -> Self {
+    /// Without a covariance, deviations are NaN. `common`: what is in it of errors that all flow has in common.
+    pub fn new(
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        covariance: Option<&Matrix5>,
+        common: Option<&Effect>,
+    ) -> Self {
         let covariance = covariance.copied().unwrap_or_else(|| Matrix5::from_element(f64::NAN));
-        Self { u: motion.u(), w: motion.w(), tangent: *tangent, covariance }
+        let covariance = covariance - common.map_or_else(Matrix5::zeros, |common| common.added);
+        Self { u: motion.u(), w: motion.w(), tangent: *tangent, covariance, common: common.copied() }
     }
 
     /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
-    pub fn slopes(&self, row: &Row, nu: f64) -> SMatrix<f64, 5, 1> {
+    pub fn slopes(&self, row: &Row, nu: f64) -> Slopes {
         let (u, t) = (&self.u, row.g * self.u);
         let s2 = t.norm_squared();
         let inverse = if s2 > 0.0 { s2.recip() } else { 0.0 };
         let turn: Vector2<f64> = self.tangent * row.g.transpose() * t * (-nu * inverse);
         let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-        SMatrix::<f64, 5, 1>::from_column_slice(&[
+        let motion = SMatrix::<f64, 5, 1>::from_column_slice(&[
             u.z * turn.x + nu * self.tangent[(0, 2)],
             u.z * turn.y + nu * self.tangent[(1, 2)],
             u.z * spin.x,
             u.z * spin.y,
             u.z * spin.z,
-        ])
+        ]);
+        // The first columns of `G` are those of the identity: they whiten.
+        Slopes { motion, flow: t.transpose() * row.g.fixed_columns::<2>(0) * (u.z * inverse) }
     }
 
-    /// What the motion's covariance makes of slopes.
-    pub fn variance(&self, slopes: &SMatrix<f64, 5, 1>) -> f64 {
-        (slopes.transpose() * self.covariance * slopes)[0]
+    /// What the motion's covariance makes of slopes, and what errors do that all flow has in common: a factor is one of the rate, a displacement moves the motion and each point's depth together.
+    pub fn variance(&self, rate: f64, slopes: &Slopes) -> f64 {
+        let own = (slopes.motion.transpose() * self.covariance * slopes.motion)[0];
+        own + self.common.as_ref().map_or(0.0, |common| {
+            let moved = slopes.motion.transpose() * common.moved + slopes.flow * common.displaced;
+            (rate * common.scale).powi(2) + moved.norm_squared()
+        })
     }
 
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from the motion's covariance; infinite where nothing comes nearer.
@@ -56,7 +89,7 @@ impl Rates {
         if rate == 0.0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        let variance = self.u.z * self.u.z * variance + self.variance(&self.slopes(row, nu));
+        let variance = self.u.z * self.u.z * variance + self.variance(rate, &self.slopes(row, nu));
         (-1.0 / rate, variance.sqrt() / (rate * rate))
     }
 
@@ -102,7 +135,7 @@ pub fn contact_map<T: Real>(
 ) -> Result<ContactMap> {
     measured(field)?;
     let covariance = Matrix5::from_fn(|i, j| covariance[i][j]);
-    let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance));
+    let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance), None);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
     let turn = (placement == Placement::Midpoint).then(|| HalfTurn::of(motion));
     let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
@@ -209,7 +242,7 @@ mod tests {
         let scene = Scene::oblique(20, 0.1, 5);
         let observations = scene.observations();
         let tangent = super::super::motion::tangents(&scene.motion.u());
-        let rates = Rates::new(&scene.motion, &tangent, None);
+        let rates = Rates::new(&scene.motion, &tangent, None, None);
         let row = observations.row(3);
         let rate = |step: &SMatrix<f64, 5, 1>| {
             let motion = scene.motion.stepped(&tangent, step);
@@ -218,7 +251,7 @@ mod tests {
         };
         let t = row.g * scene.motion.u();
         let nu = t.dot(&(row.f - row.r * scene.motion.w())) / t.norm_squared();
-        let slopes = rates.slopes(&row, nu);
+        let slopes = rates.slopes(&row, nu).motion;
         // Along the epipolar line alone: the part across moves the depth in second order only at the truth.
         for axis in 2..5 {
             let mut step = SMatrix::<f64, 5, 1>::zeros();

@@ -85,7 +85,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let (before, left) = (scaled.sigma, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
         scaled.take(left);
         let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.sigma));
-        return rotation_report(flow, all, all, &rotation, scaled.sigma);
+        return rotation_report(flow, all, all, &rotation, scaled.sigma, options);
     }
     if options.robust {
         let Some(kept) = exact_consensus(&intake, &mut scaled, rng.stream(1)) else {
@@ -100,7 +100,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         if !scaled.unknown
             && let Some(rotation) = turning(&scaled.observations)
         {
-            return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma);
+            return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma, options);
         }
         let inliers = scaled.observations.clone();
         Task { intake: &intake, options, known: None, rng }.on(&mut scaled, inliers)

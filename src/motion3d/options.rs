@@ -133,7 +133,7 @@ impl MotionOptions {
             return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
         }
         self.check_initial()?;
-        self.common.check(flow)?;
+        self.common.check(flow.projection())?;
         self.check_correlation(noise)
     }
 

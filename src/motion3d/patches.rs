@@ -14,7 +14,7 @@ use super::bound::{MotionBound, check_truth, not_determined, too_few};
 use super::camera::{Intrinsics, to_plane};
 use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
-use super::motion::{Motion, tangents};
+use super::motion::{Motion, Projection, tangents};
 use super::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
 use super::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::special::{RotationOnly, by_chance};
@@ -131,6 +131,7 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
+    options.common.check(Projection::Plane)?;
     let covariances = believed(patches.covariances, 6);
     let patches = AffinePatches { covariances: &covariances, ..*patches };
     Ok(options.threads.check()?.install(|| estimate(&patches, options)))
@@ -144,7 +145,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
     if let Some(rotation) = turning(&system) {
-        return turning_report(&system, n, &rotation);
+        return turning_report(&system, n, &rotation, &options.common, &to_plane(patches.camera));
     }
     let rng = CounterRng::new(options.seed);
     let mut minima = match options.initial {
@@ -181,8 +182,8 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
-    let moved = system.moved(&motion, &told) * to_plane(patches.camera);
-    let common = |covariance| options.common.added(&covariance, &motion, None, &moved);
+    let displaced = (&system.moved(&motion, &told), &to_plane(patches.camera));
+    let common = |covariance| options.common.on(&covariance, &motion, None, displaced).added;
     covariance = covariance.map(|covariance| covariance * wider + common(covariance));
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());

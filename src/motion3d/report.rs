@@ -1,8 +1,8 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
 use super::camera::to_plane;
-use super::common::{CommonErrors, Moved, moved};
-use super::contact::Rates;
+use super::common::{self, CommonErrors, Effect, Moved, moved};
+use super::contact::{Rates, Slopes};
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
 use super::efficient::Efficient;
@@ -10,13 +10,13 @@ use super::kernels::{Depths, depths, equations};
 use super::likelihood::Candidate;
 use super::motion::Motion;
 use super::observations::Observations;
-use super::options::Flow;
+use super::options::{Flow, MotionOptions};
 use super::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use super::robust::{Consensus, Told, among_strays};
 use super::special::RotationOnly;
-use super::together::{Weighted, together};
+use super::together::{Weighted, together, turning};
 use super::turned::HalfWay;
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use std::borrow::Cow;
 
 /// A motion found on the inliers.
@@ -25,6 +25,8 @@ pub(super) struct Solution {
     pub tangent: Matrix2x3<f64>,
     /// `None` where nothing is known.
     pub covariance: Option<Matrix5>,
+    /// What is in it of errors that all flow has in common.
+    common: Option<Effect>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     likelihood: Likelihood,
@@ -48,6 +50,7 @@ impl Solution {
             motion: minimum.motion,
             tangent: minimum.tangent,
             covariance: plugged.map(|plugged| plugged.likelihood),
+            common: None,
             status: Status::Ok,
             alternatives: Vec::new(),
             likelihood,
@@ -87,17 +90,20 @@ impl Solution {
         self.covariance = together(&covariance, inliers, &at, flow, length);
     }
 
-    /// What errors that all flow has in common add to the covariance.
-    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> Option<Matrix5> {
+    /// What errors do that all flow has in common.
+    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> Option<Effect> {
         let covariance = self.covariance?;
-        let moved = if common.offset > 0.0 {
-            let nu = self.weights(inliers);
-            let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-            moved(inliers, &at) * to_plane(flow.camera())
-        } else {
-            Moved::zeros()
-        };
-        Some(common.added(&covariance, &self.motion, inliers.prior.as_ref(), &moved))
+        let nu = self.weights(inliers);
+        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
+        let moved = if common.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
+        Some(common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera()))))
+    }
+
+    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
+    pub fn widen(&mut self, wider: f64, common: Option<&Effect>) {
+        let added = common.map_or_else(Matrix5::zeros, |common| common.added);
+        self.covariance = self.covariance.map(|covariance| covariance * wider + added);
+        self.common = common.copied();
     }
 
     /// The depths in the weights, as long as the planes.
@@ -179,10 +185,10 @@ fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) 
 
 /// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
-    let rates = Rates::new(&solution.motion, &solution.tangent, solution.covariance.as_ref());
+    let rates = Rates::new(&solution.motion, &solution.tangent, solution.covariance.as_ref(), solution.common.as_ref());
     let likeliest = likeliest(out, inliers, solution);
     let u_z = solution.motion.u().z;
-    let (mut weights, mut sum, mut common) = (0.0, 0.0, SMatrix::<f64, 5, 1>::zeros());
+    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::default());
     for (k, &source) in all.source.iter().enumerate() {
         let source = source as usize;
         let (nu, variance) = likeliest[source];
@@ -191,10 +197,11 @@ fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations,
         if out.inliers[source] && seen.s2[k] > 0.0 {
             weights += seen.s2[k];
             sum += seen.s2[k] * seen.nu[k] * u_z;
-            common += seen.s2[k] * rates.slopes(&row, nu);
+            slopes.add(&rates.slopes(&row, nu), seen.s2[k]);
         }
     }
-    out.approach = (sum / weights, (u_z * u_z / weights + rates.variance(&(common / weights))).sqrt());
+    let rate = sum / weights;
+    out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &slopes.times(1.0 / weights))).sqrt());
 }
 
 /// What is told about a camera that only turns, or stands still.
@@ -204,9 +211,16 @@ pub(super) fn rotation_report(
     inliers: &Observations,
     rotation: &RotationOnly,
     sigma: f64,
+    options: &MotionOptions,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, sigma);
-    turned(&mut out, &rotation.rotation, &rotation.covariance, rotation.chi2, &all.source);
+    let moved = common::turned(inliers, &rotation.covariance) * to_plane(flow.camera());
+    let mut covariance = rotation.covariance;
+    if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
+        covariance = turning(&covariance, inliers, &rotation.rotation, flow, length);
+    }
+    covariance += options.common.added_to_rotation(&rotation.rotation, &moved);
+    turned(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
     let rest = |k: usize| {
         let row = all.row(k);
         (row.f - row.r * rotation.rotation).norm()

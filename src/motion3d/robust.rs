@@ -25,6 +25,7 @@ pub(super) use mixture::{Told, among_strays};
 use narrowing::Narrowing;
 use rivals::{among_many_strays, rivals, second};
 use strays::Strays;
+pub(super) use unknown::larger;
 pub(super) use whole::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
@@ -149,17 +150,7 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     } else {
         observations
     };
-    let found = Narrowing::new(on).motions(STARTS, rng);
-    let mut candidates: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(on, motion)).collect();
-    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
-    candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
-    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
-    // Errors that go together look like other motions everywhere.
-    if observations.independent
-        && let Some(first) = alike::like_noise(on, &candidates)
-    {
-        candidates.drain(..first);
-    }
+    let candidates = candidates(on, rng)?;
     let &(best, _) = candidates.first()?;
     let mut rivals = rivals(on, &candidates);
     let mut found = settle(observations, best)?;
@@ -190,19 +181,28 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     if found.inliers.len() < LEAST {
         return None;
     }
-    let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inliers.clone() };
-    if observations.independent && alike::alike(on, &found.motion, &shown) {
-        let next = alike::next(&candidates, &found.motion);
-        found.doubtful |= next.is_none();
-        found.rivals.extend(next);
-    }
     found.inner.clone_from(&found.inliers);
     if let Some(inner) = coherence::inner(observations, &found) {
         found.inner = inner.inliers;
         found.quiet = inner.quiet;
         found.rivals.extend(inner.rival);
     }
+    let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inner.clone() };
+    // Errors that go together look like other motions everywhere.
+    if observations.independent && alike::alike(on, &found.motion, &shown) {
+        found.rivals.extend(alike::next(on, &candidates, &found.motion));
+    }
     Some(found)
+}
+
+/// Motions that many points obey, with what each costs: the cheapest first.
+fn candidates(observations: &Observations, rng: CounterRng) -> Option<Vec<(Motion, f64)>> {
+    let found = Narrowing::new(observations).motions(STARTS, rng);
+    let mut all: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    all.extend(second(observations, all.first()?.0, rng.stream(10)));
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    Some(all)
 }
 
 /// The sign with the lower truncated cost, and that.

@@ -13,7 +13,7 @@ use super::options::{Method, MotionOptions};
 use super::refine::{Effort, Minimum, refine};
 use super::report::{Solution, report, rotation_report};
 use super::result::{Alternative, MotionEstimate, Status};
-use super::robust::{Consensus, Rival};
+use super::robust::{Consensus, Rival, larger};
 use super::selected::of_estimated_noise;
 use super::smoothing::DepthSmoother;
 use super::special::{by_chance, turning, turning_in_unknown_noise};
@@ -126,7 +126,7 @@ impl Task<'_, '_> {
         } else {
             return None;
         };
-        Some(rotation_report(self.intake.flow, &scaled.observations, inliers, &rotation, scaled.sigma))
+        Some(rotation_report(self.intake.flow, &scaled.observations, inliers, &rotation, scaled.sigma, self.options))
     }
 
     /// The minima in the order of preference; the first has its own rotation taken out of the points.
@@ -240,11 +240,10 @@ impl Task<'_, '_> {
             // The residuals tell how large errors are that go together.
             (false, _) if length.is_some() => 1.0,
             (false, None) => misfit(inliers, cost),
-            // Residuals were cut off, and what strays leave among them is accounted for.
-            (false, Some(_)) => 1.0,
+            // What strays leave among residuals that are cut off is accounted for.
+            (false, Some(_)) => larger(&scaled.observations, &solution.motion),
         };
-        let common = common.unwrap_or_default();
-        solution.covariance = solution.covariance.map(|covariance| covariance * wider + common);
+        solution.widen(wider, common.as_ref());
     }
 }
 

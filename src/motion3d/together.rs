@@ -11,7 +11,7 @@ use super::motion::Motion;
 use super::observations::Observations;
 use super::options::Flow;
 use errors::{Errors, Neighbourhood};
-use nalgebra::{Matrix2x3, SMatrix, SymmetricEigen};
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, SymmetricEigen, Vector3};
 
 /// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows stop sharing pixels, the rest over so many correlation lengths.
 const QUICK: f64 = 0.4;
@@ -55,11 +55,7 @@ pub(super) fn together(
     let errors = Errors::told_by_residuals(&points, &inverse(&squares)?, inliers.own());
     let l = squares.cholesky()?.l();
     let back = l.try_inverse()?;
-    let relative = back * excess(&points, &errors) * back.transpose();
-    let eigen = SymmetricEigen::new(0.5 * (relative + relative.transpose()));
-    // Below 1 the points would tell more than independent ones.
-    let sizes = eigen.eigenvalues.map(|size| 1.0 + size.max(0.0));
-    let larger = eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose();
+    let larger = Matrix5::identity() + positive(&(back * excess(&points, &errors) * back.transpose()));
     let told = l.transpose() * covariance * l;
     let told = SymmetricEigen::new(0.5 * (told + told.transpose()));
     let root = told.eigenvalues.map(|size| size.max(0.0).sqrt());
@@ -67,6 +63,31 @@ pub(super) fn together(
     let out = back.transpose() * root * larger * root * back;
     let out = 0.5 * (out + out.transpose());
     inverse(&out).map(|_| out)
+}
+
+/// The same of a rotation alone, whose residuals are flow of two components.
+pub(super) fn turning(
+    covariance: &Matrix3<f64>,
+    inliers: &Observations,
+    w: &Vector3<f64>,
+    flow: &Flow<'_>,
+    length: f64,
+) -> Matrix3<f64> {
+    let mut inverse = Matrix5::zeros();
+    inverse.fixed_view_mut::<3, 3>(2, 2).copy_from(covariance);
+    let of_axis = |axis: usize| {
+        let points = Neighbourhood::of_rotation(inliers, w, axis, flow, length);
+        excess(&points, &Errors::told_by_residuals(&points, &inverse, inliers.own()))
+    };
+    inverse += inverse * positive(&(of_axis(0) + of_axis(1))) * inverse;
+    inverse.fixed_view::<3, 3>(2, 2).into_owned()
+}
+
+/// The part of a symmetric matrix above 0: below, the points would tell more than independent ones.
+fn positive(matrix: &Matrix5) -> Matrix5 {
+    let eigen = SymmetricEigen::new(0.5 * (matrix + matrix.transpose()));
+    let sizes = eigen.eigenvalues.map(|size| size.max(0.0));
+    eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose()
 }
 
 /// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told has too much for each point's own where several share one error.

@@ -23,10 +23,10 @@ def seen():
 @pytest.mark.parametrize("method", fields.METHODS)
 @pytest.mark.parametrize("way", fields.WAYS)
 def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
-    """Of the few of so few rooms that are ok four in five and more."""
+    """Of the few of so few rooms that are ok nearly all. Errors of patches of slow, precise flow may go together farther than is told."""
     row = fields.row(f"{method}, {way}", fields.estimated(seen[method], way))
     assert row["wrong"] == 0 and row["ok"] >= (12 if method == "coarse_to_fine" else 1), row
-    least = 0.84 if way != "patches=48" else 0.7
+    least = 0.88 if way != "patches=48" else 0.7
     assert row["ellipsoid"] >= least and row["ellipse"] >= least, row
 
 
@@ -79,6 +79,68 @@ def test_a_displacement_that_all_flow_has_in_common_is_in_the_covariance(six):
         moved.append(np.concatenate([bare.tangent @ other.translation, other.rotation - bare.rotation]) / 1e-4)
     expected = 0.02**2 * np.transpose(moved) @ moved
     np.testing.assert_allclose(found.covariance - bare.covariance, expected, rtol=0.02, atol=1e-3 * np.abs(expected).max())
+
+
+def scene(n=400, seed=5):
+    """Pixels and their exact flow."""
+    rng = np.random.default_rng(seed)
+    pixels, depths = rng.uniform([0, 0], [320, 240], (n, 2)), rng.uniform(0.005, 0.02, n)
+    return pixels, motion3d.predict_flow(pixels, [0.3, 0.2, -0.93], [0.01, -0.01, 0.005], depths, rooms.K)
+
+
+def test_what_all_flow_has_in_common_is_in_a_rotation_alone_too():
+    """What it adds is what rotations of flow that is moved by it, or longer, are off."""
+    pixels, _ = scene()
+    flow = motion3d.predict_flow(pixels, [1.0, 0.0, 0.0], [0.01, -0.01, 0.005], np.zeros(400), rooms.K)
+    given = {"sigma": 0.01, "placement": "start"}
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, **common, **given) for common in ({"flow_offset": 0.02, "flow_scale": 0.1}, {}))
+    assert found.status == bare.status == "rotation_only"
+    moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, **given).rotation - bare.rotation for step in 0.02 * np.eye(2)]
+    moved.append(0.1 * bare.rotation)
+    expected = np.transpose(moved) @ moved
+    np.testing.assert_allclose((found.covariance - bare.covariance)[2:, 2:], expected, rtol=0.02, atol=1e-3 * np.abs(expected).max())
+    made = [rooms.room(seed, 1e-7, 0.004) for seed in range(900, 908)]
+    held = 0
+    for seed, room in enumerate(made):
+        turned, _ = motion3d.estimate_field_motion(jacoflow.estimate(rooms.frames(room, 3.0, seed)), rooms.K)
+        off = turned.rotation - room.w
+        held += turned.status == "rotation_only" and off @ np.linalg.solve(turned.covariance[2:, 2:], off) < 7.81
+    assert held >= 6, held
+
+
+def test_a_rotation_known_beforehand_counts_once_beside_a_displacement_of_all_flow():
+    pixels, flow = scene()
+    prior = (np.array([0.01, -0.01, 0.005]), 1e-7 * np.eye(3))
+    given = {"sigma": 0.05, "placement": "start", "method": "ml", "rotation_prior": prior}
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_offset=offset, **given) for offset in (0.3, 0.0))
+    moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, initial=(bare.translation, bare.rotation), **given).rotation - bare.rotation for step in 0.01 * np.eye(2)]
+    added = np.sqrt(np.trace((found.covariance - bare.covariance)[2:, 2:]))
+    assert added == pytest.approx(30 * np.linalg.norm(moved), rel=0.1)
+
+
+def test_times_to_contact_scale_with_the_flow():
+    """A tenth more flow is a tenth more of every rate, and nothing else."""
+    pixels, flow = scene()
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=0.05, flow_scale=scale) for scale in (0.1, 0.0))
+    share = np.sqrt(found.time_to_contact_std**2 - bare.time_to_contact_std**2) / np.abs(found.time_to_contact)
+    np.testing.assert_allclose(share, 0.1, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "value"), [("flow_scale", np.nan), ("flow_scale", 2.0), ("flow_scale", -1.0), ("flow_offset", np.inf), ("flow_offset", 1e200), ("flow_offset", -1.0)])
+def test_deviations_of_patches_are_checked(name, value):
+    patches = np.zeros((4, 2, 2)), np.tile(np.eye(6), (4, 1, 1))
+    with pytest.raises(ValueError, match=f"^{name}"):
+        motion3d.estimate_motion(np.eye(4)[:, :2], np.ones((4, 2)), jacobian=patches[0], cov=patches[1], **{name: value})
+
+
+def test_noise_among_outliers_that_is_larger_than_told_widens_the_covariance():
+    pixels, flow = scene()
+    rng = np.random.default_rng(9)
+    flow = flow + 0.1 * rng.normal(size=flow.shape)
+    flow[:80] = rng.uniform(-20, 20, (80, 2))
+    told, half = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=sigma, robust=True) for sigma in (0.1, 0.05))
+    assert told.status == half.status == "ok"
+    assert 0.75 < half.direction_std / told.direction_std < 1.5
 
 
 def test_the_truth_of_rooms_is_what_they_show():

@@ -58,7 +58,7 @@ def estimate_motion(
     method : "auto", "ml" or "efficient"
         "auto": "efficient" from 30 points (5 patches) on, else "ml".
     robust : bool
-        Find the points that obey one motion among up to 60 % that do not. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
+        Find the points that obey one motion among up to 60 % that do not. Where what the points leave that obey it looks like those of something that moves otherwise (residuals of neighbours have one sign), the status is "ambiguous"; flow whose errors go together needs a `correlation_length`. Noise of these points that is larger than told widens the covariance. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
     placement : "midpoint" or "start"
         What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
         negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
@@ -74,7 +74,7 @@ def estimate_motion(
         How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
     correlation_length : float, px with K, else units of points; rad on the sphere
         How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
-    flow_scale : float, no unit
+    flow_scale : float, no unit, from 0 to 1
         Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
     flow_offset : float, units of flow
         Standard deviation of each component of a displacement that all flow has in common (a field tells how large it may be). Most of it looks like a rotation, and no residual tells it; it widens the covariance along what it would make of the motion. Not on the sphere.

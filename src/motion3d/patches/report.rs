@@ -1,12 +1,13 @@
 //! What is told about a motion of patches.
 
+use super::super::common::CommonErrors;
 use super::super::covariance::{Matrix5, direction_deviation, plugged_in};
 use super::super::motion::{Motion, tangents};
 use super::super::report::turned;
 use super::super::result::{Alternative, MotionEstimate, Status, axes, nested};
 use super::super::special::RotationOnly;
 use super::system::System;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
 pub(super) fn tell(
@@ -57,9 +58,19 @@ pub(super) fn tell(
 }
 
 /// What is told about a camera that only turns, or stands still.
-pub(super) fn turning_report(system: &System, n: usize, rotation: &RotationOnly) -> MotionEstimate {
+///
+/// `to_plane` maps flow to the plane at distance 1.
+pub(super) fn turning_report(
+    system: &System,
+    n: usize,
+    rotation: &RotationOnly,
+    common: &CommonErrors,
+    to_plane: &Matrix2<f64>,
+) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(n, Status::RotationOnly, 1.0);
-    turned(&mut out, &rotation.rotation, &rotation.covariance, rotation.chi2, &system.source);
+    let moved = rotation.covariance * system.turning() * to_plane;
+    let covariance = rotation.covariance + common.added_to_rotation(&rotation.rotation, &moved);
+    turned(&mut out, &rotation.rotation, &covariance, rotation.chi2, &system.source);
     out.surfaces = vec![[f64::NAN; 3]; n];
     for (patch, &source) in system.patches.iter().zip(&system.source) {
         let source = source as usize;

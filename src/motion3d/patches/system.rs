@@ -5,7 +5,7 @@ use super::super::covariance::{Matrix5, inverse};
 use super::super::motion::{AffineRows, Motion, tangents};
 use super::super::special::by_chance;
 use super::super::turned::HalfTurn;
-use nalgebra::{Matrix2x3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
 
@@ -190,6 +190,11 @@ impl System {
             sum += weighted * patch.whiten.fixed_columns::<2>(0);
         }
         inverse(&information).map_or(Moved::zeros(), |inverse| inverse * sum)
+    }
+
+    /// `sum R_k^t L_k^-1` of one displacement of all flow.
+    pub fn turning(&self) -> Matrix3x2<f64> {
+        self.patches.iter().map(|patch| patch.r.transpose() * patch.whiten.fixed_columns::<2>(0)).sum()
     }
 
     /// The best rotation for a direction, and what it leaves.

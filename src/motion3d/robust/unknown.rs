@@ -4,6 +4,8 @@
 
 use super::super::estimate::Scaled;
 use super::super::kernels::depths;
+use super::super::motion::Motion;
+use super::super::observations::Observations;
 use super::alike::alike;
 use super::{Consensus, UNKNOWNS, in_known_noise};
 use crate::math::random::CounterRng;
@@ -11,9 +13,14 @@ use crate::math::random::CounterRng;
 /// First guesses, in shares of the median flow: the next one where residuals go together.
 const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];
 
-/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal distribution cut there; most rounds.
+/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal distribution cut there.
 const CUT: f64 = 2.5;
 const CUT_VARIANCE: f64 = 0.911;
+
+/// The share of the information about a variance that is left to them.
+const CUT_INFORMATION: f64 = 0.69;
+
+/// Most rounds, and steps of each.
 const ROUNDS: usize = 4;
 const STEPS: usize = 50;
 
@@ -54,6 +61,19 @@ fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
         }
     }
     Some(found)
+}
+
+/// By how many deviations the noise of points that obey must be larger than it is told.
+const LARGER: f64 = 4.0;
+
+/// What the noise of the points that obey is larger by, in variance, than is told, where chance does not explain it; 1 where errors are not independent.
+pub(in super::super) fn larger(observations: &Observations, motion: &Motion) -> f64 {
+    if !observations.independent {
+        return 1.0;
+    }
+    let variance = noise(&depths(observations, motion).e[..observations.n]).powi(2);
+    let chance = LARGER * (2.0 / (CUT_INFORMATION * observations.n as f64)).sqrt();
+    if variance > 1.0 + chance { variance } else { 1.0 }
 }
 
 /// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution"; the five unknowns take their share away.

@@ -93,7 +93,24 @@ impl Neighbourhood {
             row: slopes(inliers, at.motion, at.tangent, at.nu[k], k),
             residual: residuals[k],
         };
-        let mut all: Vec<Point> = (0..inliers.n).map(point).collect();
+        Self::of((0..inliers.n).map(point).collect())
+    }
+
+    /// The same of one component of the flow that a rotation alone leaves.
+    pub fn of_rotation(inliers: &Observations, w: &Vector3<f64>, axis: usize, flow: &Flow<'_>, length: f64) -> Self {
+        let point = |k: usize| {
+            let row = inliers.row(k);
+            let turn = row.r.row(axis);
+            Point {
+                place: flow.place(inliers.source[k] as usize) / length,
+                row: Vector5::new(0.0, 0.0, turn[0], turn[1], turn[2]),
+                residual: row.f[axis] - (turn * w)[0],
+            }
+        };
+        Self::of((0..inliers.n).map(point).collect())
+    }
+
+    fn of(mut all: Vec<Point>) -> Self {
         all.sort_by(|a, b| a.place.y.total_cmp(&b.place.y));
         Self { all }
     }
