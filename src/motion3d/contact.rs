@@ -84,12 +84,12 @@ impl Rates {
     }
 
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from the motion's covariance; infinite where nothing comes nearer.
-    pub fn contact(&self, row: &Row, nu: f64, variance: f64) -> (f64, f64) {
+    pub fn contact(&self, nu: f64, variance: f64, slopes: &Slopes) -> (f64, f64) {
         let rate = nu * self.u.z;
         if rate == 0.0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        let variance = self.u.z * self.u.z * variance + self.variance(rate, &self.slopes(row, nu));
+        let variance = self.u.z * self.u.z * variance + self.variance(rate, slopes);
         (-1.0 / rate, variance.sqrt() / (rate * rate))
     }
 
@@ -98,7 +98,8 @@ impl Rates {
         let (t, d) = (row.g * self.u, row.f - row.r * self.w);
         let s2 = t.norm_squared();
         let nu = t.dot(&d) / s2;
-        let (contact, deviation) = self.contact(row, half_way.depth(nu), half_way.slope(nu).powi(2) / s2);
+        let depth = half_way.depth(nu);
+        let (contact, deviation) = self.contact(depth, half_way.slope(nu).powi(2) / s2, &self.slopes(row, depth));
         [contact, deviation, (t.y * d.x - t.x * d.y) / s2.sqrt()]
     }
 }

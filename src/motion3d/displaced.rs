@@ -26,7 +26,7 @@ const NEGLIGIBLE: f64 = 0.01;
 
 /// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the change of the rotation, rad, that is rounding.
 const SETTLED: f64 = 1e-14;
-const ROUGHLY: f64 = 1e-4;
+const ROUGHLY: f64 = 1e-3;
 const MANY: usize = 10_000;
 const ROUNDING: f64 = 1e-13;
 
@@ -226,7 +226,7 @@ fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unkn
             break;
         }
         let next = intake.turned(here, HalfTurn::of(&minimum.motion));
-        minimum = refine(&next, minimum.motion, None, Effort::FULL);
+        minimum = refine(&next, minimum.motion, None, Effort::of(next.n));
         turned = Some(next);
         negligible = settled;
     }

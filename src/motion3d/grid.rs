@@ -33,7 +33,7 @@ const APART_FURTHER: f64 = 4.0;
 /// Starts among what a few steps on a few points lead to.
 const BASINS: usize = 4;
 const FEW: usize = 128;
-const STEPS: Effort = Effort { steps: 4, tolerance: 1e-2 };
+const STEPS: Effort = Effort { steps: 4, tolerance: 1e-2, deviations: 0.0 };
 
 /// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
 const TOGETHER: usize = 20;

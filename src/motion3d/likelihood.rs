@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MANY: usize = 4000;
 const FEWER: usize = 2000;
 
-/// Minima that are then refined on all points, beside the one with the smoothest depths.
+/// Minima that are then refined on all points: the one with the least residuals, and the one with the smoothest depths or the next.
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.
@@ -73,12 +73,18 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let rough = different(rough);
         let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
         finalists.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        // The truth may not be among those whose residuals happen to be small.
+        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().next();
+        if let Some(best) = smoothest
+            && best.motion() != finalists[0].motion()
+        {
+            finalists.insert(1, best);
+        }
         finalists.truncate(FINALISTS);
-        // The truth may be neither of those whose residuals happen to be small.
-        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().take(1);
-        let added = smoothest.filter(|best| finalists.iter().all(|other| other.motion() != best.motion()));
-        let rough: Vec<Candidate> = finalists.iter().copied().chain(added).collect();
-        rough.iter().map(|candidate| refine(observations, *candidate.motion(), None, Effort::FULL)).collect()
+        finalists
+            .iter()
+            .map(|candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n)))
+            .collect()
     } else {
         starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()
     };

@@ -5,6 +5,9 @@ use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use nalgebra::{Matrix2x3, SMatrix};
 
+/// Points from which on there are many.
+const MANY: usize = 4000;
+
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Effort {
@@ -12,15 +15,22 @@ pub(super) struct Effort {
     pub steps: usize,
     /// Length of a step `(psi, w)`, rad, that is not worth another.
     pub tolerance: f64,
+    /// The same in deviations of what is found, as far as its residuals tell these.
+    pub deviations: f64,
 }
 
 impl Effort {
     /// To leave a motion as it is.
-    pub const NONE: Self = Self { steps: 0, tolerance: 0.0 };
+    pub const NONE: Self = Self { steps: 0, tolerance: 0.0, deviations: 0.0 };
     /// For a start that will be refined again.
-    pub const ROUGH: Self = Self { steps: 15, tolerance: 1e-4 };
+    pub const ROUGH: Self = Self { steps: 15, tolerance: 1e-4, deviations: 0.0 };
     /// To the minimum.
-    pub const FULL: Self = Self { steps: 60, tolerance: 1e-10 };
+    pub const FULL: Self = Self { steps: 60, tolerance: 1e-10, deviations: 0.0 };
+
+    /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the deviation hardly anything is left.
+    pub const fn of(n: usize) -> Self {
+        if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
+    }
 }
 
 /// A minimum with the equations there.
@@ -68,7 +78,8 @@ pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64
             continue;
         };
         let there = Minimum::at(observations, here.motion.stepped(&here.tangent, &change), cut);
-        let settled = change.norm() < effort.tolerance;
+        let told = change.dot(&(here.equations.h * change)) * observations.n as f64;
+        let settled = change.norm() < effort.tolerance || told < effort.deviations.powi(2) * here.equations.cost;
         if there.equations.cost <= here.equations.cost {
             here = there;
             damping *= 0.1;

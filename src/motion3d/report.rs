@@ -17,7 +17,11 @@ use super::special::RotationOnly;
 use super::together::{Weighted, together, turning};
 use super::turned::HalfWay;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
+use rayon::prelude::*;
 use std::borrow::Cow;
+
+/// Fewest points that a thread is worth its while for.
+const TOGETHER: usize = 1000;
 
 /// A motion found on the inliers.
 pub(super) struct Solution {
@@ -188,16 +192,22 @@ fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations,
     let rates = Rates::new(&solution.motion, &solution.tangent, solution.covariance.as_ref(), solution.common.as_ref());
     let likeliest = likeliest(out, inliers, solution);
     let u_z = solution.motion.u().z;
-    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::default());
-    for (k, &source) in all.source.iter().enumerate() {
-        let source = source as usize;
-        let (nu, variance) = likeliest[source];
+    let told = |k: usize| {
+        let (nu, variance) = likeliest[all.source[k] as usize];
         let row = all.row(k);
-        (out.time_to_contact[source], out.time_to_contact_std[source]) = rates.contact(&row, nu, variance);
+        let slopes = rates.slopes(&row, nu);
+        (rates.contact(nu, variance, &slopes), slopes)
+    };
+    let told: Vec<((f64, f64), Slopes)> = (0..all.n).into_par_iter().with_min_len(TOGETHER).map(told).collect();
+    // Summed in one order, whoever computed them.
+    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::default());
+    for (k, (contact, own)) in told.iter().enumerate() {
+        let source = all.source[k] as usize;
+        (out.time_to_contact[source], out.time_to_contact_std[source]) = *contact;
         if out.inliers[source] && seen.s2[k] > 0.0 {
             weights += seen.s2[k];
             sum += seen.s2[k] * seen.nu[k] * u_z;
-            slopes.add(&rates.slopes(&row, nu), seen.s2[k]);
+            slopes.add(own, seen.s2[k]);
         }
     }
     let rate = sum / weights;

@@ -160,7 +160,7 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         if kept.len() < LEAST {
             break;
         }
-        let motion = refine(&observations.subset(&kept), found.motion, None, effort(observations)).motion;
+        let motion = refine(&observations.subset(&kept), found.motion, None, Effort::of(observations.n)).motion;
         let obeying = obeying(observations, &motion);
         found = Consensus::new(motion, obeying);
     }
@@ -221,11 +221,6 @@ fn obeying(observations: &Observations, motion: &Motion) -> Vec<u32> {
     (0..observations.n as u32).filter(obeys).collect()
 }
 
-/// Of many points the minimum is found again with all effort afterwards.
-fn effort(observations: &Observations) -> Effort {
-    if observations.n > MANY { Effort { steps: 15, tolerance: 1e-6 } } else { Effort::FULL }
-}
-
 /// Maximum likelihood on the points that obey, until these stay the same.
 fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
     let mut motion = start;
@@ -234,7 +229,7 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < LEAST {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, effort(observations)).motion;
+        motion = refine(&observations.subset(&inliers), motion, None, Effort::of(observations.n)).motion;
         let next = obeying(observations, &motion);
         // Of many points a few always lie on the border.
         let settled =

@@ -68,7 +68,7 @@ impl Task<'_, '_> {
         if scaled.unknown {
             let sigma = (found[0].equations.cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
             rescaled(scaled, &mut inliers, sigma);
-            found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::FULL)).collect();
+            found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::of(inliers.n))).collect();
         }
         let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
         let mut solved = self.solved(&inliers, &candidates, made);
@@ -276,7 +276,7 @@ fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     }
     let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
     let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
-    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::FULL)).collect())
+    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::of(inliers.n))).collect())
 }
 
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.

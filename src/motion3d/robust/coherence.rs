@@ -5,8 +5,8 @@ use super::super::kernels::equations;
 use super::super::motion::{Motion, tangents};
 use super::super::neighbours::{Neighbours, Tree};
 use super::super::observations::{Observations, median};
-use super::super::refine::refine;
-use super::{Consensus, LEAST, MANY, Rival, effort, obeying};
+use super::super::refine::{Effort, refine};
+use super::{Consensus, LEAST, MANY, Rival, obeying};
 use std::ops::Range;
 
 /// Neighbours that are looked at; points from which on there are enough of them.
@@ -125,7 +125,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
         if kept == inliers || kept.len() < LEAST {
             break;
         }
-        motion = refine(&observations.subset(&kept), motion, None, effort(observations)).motion;
+        motion = refine(&observations.subset(&kept), motion, None, Effort::of(observations.n)).motion;
         inliers = kept;
         quiet = rejected.iter().map(|&share| share <= limit).collect();
     }

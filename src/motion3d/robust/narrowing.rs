@@ -51,5 +51,5 @@ pub(super) fn narrow(observations: &Observations, start: Motion, bound: f64) -> 
         motion = refine(observations, motion, Some(cut), Effort::ROUGH).motion;
         cut /= NARROWING;
     }
-    refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7 }).motion
+    refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
 }
