@@ -81,10 +81,12 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
             finalists.insert(1, best);
         }
         finalists.truncate(FINALISTS);
-        finalists
-            .iter()
-            .map(|candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n)))
-            .collect()
+        // A step on all points costs as much as many on few.
+        let followed = |candidate: &Candidate| {
+            let near = refine(&fewer, *candidate.motion(), None, Effort::FULL);
+            refine(observations, near.motion, None, Effort::of(observations.n))
+        };
+        finalists.iter().map(followed).collect()
     } else {
         starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()
     };
