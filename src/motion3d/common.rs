@@ -9,13 +9,21 @@
 use super::covariance::{Matrix5, inverse};
 use super::kernels::information;
 use super::motion::{Motion, Projection};
-use super::observations::{Known, Observations, median};
+use super::observations::{Known, Observations, median, quantile};
 use super::together::{Weighted, slopes};
 use crate::error::{Error, Result};
+use crate::math::Real;
+use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2, Vector3};
 
 /// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it (`benchmarks/motion3d_fields.py --errors`).
 const SHARE: f64 = 0.4;
+
+/// The share of the points whose errors tell how far the factor is off: others have covariances for lack of texture.
+const BEST: f64 = 0.25;
+
+/// About so many sites of a field are asked.
+const ENOUGH: f64 = 4000.0;
 
 /// The largest displacement: squares of larger ones are no numbers.
 const FARTHEST: f64 = 1e100;
@@ -45,8 +53,8 @@ pub(super) struct Effect {
 }
 
 impl CommonErrors {
-    /// As far as covariances tell. The factor: by what would be the whole error of half the points. Of each point, its flow and the covariance of that.
-    pub(super) fn told(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> Self {
+    /// As far as covariances tell. The factor: by what would be the whole error of the points that tell it best. Of each point, its flow and the covariance of that.
+    fn told(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> Self {
         let (mut squares, mut variances) = (Vec::new(), Vec::new());
         for (flow, covariance) in points {
             let square = covariance.cholesky().map(|factor| flow.dot(&factor.solve(&flow)));
@@ -55,10 +63,25 @@ impl CommonErrors {
                 variances.push(0.5 * covariance.trace());
             }
         }
-        let median_square = median(&mut squares);
+        let square = quantile(&mut squares, 1.0 - BEST);
         // An error has two components. Flow that may be twice as long or none has no scale.
-        let scale = if median_square > 0.0 { (2.0 / median_square).sqrt().min(1.0) } else { 1.0 };
+        let scale = if square > 0.0 { (2.0 / square).sqrt().min(1.0) } else { 1.0 };
         Self { scale, offset: SHARE * median(&mut variances).sqrt() }
+    }
+
+    /// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not tell by how large a factor flow is off.
+    pub(super) fn of_field<T: Real>(field: &FlowField<T>) -> Self {
+        let step = ((field.len() as f64 / ENOUGH).sqrt() as usize).max(1);
+        let sites = (0..field.height)
+            .step_by(step)
+            .flat_map(|row| (0..field.width).step_by(step).map(move |column| row * field.width + column));
+        let told = |site: usize| {
+            let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
+            let covariance = field.covariance_at(site).filter(|_| valid)?;
+            let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+            Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
+        };
+        Self::told(sites.filter_map(told))
     }
 
     /// On the plane or the sphere.
@@ -136,11 +159,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_are_told_by_the_usual_point() {
+    fn both_are_told_by_points() {
         let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
         let common = CommonErrors::told([1.0, 4.0, 9.0].into_iter().map(point));
-        // A flow of 20 deviations, and one point's of 0.2.
-        assert!((common.scale - (2.0f64 / 400.0).sqrt()).abs() < 1e-12, "{common:?}");
+        // A flow of 45 deviations, and one point's of 0.2.
+        assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
         assert!((common.offset - SHARE * 0.2).abs() < 1e-12, "{common:?}");
         assert_eq!(CommonErrors::told(std::iter::empty()).scale, 1.0);
     }

@@ -71,7 +71,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
     }
     scaled.observations.shared = options.shared.unwrap_or(1.0);
-    scaled.observations.independent = options.shared.is_none() && options.correlation_length.is_none();
+    let alone = |told: Option<f64>, usual: f64| told.is_none_or(|told| told == usual);
+    scaled.observations.independent = alone(options.shared, 1.0) && alone(options.correlation_length, 0.0);
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
     if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {

@@ -45,7 +45,7 @@ pub struct FieldPoints {
     pub shared: f64,
     /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
     pub correlation_length: f64,
-    /// What the flow of all of them may have in common, as far as their covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    /// What the flow of the whole field may have in common, as far as its covariances tell. For [`MotionOptions::common`](super::MotionOptions).
     pub common: CommonErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
@@ -107,7 +107,8 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         Sites::Points(_) => spacing,
     };
     let correlation_length = field.layout.correlation_length;
-    let mut out = FieldPoints { shared, correlation_length, spacing, ..FieldPoints::default() };
+    let common = CommonErrors::of_field(field);
+    let mut out = FieldPoints { shared, correlation_length, common, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
@@ -130,8 +131,6 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
         }
     }
-    let own = |(flow, covariance): (&[f64; 2], &[f64])| ((*flow).into(), Matrix2::from_row_slice(covariance) / shared);
-    out.common = CommonErrors::told(out.flow.iter().zip(out.covariances.chunks_exact(4)).map(own));
     Ok(out)
 }
 

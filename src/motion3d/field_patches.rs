@@ -8,7 +8,7 @@ use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, Sites, Status};
-use nalgebra::{Matrix2, Matrix6, SMatrix, SVector, Vector2, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
 /// Least side of a window, px: six numbers of less are hardly more than those of its pixels.
@@ -29,7 +29,7 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
-    /// What the flow of all of them may have in common, as far as the pixels' covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    /// What the flow of the whole field may have in common, as far as its covariances tell. For [`MotionOptions::common`](super::MotionOptions).
     pub common: CommonErrors,
 }
 
@@ -64,13 +64,7 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.sites(field, region);
     let fitted: Vec<_> = sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect();
-    let pixel = |&site: &usize| {
-        let covariance = field.covariance_at(site)?;
-        let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
-        Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
-    };
-    let common = CommonErrors::told(sites.iter().flatten().filter_map(pixel));
-    let mut out = FieldPatches { common, ..FieldPatches::default() };
+    let mut out = FieldPatches { common: CommonErrors::of_field(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());

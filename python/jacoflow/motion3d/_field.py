@@ -44,7 +44,7 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what is a single point's whole error (`flow_scale`), and that it may be off by one displacement, of 0.4 of that (`flow_offset`).
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what would be the whole error of the quarter of the field's points that tell it best (`flow_scale`), and that it may be off by one displacement, of 0.4 deviations of a point (`flow_offset`).
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
