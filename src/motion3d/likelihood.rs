@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MANY: usize = 4000;
 const FEWER: usize = 2000;
 
-/// Minima that are then refined on all points: the one with the least residuals, and the one with the smoothest depths or the next.
+/// Minima that are then refined on all points, beside the one with the smoothest depths.
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.
@@ -73,19 +73,14 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let rough = different(rough);
         let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
         finalists.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        // The truth may not be among those whose residuals happen to be small.
-        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().next();
-        if let Some(best) = smoothest
-            && best.motion() != finalists[0].motion()
-        {
-            finalists.insert(1, best);
-        }
         finalists.truncate(FINALISTS);
-        // A step on all points costs as much as many on few.
-        let followed = |candidate: &Candidate| {
-            let near = refine(&fewer, *candidate.motion(), None, Effort::FULL);
-            refine(observations, near.motion, None, Effort::of(observations.n))
-        };
+        // The truth may be neither of those whose residuals happen to be small.
+        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().next();
+        let other = |best: &Candidate| finalists.iter().all(|known| known.motion() != best.motion());
+        let added = smoothest.filter(other);
+        finalists.extend(added);
+        let followed =
+            |candidate: &Candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n));
         finalists.iter().map(followed).collect()
     } else {
         starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()

@@ -29,7 +29,7 @@ impl Effort {
 
     /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the deviation hardly anything is left.
     pub const fn of(n: usize) -> Self {
-        if n > MANY { Self { steps: 15, deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
+        if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
     }
 }
 
