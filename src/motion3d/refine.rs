@@ -8,6 +8,9 @@ use nalgebra::{Matrix2x3, SMatrix};
 /// Points from which on there are many.
 const MANY: usize = 4000;
 
+/// The largest share of `H` that may be noise of the depths where steps are taken without it.
+const MOST: f64 = 0.75;
+
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Effort {
@@ -54,12 +57,15 @@ impl Minimum {
 }
 
 /// The step that solves the damped equations; `None` where they have no solution.
+///
+/// `H` has the noise of the depths in it, `P`: without it each step would leave the share `P / H` of the way. Where that is most of `H`, the step is that of Gauss and Newton.
 fn step(equations: &Equations, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
-    let mut h = equations.h;
+    let Equations { h, p, .. } = equations;
+    let mut damped = if (h - p / MOST).cholesky().is_some() { h - p } else { *h };
     for i in 0..5 {
-        h[(i, i)] += damping * h[(i, i)];
+        damped[(i, i)] += damping * h[(i, i)];
     }
-    let step = h.cholesky()?.solve(&equations.gradient);
+    let step = damped.cholesky()?.solve(&equations.gradient);
     step.iter().all(|value| value.is_finite()).then_some(step)
 }
 

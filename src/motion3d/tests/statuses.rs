@@ -3,25 +3,28 @@
 use super::super::*;
 use super::scenes::{Scene, W, oblique, smooth};
 
-/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others. (The direction's confidence interval may have no end in such noise: `ill_conditioned`.)
+/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others. (The direction's confidence interval may have no end in such noise: `ill_conditioned`; or another minimum comes as close.)
 #[test]
 fn depths_that_are_mostly_noise_are_low_snr() {
     let forward = Motion::new([0.05, -0.03, 1.0], W);
     let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1e-8 } else { 0.0 }));
     let rotation_prior = Some(RotationPrior { rotation: W, covariance });
     let options = MotionOptions { rotation_prior, ..MotionOptions::default() };
-    let mut low = 0;
+    let (mut low, mut other) = (0, 0);
     for seed in 0..40 {
         let found = Scene::new(forward, 300, 0.6, 0.6, seed, |x, y, _| smooth(x, y)).run(&options);
         let nothing_left = found.likelihood.covariance[0][0].is_nan();
-        let endless = found.status == Status::IllConditioned;
-        assert!(endless || (found.status == Status::LowSnr) == nothing_left, "{seed}: {:?}", found.status);
-        assert!(endless || nothing_left || found.status == Status::Ok, "{seed}: {:?}", found.status);
+        match found.status {
+            Status::LowSnr => assert!(nothing_left, "{seed}"),
+            Status::Ok => assert!(!nothing_left, "{seed}"),
+            Status::IllConditioned | Status::Ambiguous => other += 1,
+            status => panic!("{seed}: {status:?}"),
+        }
         // What is told instead, that of the smoothed weights, holds all the same.
         assert!(found.direction_std > 2.0 && found.motion.angle_to(&forward).to_degrees() < 4.0 * found.direction_std);
         low += u32::from(found.status == Status::LowSnr);
     }
-    assert!((4..=36).contains(&low), "{low} of 40");
+    assert!((4..=36).contains(&low) && other <= 4, "{low} and {other} of 40");
 }
 
 #[test]
