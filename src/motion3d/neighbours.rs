@@ -97,6 +97,12 @@ impl Tree {
         cells
     }
 
+    /// The places of all halves, halves of halves and so on that have at least `least` points.
+    pub fn halves(&self, least: usize) -> Vec<std::ops::Range<usize>> {
+        let ranges = self.nodes.iter().skip(1).map(|node| node.range.0 as usize..node.range.1 as usize);
+        ranges.filter(|places| places.len() >= least).collect()
+    }
+
     /// The `k` nearest of the points at the places `asked`, themselves left out; `k` is less than the number of points.
     pub fn nearest(&self, asked: &[u32], k: usize) -> Neighbours {
         let mut places = vec![0u32; asked.len() * k];
@@ -215,6 +221,15 @@ mod tests {
             }
             assert!(!found.of(i).contains(&place));
         }
+    }
+
+    #[test]
+    fn halves_are_halves_of_halves() {
+        let positions: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        let tree = Tree::new(&positions);
+        let mut halves = tree.halves(25);
+        halves.sort_by_key(|places| (usize::MAX - places.len(), places.start));
+        assert_eq!(halves, [0..50, 50..100, 0..25, 25..50, 50..75, 75..100]);
     }
 
     #[test]

@@ -6,6 +6,8 @@ mod gate;
 mod hanging;
 mod mixture;
 mod narrowing;
+mod otherwise;
+mod regions;
 mod rivals;
 mod search;
 mod strays;
@@ -189,8 +191,8 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     }
     let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inner.clone() };
     // Errors that go together look like other motions everywhere.
-    if observations.independent && alike::alike(on, &found.motion, &shown) {
-        found.rivals.extend(alike::next(on, &candidates, &found.motion));
+    if observations.independent {
+        found.rivals.extend(otherwise::instead(on, &candidates, &found.motion, &shown));
     }
     Some(found)
 }
