@@ -8,8 +8,11 @@ use nalgebra::{Matrix2x3, SMatrix};
 /// Points from which on there are many.
 const MANY: usize = 4000;
 
-/// The largest share of `H` that may be noise of the depths where steps are taken without it.
+/// The largest share of `H` that may be noise of the depths where steps are taken without that.
 const MOST: f64 = 0.95;
+
+/// Deviations of a step that is near the minimum.
+const NEAR: f64 = 0.3;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
@@ -56,17 +59,24 @@ impl Minimum {
     }
 }
 
-/// The step that solves the damped equations; `None` where they have no solution.
+/// The step that solves the damped equations of `n` points; `None` where they have no solution.
 ///
-/// `H` has the noise of the depths in it, `P`: without it each step would leave the share `P / H` of the way. Where that is most of `H`, the step is that of Gauss and Newton.
-fn step(equations: &Equations, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
-    let Equations { h, p, .. } = equations;
-    let mut damped = if (h - p / MOST).cholesky().is_some() { h - p } else { *h };
-    for i in 0..5 {
-        damped[(i, i)] += damping * h[(i, i)];
-    }
-    let step = damped.cholesky()?.solve(&equations.gradient);
-    step.iter().all(|value| value.is_finite()).then_some(step)
+/// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they would leave the share `P / H` of the way, and are taken without it.
+fn step(equations: &Equations, n: usize, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
+    let Equations { h, p, gradient, .. } = equations;
+    let solved = |matrix: SMatrix<f64, 5, 5>| {
+        let damped = matrix + SMatrix::from_diagonal(&(h.diagonal() * damping));
+        let step = damped.cholesky()?.solve(gradient);
+        step.iter().all(|value| value.is_finite()).then_some(step)
+    };
+    let careful = solved(*h)?;
+    let near = squared_deviations(equations, &careful, n) < NEAR * NEAR && (h - p / MOST).cholesky().is_some();
+    if near { solved(h - p) } else { Some(careful) }
+}
+
+/// The square of a step in deviations of what is found, as far as residuals of `n` points tell these.
+fn squared_deviations(equations: &Equations, step: &SMatrix<f64, 5, 1>, n: usize) -> f64 {
+    step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }
 
 /// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along with it.
@@ -76,7 +86,7 @@ pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64
     let mut here = Minimum::at(observations, start, cut);
     let mut damping = 1e-4;
     for _ in 0..effort.steps {
-        let Some(change) = step(&here.equations, damping) else {
+        let Some(change) = step(&here.equations, observations.n, damping) else {
             damping = (damping * 10.0f64).max(1e-6);
             if damping > 1e12 {
                 break;
@@ -84,8 +94,8 @@ pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64
             continue;
         };
         let there = Minimum::at(observations, here.motion.stepped(&here.tangent, &change), cut);
-        let told = change.dot(&(here.equations.h * change)) * observations.n as f64;
-        let settled = change.norm() < effort.tolerance || told < effort.deviations.powi(2) * here.equations.cost;
+        let deviations = squared_deviations(&here.equations, &change, observations.n).sqrt();
+        let settled = change.norm() < effort.tolerance || deviations < effort.deviations;
         if there.equations.cost <= here.equations.cost {
             here = there;
             damping *= 0.1;
@@ -142,8 +152,8 @@ mod tests {
         let least = refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, Effort::FULL);
         let noisy = |share: f64| (least.equations.h - least.equations.p / share).cholesky().is_none();
         assert!(noisy(0.7) && !noisy(MOST));
-        let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.02, -0.01, 0.0, 0.0, 0.0]]));
-        let found = refine(&observations, near, None, Effort { steps: 5, ..Effort::FULL });
+        let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.004, -0.002, 0.0, 0.0, 0.0]]));
+        let found = refine(&observations, near, None, Effort { steps: 3, ..Effort::FULL });
         assert!(found.motion.angle_to(&least.motion) < 1e-5, "{}", found.motion.angle_to(&least.motion));
     }
 }
