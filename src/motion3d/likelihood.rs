@@ -79,6 +79,11 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let other = |best: &Candidate| finalists.iter().all(|known| known.motion() != best.motion());
         let added = smoothest.filter(other);
         finalists.extend(added);
+        // What no sign nor depths can make up for on few points need not be followed on many.
+        let left = |finalist: &Candidate| finalist.minimum.equations.cost;
+        let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
+        let limit = least + close(fewer.n) * (least / fewer.n as f64).max(1.0);
+        finalists.retain(|finalist| left(finalist) <= limit);
         let followed =
             |candidate: &Candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n));
         finalists.iter().map(followed).collect()
