@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn parts_that_determine_nothing_pull_nowhere() {
-        // Of twice as many points as there are unknowns a half takes all that is left.
+        // Halves of eight points, and none.
         let few = Scene::oblique(16, 0.02, 1).observations();
         assert!(!pull_apart(&few, &oblique(), &(0..16).collect::<Vec<u32>>()));
         assert!(!pull_apart(&few, &oblique(), &(0..5).collect::<Vec<u32>>()));
