@@ -26,6 +26,8 @@ pub(super) struct Candidate {
     pub minimum: Minimum,
     /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared units of noise.
     pub cost: f64,
+    /// The same but for what noise alone leads behind the camera, where the roughness is in it; else infinite.
+    pub fair: f64,
 }
 
 impl Candidate {
@@ -34,11 +36,16 @@ impl Candidate {
         let reversed = minimum.reversed(observations);
         let better = if reversed.equations.behind < minimum.equations.behind { reversed } else { *minimum };
         // J is of the minimum in both signs; taken from one of them, so that a cut does not matter.
-        Self { minimum: better, cost: reversed.equations.cost + better.equations.behind }
+        Self { minimum: better, cost: reversed.equations.cost + better.equations.behind, fair: f64::INFINITY }
     }
 
     pub fn motion(&self) -> &Motion {
         &self.minimum.motion
+    }
+
+    /// `J` and those depths behind the camera that noise does not lead there.
+    fn without_noise(&self) -> f64 {
+        self.minimum.equations.cost + self.minimum.equations.signs()
     }
 }
 
@@ -73,12 +80,15 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let rough = different(rough);
         let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
         finalists.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let fairest = finalists.iter().min_by(|a, b| a.without_noise().total_cmp(&b.without_noise())).copied();
         finalists.truncate(FINALISTS);
         // The truth may be neither of those whose residuals happen to be small.
         let smoothest = choose(&fewer, &rough, smoother).0.into_iter().next();
-        let other = |best: &Candidate| finalists.iter().all(|known| known.motion() != best.motion());
-        let added = smoothest.filter(other);
-        finalists.extend(added);
+        for added in [smoothest, fairest].into_iter().flatten() {
+            if finalists.iter().all(|known| known.motion() != added.motion()) {
+                finalists.push(added);
+            }
+        }
         // What no sign nor depths can make up for on few points need not be followed on many.
         let left = |finalist: &Candidate| finalist.minimum.equations.cost;
         let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
@@ -124,15 +134,21 @@ pub(super) fn choose(
         minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
-    let limit = best + close(observations.n);
-    let rivals = candidates.iter().take_while(|candidate| candidate.cost < limit).count();
-    if rivals < 2 {
+    let least = candidates.iter().map(Candidate::without_noise).fold(f64::INFINITY, f64::min);
+    let rival = |candidate: &Candidate| {
+        candidate.cost < best + close(observations.n) || candidate.without_noise() < least + close(observations.n)
+    };
+    let (mut rivals, others): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|one| rival(one));
+    if rivals.len() < 2 {
         return (candidates, None);
     }
     let smoother = smoother();
-    for candidate in &mut candidates[..rivals] {
-        candidate.cost += smoother.cost(&depths(observations, &candidate.minimum.motion));
+    for candidate in &mut rivals {
+        let rough = smoother.cost(&depths(observations, &candidate.minimum.motion));
+        candidate.fair = candidate.without_noise() + rough;
+        candidate.cost += rough;
     }
-    candidates[..rivals].sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    (candidates, Some(smoother))
+    rivals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    rivals.extend(others);
+    (rivals, Some(smoother))
 }

@@ -192,7 +192,9 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inner.clone() };
     // Errors that go together look like other motions everywhere.
     if observations.independent {
-        found.rivals.extend(otherwise::instead(on, &candidates, &found.motion, &shown));
+        let instead = otherwise::instead(on, &candidates, &found.motion, &shown);
+        found.rivals.retain(|known| instead.as_ref().is_none_or(|other| known.motion != other.motion));
+        found.rivals.extend(instead);
     }
     Some(found)
 }

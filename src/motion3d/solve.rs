@@ -84,7 +84,7 @@ impl Task<'_, '_> {
             (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
         }
         self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
-        solved.undecided = solved.undecided.or_else(|| contested(&candidates));
+        solved.undecided = solved.undecided.or_else(|| contested(&candidates, &solved.solution));
         solved.solution.alternatives = close(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
@@ -172,7 +172,8 @@ impl Task<'_, '_> {
 
     fn preferred(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
         if self.options.initial.is_some() {
-            let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
+            let given =
+                |minimum: &Minimum| Candidate { cost: minimum.equations.cost, fair: f64::INFINITY, minimum: *minimum };
             return (found.iter().map(given).collect(), None);
         }
         choose(inliers, found, || self.smoother(inliers))
@@ -247,10 +248,15 @@ impl Task<'_, '_> {
     }
 }
 
-/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with its own.
-fn contested(candidates: &[Candidate]) -> Option<Alternative> {
-    let preferred = candidates.get(1).filter(|other| other.cost < candidates[0].cost)?;
-    Some(Alternative { motion: *preferred.motion(), excess: preferred.cost - candidates[0].cost })
+/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with its own; or one that is where depths behind the camera count only as far as noise does not explain them: of depths that are hardly any, half are behind it.
+fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternative> {
+    let first = &candidates[0];
+    let preferred = candidates.get(1).filter(|other| other.cost < first.cost);
+    let deviation = DISTINCT * solution.covariance.as_ref().map_or(0.0, direction_deviation);
+    let apart = |other: &&Candidate| other.motion().angle_to(&solution.motion).to_degrees() > deviation;
+    let fairer = || candidates.iter().filter(|other| other.fair < first.fair).filter(apart);
+    let other = preferred.or_else(|| fairer().min_by(|a, b| a.fair.total_cmp(&b.fair)))?;
+    Some(Alternative { motion: *other.motion(), excess: other.cost - first.cost })
 }
 
 /// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it: whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was missed), the motion is off by as much (R. Birge 1932).

@@ -20,6 +20,15 @@ pub(in super::super) struct Equations {
     pub cost: f64,
     /// `sum (nu^ / sd)^2` over the points behind the camera.
     pub behind: f64,
+    /// How many these are.
+    pub reversed: f64,
+}
+
+impl Equations {
+    /// What depths behind the camera speak against a motion: the noise of depths that are hardly any leaves `sum (nu^ / sd)^2` of no more than their number.
+    pub fn signs(&self) -> f64 {
+        (self.behind - self.reversed).max(0.0)
+    }
 }
 
 struct EquationSums<'a> {
@@ -30,7 +39,7 @@ struct EquationSums<'a> {
     inverse_cut: f64,
 }
 
-const EQUATION_SUMS: usize = 26;
+const EQUATION_SUMS: usize = 27;
 
 impl Kernel<f64> for EquationSums<'_> {
     type Output = [f64; EQUATION_SUMS];
@@ -67,6 +76,7 @@ impl Kernel<f64> for EquationSums<'_> {
             sums[24] = sums[24] + (one - rest * rest * rest);
             let behind = seen.along.min(V::zero());
             sums[25] = (behind * behind).mul_add(seen.inverse, sums[25]);
+            sums[26] = sums[26] + V::select(seen.along.lt(V::zero()), one, V::zero());
         }
         sums.map(total)
     }
@@ -101,5 +111,5 @@ pub(in super::super) fn equations(
     p[(0, 1)] = sums[21];
     p[(1, 0)] = sums[21];
     p[(1, 1)] = sums[22];
-    Equations { h, gradient, p, cost, behind: sums[25] }
+    Equations { h, gradient, p, cost, behind: sums[25], reversed: sums[26] }
 }

@@ -5,12 +5,18 @@ use super::super::motion::Motion;
 use super::super::neighbours::Tree;
 use super::super::observations::Observations;
 
+/// Points from which on there are enough of them to tell.
+pub(super) const ENOUGH: usize = 50;
+
 /// Neighbours whose residuals are looked at, and deviations by which they go together.
 const NEAREST: usize = 8;
 const TOGETHER: f64 = 3.0;
 
 /// Whether the residuals of neighbours among `points` have the same sign more often than noise does.
 pub(super) fn alike(observations: &Observations, motion: &Motion, points: &[u32]) -> bool {
+    if points.len() < ENOUGH {
+        return false;
+    }
     let seen = depths(observations, motion).e;
     let sites: Vec<[f64; 3]> = points.iter().map(|&k| observations.site[k as usize]).collect();
     let tree = Tree::new(&sites);

@@ -3,12 +3,9 @@
 use super::super::kernels::depths;
 use super::super::motion::Motion;
 use super::super::observations::Observations;
-use super::alike::alike;
+use super::alike::{ENOUGH, alike};
 use super::regions::pull_apart;
 use super::{APART, Rival, obeying};
-
-/// Points from which on there are enough of them to tell.
-const ENOUGH: usize = 50;
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;

@@ -17,6 +17,20 @@ fn with_outliers(n: usize, outliers: usize, sigma: f64, reach: f64, seed: u64) -
     scene
 }
 
+/// Whatever few points are said to be, nothing is said to be sure.
+#[test]
+fn a_handful_of_points_is_no_reason_to_stop() {
+    for n in 0..16 {
+        for seed in 0..8 {
+            let scene = with_outliers(n, n / 3, 0.02, 1.0, seed);
+            for noise in [Noise::Unknown, Noise::Sigma(0.02)] {
+                let found = estimate_motion(&scene.flow(), &noise, &options()).unwrap();
+                assert!(n >= 12 || found.status != Status::Ok, "{n}: {:?}", found.status);
+            }
+        }
+    }
+}
+
 /// A few of few points always agree by chance: where the noise is not known, it must not be theirs.
 #[test]
 fn few_points_do_not_choose_their_own_noise() {

@@ -27,6 +27,18 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
     }
 }
 
+/// Of hardly visible depths half are behind the camera by noise alone, and a wrong motion may have fewer of them.
+#[test]
+fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
+    let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);
+    for (n, sigma) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
+        let (_, wrong) = counts(30, |seed| Scene::new(ahead, n, 0.5, sigma, seed, |_, y, _| ground(y)));
+        assert!(wrong <= 2, "{n} {sigma}: {wrong}");
+    }
+    let (confident, wrong) = counts(30, |seed| Scene::new(ahead, 1000, 0.5, 0.1, seed, |_, y, _| ground(y)));
+    assert!(confident >= 15 && wrong == 0, "{confident} {wrong}");
+}
+
 #[test]
 fn depths_that_tell_are_trusted() {
     let motion = oblique();
