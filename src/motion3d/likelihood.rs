@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const MANY: usize = 4000;
 const FEWER: usize = 2000;
 
-/// Minima that are then refined on all points, beside the one with the smoothest depths.
+/// Minima that are then refined on all points, beside the one with the smoothest depths and the first where signs count without their noise.
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.
@@ -89,7 +89,8 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
                 finalists.push(added);
             }
         }
-        // What no sign nor depths can make up for on few points need not be followed on many.
+        // What leaves more on few points than chance explains need not be followed on many, whatever its signs and depths.
+        // (Signs do not decide here: at a minimum that is not reached yet they are of other depths.)
         let left = |finalist: &Candidate| finalist.minimum.equations.cost;
         let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
         let limit = least + close(fewer.n) * (least / fewer.n as f64).max(1.0);

@@ -81,7 +81,7 @@ fn squared_deviations(equations: &Equations, step: &SMatrix<f64, 5, 1>, n: usize
 
 /// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along with it.
 ///
-/// The slope of `e` is `-D(nu^)` exactly, so that these are Gauss-Newton steps.
+/// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton steps.
 pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64>, effort: Effort) -> Minimum {
     let mut here = Minimum::at(observations, start, cut);
     let mut damping = 1e-4;
