@@ -40,16 +40,47 @@ pub struct CommonErrors {
     pub offset: f64,
 }
 
-/// What they do to a motion.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Effect {
-    /// To its covariance.
-    pub added: Matrix5,
-    /// Of the factor.
+/// What they do to a motion: its covariance has the squares of `motion` in it. Default: nothing.
+///
+/// Whatever is computed from the same flow and the motion together, as depths are, errs with both.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CommonEffect {
+    /// Standard deviation of the factor.
     pub scale: f64,
-    /// Displacements of one deviation along both axes, on the plane at distance 1, and what each does to the motion.
-    pub displaced: Matrix2<f64>,
-    pub moved: Moved,
+    /// Displacements of one deviation along both axes of the picture, on the plane at distance 1.
+    pub displaced: [[f64; 2]; 2],
+    /// What one deviation of the factor and each of these displacements do to `(psi, w)`, rad and rad/frame.
+    pub motion: [[f64; 5]; 3],
+}
+
+impl CommonEffect {
+    fn of(scale: f64, scaled: &SVector<f64, 5>, displaced: &Matrix2<f64>, moved: &Moved) -> Self {
+        let column = |k: usize| moved.column(k).into_owned().into();
+        let displacement = |k: usize| displaced.column(k).into_owned().into();
+        Self {
+            scale,
+            displaced: [displacement(0), displacement(1)],
+            motion: [(scaled * scale).into(), column(0), column(1)],
+        }
+    }
+
+    /// What displacements of one deviation do to the motion.
+    fn moves(&self) -> [SVector<f64, 5>; 3] {
+        self.motion.map(SVector::from)
+    }
+
+    /// What is in the motion's covariance.
+    pub(super) fn added(&self) -> Matrix5 {
+        self.moves().iter().map(|moved| moved * moved.transpose()).sum()
+    }
+
+    /// The variance of a value that is `value` times as large with all flow, by its slopes along `(psi, w)` and along a point's own flow on the plane at distance 1.
+    pub(super) fn variance(&self, value: f64, of_motion: &SVector<f64, 5>, of_flow: &RowVector2<f64>) -> f64 {
+        let [_, along @ ..] = self.moves();
+        let displaced = along.iter().zip(self.displaced.map(Vector2::from));
+        let moved = displaced.map(|(moved, by)| (of_motion.dot(moved) + (of_flow * by)[0]).powi(2));
+        (value * self.scale).powi(2) + moved.sum::<f64>()
+    }
 }
 
 impl CommonErrors {
@@ -109,16 +140,14 @@ impl CommonErrors {
         motion: &Motion,
         known: Option<&Known>,
         (moved, unit): (&Moved, &Matrix2<f64>),
-    ) -> Effect {
+    ) -> CommonEffect {
         let w = motion.w();
         let mut scaled = SVector::<f64, 5>::new(0.0, 0.0, w.x, w.y, w.z);
         if let Some(known) = known {
             scaled -= covariance.fixed_columns::<3>(2) * (known.information * w);
         }
         let displaced = unit * self.offset;
-        let moved = moved * displaced;
-        let added = scaled * scaled.transpose() * self.scale.powi(2) + moved * moved.transpose();
-        Effect { added, scale: self.scale, displaced, moved }
+        CommonEffect::of(self.scale, &scaled, &displaced, &(moved * displaced))
     }
 
     /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the flow do to it.

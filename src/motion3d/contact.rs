@@ -1,7 +1,7 @@
 //! Time to contact: how fast points come nearer, with what is known of that.
 
 use super::camera::Intrinsics;
-use super::common::Effect;
+use super::common::CommonEffect;
 use super::covariance::Matrix5;
 use super::field::measured;
 use super::intake::{plane_row, turned_row};
@@ -15,6 +15,19 @@ use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
 
+/// A motion as far as times to contact take it: that of a [`MotionEstimate`](super::MotionEstimate) by [`uncertain`](super::MotionEstimate::uncertain).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UncertainMotion {
+    /// The motion of the scene relative to the camera.
+    pub motion: Motion,
+    /// Axes of `psi`: two unit vectors perpendicular to `u`.
+    pub tangent: [[f64; 3]; 2],
+    /// Covariance of `(psi, w)`, rad and rad/frame.
+    pub covariance: [[f64; 5]; 5],
+    /// What is in it of errors that all flow has in common, those of the points whose times are wanted too.
+    pub common: CommonEffect,
+}
+
 /// Rates of approach `nu u_z` under a motion.
 pub(super) struct Rates {
     u: Vector3<f64>,
@@ -22,7 +35,7 @@ pub(super) struct Rates {
     tangent: Matrix2x3<f64>,
     /// Without what errors add that all flow has in common, where that is known.
     covariance: Matrix5,
-    common: Option<Effect>,
+    common: CommonEffect,
 }
 
 /// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance 1.
@@ -44,43 +57,37 @@ impl Slopes {
 }
 
 impl Rates {
-    /// Without a covariance, deviations are NaN. `common`: what is in it of errors that all flow has in common.
-    pub fn new(
-        motion: &Motion,
-        tangent: &Matrix2x3<f64>,
-        covariance: Option<&Matrix5>,
-        common: Option<&Effect>,
-    ) -> Self {
-        let covariance = covariance.copied().unwrap_or_else(|| Matrix5::from_element(f64::NAN));
-        let covariance = covariance - common.map_or_else(Matrix5::zeros, |common| common.added);
-        Self { u: motion.u(), w: motion.w(), tangent: *tangent, covariance, common: common.copied() }
+    /// Without a covariance, deviations are NaN.
+    pub fn new(of: &UncertainMotion) -> Self {
+        let covariance = Matrix5::from_fn(|i, j| of.covariance[i][j]) - of.common.added();
+        let tangent = Matrix2x3::from_fn(|i, j| of.tangent[i][j]);
+        Self { u: of.motion.u(), w: of.motion.w(), tangent, covariance, common: of.common }
     }
 
     /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
     pub fn slopes(&self, row: &Row, nu: f64) -> Slopes {
-        let (u, t) = (&self.u, row.g * self.u);
+        let t = row.g * self.u;
         let s2 = t.norm_squared();
         let inverse = if s2 > 0.0 { s2.recip() } else { 0.0 };
         let turn: Vector2<f64> = self.tangent * row.g.transpose() * t * (-nu * inverse);
         let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-        let motion = SMatrix::<f64, 5, 1>::from_column_slice(&[
-            u.z * turn.x + nu * self.tangent[(0, 2)],
-            u.z * turn.y + nu * self.tangent[(1, 2)],
-            u.z * spin.x,
-            u.z * spin.y,
-            u.z * spin.z,
-        ]);
+        let motion = SMatrix::<f64, 5, 1>::new(turn.x, turn.y, spin.x, spin.y, spin.z);
         // The first columns of `G` are those of the identity: they whiten.
-        Slopes { motion, flow: t.transpose() * row.g.fixed_columns::<2>(0) * (u.z * inverse) }
+        self.slopes_of(nu, (motion, t.transpose() * row.g.fixed_columns::<2>(0) * inverse))
+    }
+
+    /// From the slopes of a depth `nu`.
+    pub fn slopes_of(&self, nu: f64, (mut motion, flow): (SMatrix<f64, 5, 1>, RowVector2<f64>)) -> Slopes {
+        motion *= self.u.z;
+        motion[0] += nu * self.tangent[(0, 2)];
+        motion[1] += nu * self.tangent[(1, 2)];
+        Slopes { motion, flow: flow * self.u.z }
     }
 
     /// What the motion's covariance makes of slopes, and what errors do that all flow has in common: a factor is one of the rate, a displacement moves the motion and each point's depth together.
     pub fn variance(&self, rate: f64, slopes: &Slopes) -> f64 {
         let own = (slopes.motion.transpose() * self.covariance * slopes.motion)[0];
-        own + self.common.as_ref().map_or(0.0, |common| {
-            let moved = slopes.motion.transpose() * common.moved + slopes.flow * common.displaced;
-            (rate * common.scale).powi(2) + moved.norm_squared()
-        })
+        own + self.common.variance(rate, &slopes.motion, &slopes.flow)
     }
 
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from the motion's covariance; infinite where nothing comes nearer.
@@ -119,8 +126,7 @@ pub struct ContactMap {
     pub residual: Vec<f64>,
 }
 
-/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way between the frames with [`Placement::Midpoint`]. Motion, tangent axes and covariance are those of a
-/// [`MotionEstimate`](super::MotionEstimate).
+/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way between the frames with [`Placement::Midpoint`].
 ///
 /// Where the motion has no translation all times are infinite.
 ///
@@ -129,14 +135,11 @@ pub struct ContactMap {
 pub fn contact_map<T: Real>(
     field: &FlowField<T>,
     camera: &Intrinsics,
-    motion: &Motion,
-    tangent: &[[f64; 3]; 2],
-    covariance: &[[f64; 5]; 5],
+    known: &UncertainMotion,
     placement: Placement,
 ) -> Result<ContactMap> {
     measured(field)?;
-    let covariance = Matrix5::from_fn(|i, j| covariance[i][j]);
-    let rates = Rates::new(motion, &Matrix2x3::from_fn(|i, j| tangent[i][j]), Some(&covariance), None);
+    let (rates, motion) = (Rates::new(known), &known.motion);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
     let turn = (placement == Placement::Midpoint).then(|| HalfTurn::of(motion));
     let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
@@ -176,6 +179,7 @@ fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Ha
 
 #[cfg(test)]
 mod tests {
+    use super::super::result::{UNKNOWN, axes};
     use super::super::tests::scenes::{Scene, smooth};
     use super::super::{MotionOptions, Noise, estimate_motion};
     use super::*;
@@ -219,10 +223,11 @@ mod tests {
         // Something that goes its own way.
         field.motion[100] += 5.0;
         let mut covariance = [[0.0; 5]; 5];
-        let map = |covariance: &[[f64; 5]; 5]| {
-            contact_map(&field, &camera, &motion, &TANGENT, covariance, Placement::Start).unwrap()
+        let map = |motion: Motion, covariance: [[f64; 5]; 5]| {
+            let known = UncertainMotion { motion, tangent: TANGENT, covariance, common: CommonEffect::default() };
+            contact_map(&field, &camera, &known, Placement::Start).unwrap()
         };
-        let exact = map(&covariance);
+        let exact = map(motion, covariance);
         assert_eq!((exact.width, exact.height, exact.contact.len()), (64, 48, 64 * 48));
         assert!(exact.contact[5].is_nan() && exact.residual[100].abs() > 3.0);
         let corner = 0;
@@ -230,10 +235,10 @@ mod tests {
         // nu = 1/50 with the deviation 0.0005 / s at s = 0.4.
         assert!((exact.deviation[corner] - 50.0 * 50.0 * 5e-4 / 0.4).abs() < 1e-3, "{}", exact.deviation[corner]);
         covariance[3][3] = 1e-6;
-        let unsure = map(&covariance);
+        let unsure = map(motion, covariance);
         assert!(unsure.deviation[corner] > 1.1 * exact.deviation[corner]);
         let still = Motion { translation: [f64::NAN; 3], ..motion };
-        let never = contact_map(&field, &camera, &still, &TANGENT, &covariance, Placement::Start).unwrap();
+        let never = map(still, covariance);
         assert!(never.contact[corner].is_infinite() && never.contact[5].is_nan());
     }
 
@@ -243,7 +248,13 @@ mod tests {
         let scene = Scene::oblique(20, 0.1, 5);
         let observations = scene.observations();
         let tangent = super::super::motion::tangents(&scene.motion.u());
-        let rates = Rates::new(&scene.motion, &tangent, None, None);
+        let known = UncertainMotion {
+            motion: scene.motion,
+            tangent: axes(&tangent),
+            covariance: UNKNOWN,
+            common: CommonEffect::default(),
+        };
+        let rates = Rates::new(&known);
         let row = observations.row(3);
         let rate = |step: &SMatrix<f64, 5, 1>| {
             let motion = scene.motion.stepped(&tangent, step);

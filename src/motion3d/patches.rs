@@ -12,6 +12,7 @@ mod verdict;
 use super::belief::believed;
 use super::bound::{MotionBound, check_truth, not_determined, too_few};
 use super::camera::{Intrinsics, to_plane};
+use super::common::CommonEffect;
 use super::covariance::{determined, inverse, plugged_in};
 use super::grid::{apart, evaluate, sample};
 use super::motion::{Motion, Projection, tangents};
@@ -183,8 +184,9 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
     let displaced = (&system.moved(&motion, &told), &to_plane(patches.camera));
-    let common = |covariance| options.common.on(&covariance, &motion, None, displaced).added;
-    covariance = covariance.map(|covariance| covariance * wider + common(covariance));
+    let common = |covariance| options.common.on(&covariance, &motion, None, displaced);
+    out.common = covariance.map_or_else(CommonEffect::default, common);
+    covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;
     let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {

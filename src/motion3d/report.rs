@@ -1,7 +1,7 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
 use super::camera::to_plane;
-use super::common::{self, CommonErrors, Effect, Moved, moved};
+use super::common::{self, CommonEffect, CommonErrors, Moved, moved};
 use super::contact::{Rates, Slopes};
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
@@ -30,7 +30,7 @@ pub(super) struct Solution {
     /// `None` where nothing is known.
     pub covariance: Option<Matrix5>,
     /// What is in it of errors that all flow has in common.
-    common: Option<Effect>,
+    common: CommonEffect,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     likelihood: Likelihood,
@@ -54,7 +54,7 @@ impl Solution {
             motion: minimum.motion,
             tangent: minimum.tangent,
             covariance: plugged.map(|plugged| plugged.likelihood),
-            common: None,
+            common: CommonEffect::default(),
             status: Status::Ok,
             alternatives: Vec::new(),
             likelihood,
@@ -95,19 +95,18 @@ impl Solution {
     }
 
     /// What errors do that all flow has in common.
-    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> Option<Effect> {
-        let covariance = self.covariance?;
+    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
+        let Some(covariance) = self.covariance else { return CommonEffect::default() };
         let nu = self.weights(inliers);
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
         let moved = if common.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
-        Some(common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera()))))
+        common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera())))
     }
 
     /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
-    pub fn widen(&mut self, wider: f64, common: Option<&Effect>) {
-        let added = common.map_or_else(Matrix5::zeros, |common| common.added);
-        self.covariance = self.covariance.map(|covariance| covariance * wider + added);
-        self.common = common.copied();
+    pub fn widen(&mut self, wider: f64, common: CommonEffect) {
+        self.covariance = self.covariance.map(|covariance| covariance * wider + common.added());
+        self.common = common;
     }
 
     /// The depths in the weights, as long as the planes.
@@ -145,6 +144,7 @@ pub(super) fn report(
     out.efficient = solution.smooth.is_some();
     out.fell_back = solution.fell_back;
     out.tangent = axes(&solution.tangent);
+    out.common = solution.common;
     if let Some(covariance) = &solution.covariance {
         out.covariance = nested(covariance);
         out.direction_std = direction_deviation(covariance);
@@ -189,7 +189,7 @@ fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) 
 
 /// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
-    let rates = Rates::new(&solution.motion, &solution.tangent, solution.covariance.as_ref(), solution.common.as_ref());
+    let rates = Rates::new(&out.uncertain());
     let likeliest = likeliest(out, inliers, solution);
     let u_z = solution.motion.u().z;
     let told = |k: usize| {

@@ -1,6 +1,8 @@
 //! What an estimate tells.
 
 use super::camera::Intrinsics;
+use super::common::CommonEffect;
+use super::contact::UncertainMotion;
 use super::motion::Motion;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
 
@@ -75,6 +77,8 @@ pub struct MotionEstimate {
     pub covariance: [[f64; 5]; 5],
     /// Axes of `psi`: two unit vectors perpendicular to `u`.
     pub tangent: [[f64; 3]; 2],
+    /// What is in the covariance of errors that all flow has in common.
+    pub common: CommonEffect,
     /// The Cramér-Rao bound (8), with the information estimated; NaN where it is not known.
     pub bound: [[f64; 5]; 5],
     /// Standard deviation of the direction, `sqrt(tr psi)`, degrees.
@@ -119,6 +123,12 @@ pub(super) fn nested(matrix: &SMatrix<f64, 5, 5>) -> [[f64; 5]; 5] {
 }
 
 impl MotionEstimate {
+    /// The motion as [`contact_map`](super::contact_map) takes it.
+    pub fn uncertain(&self) -> UncertainMotion {
+        let Self { motion, tangent, covariance, common, .. } = *self;
+        UncertainMotion { motion, tangent, covariance, common }
+    }
+
     /// No motion, for N points.
     pub(super) fn nothing(n: usize, status: Status, sigma: f64) -> Self {
         let none = Motion { translation: [f64::NAN; 3], rotation: [f64::NAN; 3] };
@@ -130,6 +140,7 @@ impl MotionEstimate {
             fell_back: false,
             covariance: UNKNOWN,
             tangent: nowhere,
+            common: CommonEffect::default(),
             bound: UNKNOWN,
             direction_std: f64::NAN,
             rotation_std: [f64::NAN; 3],

@@ -244,7 +244,7 @@ impl Task<'_, '_> {
             // What strays leave among residuals that are cut off is accounted for.
             (false, Some(_)) => larger(&scaled.observations, &solution.motion),
         };
-        solution.widen(wider, common.as_ref());
+        solution.widen(wider, common);
     }
 }
 

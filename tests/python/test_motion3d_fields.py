@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import jacoflow
 from jacoflow import motion3d
@@ -61,6 +61,24 @@ def test_a_field_has_a_map_of_times_to_contact():
         motion3d.time_to_contact_map(jacoflow.estimate(np.stack([*frames, frames[1], frames[1]]), method="windowed"), found, camera)
     with pytest.raises(ValueError, match="^placement"):
         motion3d.time_to_contact_map(field, found, camera, placement="end")
+
+
+@pytest.mark.parametrize("common", [{"flow_scale": 0.5}, {"flow_offset": 0.5}])
+@pytest.mark.parametrize("form", [{"robust": False}, {"patches": 24}])
+def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
+    frames, camera = textured_drive()
+    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    found, points = motion3d.estimate_field_motion(field, camera, **form, **common)
+    x, y = np.round(points).astype(int).T
+    _, deviation, _ = motion3d.time_to_contact_map(field, found, camera)
+    assert np.nanmedian(deviation[y, x] / found.time_to_contact_std) == pytest.approx(1, abs=0.3 if "patches" in form else 0.1)
+    known = found.common_errors
+    assert_allclose(np.linalg.eigvalsh(found.covariance - known.motion.T @ known.motion) > 0, True)
+    (name, value), = common.items()
+    if name == "flow_scale":
+        assert known.scale == value
+    else:
+        assert_allclose(known.displacements, np.diag(value / np.diag(camera)[:2]), rtol=1e-12)
 
 
 def test_options_that_a_field_does_not_have_are_refused_by_name():

@@ -45,3 +45,22 @@ def test_six_numbers_on_layouts_with_the_published_bounds(case):
         assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25 if n == 10 else 0.2), row
     if n == 200:
         assert row["six ML"] > 1.15 * row["six shrunk"], row
+
+
+@pytest.mark.parametrize("common", [0.0, 0.05])
+def test_rates_of_patches_are_as_sure_as_they_say(common):
+    """With what the motion is off by, its rotation too, and with a displacement of all flow."""
+    u, w = np.array([0.3, 0.2, -0.93]) / np.linalg.norm([0.3, 0.2, -0.93]), [0.01, -0.01, 0.005]
+    held = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        pixels, depths = rng.uniform([0, 0], [320, 240], (20, 2)), rng.uniform(0.005, 0.02, 20)
+        # Walls that face the camera.
+        flow, right, below = (motion3d.predict_flow(pixels + step, u, w, depths, scenes.K) for step in np.array([[0, 0], [1e-3, 0], [0, 1e-3]]))
+        jacobian = np.stack([right - flow, below - flow], axis=-1) / 1e-3 + 0.0006 * rng.normal(size=(20, 2, 2))
+        flow = flow + 0.02 * rng.normal(size=(20, 2)) + common * rng.normal(size=2)
+        cov = np.diag([0.02**2] * 2 + [0.0006**2] * 4) + np.zeros((20, 1, 1))
+        found = motion3d.estimate_motion(pixels, flow, scenes.K, jacobian=jacobian, cov=cov, placement="start", method="ml", flow_offset=common)
+        rate = -1 / found.time_to_contact
+        held.append(np.abs(rate - depths * u[2]) < 1.96 * found.time_to_contact_std * rate**2)
+    assert 0.91 < np.mean(held) < 0.98

@@ -18,11 +18,12 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 from ._bound import MotionBound, motion_bound
 from ._estimate import estimate_motion
 from ._field import estimate_field_motion, time_to_contact_map
-from ._results import MotionEstimate, MotionSolution, focus_of_expansion, time_to_contact, time_to_contact_std
+from ._results import CommonEffect, MotionEstimate, MotionSolution, focus_of_expansion, time_to_contact, time_to_contact_std
 from ._sideways import SidewaysBound, SidewaysEstimate, estimate_sideways, sideways_bound
 from ._two_views import essential_matrix, predict_flow
 
 __all__ = [
+    "CommonEffect",
     "MotionBound",
     "MotionEstimate",
     "MotionSolution",

@@ -122,7 +122,7 @@ def time_to_contact_map(
     """Frames to contact at every pixel of a flow field, (H, W), their standard deviations, frames, and residuals, in units of noise.
 
     Each pixel has the time of whatever it shows, `-1 / (nu u_z)` with the inverse depth of its own flow: positive when approaching, infinite where the motion has no translation, NaN where the field is not valid. Times count from half way between the frames with
-    "midpoint". The deviations are those of the pixel's own flow and of the motion; errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 tells of something that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
+    "midpoint". The deviations are those of the pixel's own flow and of the motion, with what both have in common (`result.common_errors`); errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 tells of something that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
 
     Parameters
     ----------
@@ -143,4 +143,14 @@ def time_to_contact_map(
     kind("field", field, FlowField)
     kind("result", result, MotionEstimate)
     word("placement", placement)
-    return _motion3d_contact_map(field, K, (result.translation, result.rotation, result.tangent, result.covariance), placement)
+    common = result.common_errors
+    told = {
+        "translation": result.translation,
+        "rotation": result.rotation,
+        "tangent": result.tangent,
+        "covariance": result.covariance,
+        "scale": common.scale,
+        "displacements": common.displacements,
+        "moves": common.motion,
+    }
+    return _motion3d_contact_map(field, K, told, placement)

@@ -29,6 +29,18 @@ class MotionSolution:
 
 
 @dataclass(frozen=True, eq=False)
+class CommonEffect:
+    """What a factor and a displacement do to a motion that all flow has in common (`flow_scale`, `flow_offset` of `estimate_motion`): `motion.T @ motion` is in its covariance."""
+
+    scale: float
+    """Standard deviation of the factor, no unit."""
+    displacements: Array
+    """Displacements (2, 2), one a row, of one standard deviation along both axes of the picture, on the plane at distance 1."""
+    motion: Array
+    """What one standard deviation of the factor and each displacement do to (psi, w) (3, 5), rad and rad/frame."""
+
+
+@dataclass(frozen=True, eq=False)
 class MotionEstimate:
     """A rigid motion, rad/frame, with its uncertainty and the inverse depths (N,) of its points."""
 
@@ -47,6 +59,8 @@ class MotionEstimate:
     """Covariance (5, 5) of (psi, w): the direction is `u + psi @ tangent`, psi in rad, w in rad/frame. Where residuals are larger than the noise that was told, by more than chance, it is larger by as much."""
     tangent: Array
     """Axes (2, 3) of psi: unit vectors perpendicular to `u`, no unit."""
+    common_errors: CommonEffect
+    """What is in `covariance` of errors that all flow has in common (units there)."""
     crlb: Array
     """The Cramer-Rao bound (5, 5) of (psi, w) (8), rad and rad/frame, with the information estimated; NaN where that is mostly noise."""
     direction_std: float
@@ -91,6 +105,7 @@ def estimate_of(told: dict[str, Any]) -> MotionEstimate:
     surfaces = told.pop("surfaces")
     told["alternatives"] = tuple(MotionSolution(**other) for other in told["alternatives"])
     told["ml"] = MotionSolution(**told["ml"])
+    told["common_errors"] = CommonEffect(**told["common_errors"])
     return MotionEstimate(**told, surface_slopes=surfaces[:, 1:] if len(surfaces) else None)
 
 

@@ -1,13 +1,14 @@
 //! What is told about a motion of patches.
 
 use super::super::common::CommonErrors;
+use super::super::contact::Rates;
 use super::super::covariance::{Matrix5, direction_deviation, plugged_in};
 use super::super::motion::{Motion, tangents};
 use super::super::report::turned;
 use super::super::result::{Alternative, MotionEstimate, Status, axes, nested};
 use super::super::special::RotationOnly;
 use super::system::System;
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector3};
 
 /// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
 pub(super) fn tell(
@@ -29,6 +30,7 @@ pub(super) fn tell(
     if let Some(plugged) = plugged_in(&here.h, &here.p) {
         out.bound = nested(&plugged.bound);
     }
+    let rates = Rates::new(&out.uncertain());
     out.surfaces = vec![[f64::NAN; 3]; out.inliers.len()];
     for (k, (patch, &source)) in system.patches.iter().zip(&system.source).enumerate() {
         let (source, seen) = (source as usize, patch.seen(motion));
@@ -39,13 +41,9 @@ pub(super) fn tell(
         out.surfaces[source] = surface.into();
         out.residuals[source] = seen.cost.sqrt();
         out.inliers[source] = true;
-        let rate = surface[0] * motion.translation[2];
-        out.time_to_contact[source] = if rate == 0.0 { f64::INFINITY } else { -1.0 / rate };
-        let slopes = Vector2::new(surface[0] * tangent[(0, 2)], surface[0] * tangent[(1, 2)]);
-        let of_direction =
-            covariance.map_or(f64::NAN, |c| (slopes.transpose() * c.fixed_view::<2, 2>(0, 0) * slopes)[0]);
-        let variance = motion.translation[2].powi(2) * seen.covariance[(0, 0)] + of_direction;
-        out.time_to_contact_std[source] = if rate == 0.0 { f64::INFINITY } else { variance.sqrt() / (rate * rate) };
+        let slopes = rates.slopes_of(surface[0], patch.depth_slopes(&tangent, motion, &seen));
+        (out.time_to_contact[source], out.time_to_contact_std[source]) =
+            rates.contact(surface[0], seen.covariance[(0, 0)], &slopes);
     }
     let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
     match system.twin(motion) {

@@ -5,7 +5,7 @@ use super::super::covariance::{Matrix5, inverse};
 use super::super::motion::{AffineRows, Motion, tangents};
 use super::super::special::by_chance;
 use super::super::turned::HalfTurn;
-use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, RowVector2, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
 
@@ -119,6 +119,18 @@ impl Patch {
         }
         slopes.fixed_columns_mut::<3>(2).copy_from(&self.r);
         slopes
+    }
+
+    /// Slopes of the inverse depth along `(psi, w)` and along one displacement of the flow.
+    pub fn depth_slopes(
+        &self,
+        tangent: &Matrix2x3<f64>,
+        motion: &Motion,
+        seen: &SeenPatch,
+    ) -> (SMatrix<f64, 5, 1>, RowVector2<f64>) {
+        let along = (seen.covariance * self.depth(&motion.u()).transpose()).fixed_rows::<1>(0).into_owned();
+        let of_motion = -(along * self.slopes(tangent, &seen.surface)).transpose();
+        (of_motion, along * self.whiten.fixed_columns::<2>(0))
     }
 
     /// `sum_ij C_ij (G_i E)^t X (G_j E)`, what noise of the surface adds to products of slopes.

@@ -184,8 +184,7 @@ impl Egomotion {
     /// Times to contact of all sites with their deviations and residuals.
     fn map<T: Real>(&mut self, field: &FlowField<T>, found: &MotionEstimate) -> Result<()> {
         let Some(folder) = &self.plan.maps else { return Ok(()) };
-        let MotionEstimate { motion, tangent, covariance, .. } = found;
-        let map = contact_map(field, &self.plan.camera, motion, tangent, covariance, self.plan.motion.placement)?;
+        let map = contact_map(field, &self.plan.camera, &found.uncertain(), self.plan.motion.placement)?;
         let path = NumberedFiles::create(folder, "contact", "npz")?.path(field.layout.frame_index);
         let mut archive = NpzWriter::create(&path)?;
         let planes =

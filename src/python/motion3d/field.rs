@@ -1,10 +1,12 @@
 //! Points of a flow field for 3-D motion, and times to contact all over it.
 
 use super::flow::{motion, spread};
-use super::given::{square, word};
+use super::given::{fixed, square, word};
 use super::options::PLACEMENTS;
 use super::told::matrix;
-use crate::motion3d::{FieldOptions, Intrinsics, contact_map, field_patches, field_points};
+use crate::motion3d::{
+    CommonEffect, FieldOptions, Intrinsics, UncertainMotion, contact_map, field_patches, field_points,
+};
 use crate::python::arrays;
 use crate::python::field::{FlowField, Store, each};
 use crate::python::options::{self, Region};
@@ -66,8 +68,28 @@ fn single(field: &FlowField) -> PyResult<()> {
     if field.count().1 { Err(PyValueError::new_err(message)) } else { Ok(()) }
 }
 
-/// A motion as its result tells it: translation, rotation, tangent, covariance.
-type Told<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>);
+/// A motion as its result tells it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Told<'py> {
+    translation: Array<'py>,
+    rotation: Array<'py>,
+    tangent: Array<'py>,
+    covariance: Array<'py>,
+    scale: f64,
+    displacements: Array<'py>,
+    moves: Array<'py>,
+}
+
+impl Told<'_> {
+    /// As the core takes it.
+    fn core(&self) -> PyResult<UncertainMotion> {
+        let (tangent, covariance) = spread(&self.tangent, &self.covariance)?;
+        let displaced = fixed("common_errors.displacements", &self.displacements)?;
+        let common = CommonEffect { scale: self.scale, displaced, motion: fixed("common_errors.motion", &self.moves)? };
+        Ok(UncertainMotion { motion: motion(&self.translation, &self.rotation)?, tangent, covariance, common })
+    }
+}
 
 #[pyfunction]
 #[pyo3(name = "_motion3d_contact_map")]
@@ -80,12 +102,11 @@ pub fn motion3d_contact_map<'py>(
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>)> {
     single(field)?;
     let camera = Intrinsics::new(square("K", "", intrinsics)?)?;
-    let motion = motion(&told.0, &told.1)?;
-    let (tangent, covariance) = spread(&told.2, &told.3)?;
+    let known = told.core()?;
     let placement = word("placement", placement, &PLACEMENTS)?;
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| contact_map(&field, &camera, &motion, &tangent, &covariance, placement))
+        py.detach(|| contact_map(&field, &camera, &known, placement))
     })?;
     let shape = [found.height, found.width];
     Ok((

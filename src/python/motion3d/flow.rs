@@ -1,6 +1,6 @@
 //! What a motion does to points, and where it leads.
 
-use super::given::{camera, rows, triple};
+use super::given::{camera, fixed, rows, triple};
 use super::told::{matrix, vector};
 use crate::error::Error;
 use crate::motion3d::{Motion, RotationPrior, focus_of_expansion};
@@ -12,12 +12,7 @@ type Any<'py> = Bound<'py, PyAny>;
 
 /// The axes of a direction and the covariance that is told in them.
 pub fn spread(tangent: &Any<'_>, covariance: &Any<'_>) -> PyResult<([[f64; 3]; 2], [[f64; 5]; 5])> {
-    let (_, axes) = arrays::doubles("tangent", tangent)?;
-    let (_, values) = arrays::doubles("covariance", covariance)?;
-    match (<[[f64; 3]; 2]>::try_from(axes.as_chunks().0), <[[f64; 5]; 5]>::try_from(values.as_chunks().0)) {
-        (Ok(axes), Ok(values)) => Ok((axes, values)),
-        _ => Err(Error::argument("covariance", "shapes (2, 3) and (5, 5)", "others").into()),
-    }
+    Ok((fixed("tangent", tangent)?, fixed("covariance", covariance)?))
 }
 
 pub fn motion(translation: &Any<'_>, rotation: &Any<'_>) -> PyResult<Motion> {

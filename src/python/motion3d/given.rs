@@ -38,6 +38,14 @@ pub fn triple(name: &'static str, given: &Any<'_>) -> PyResult<[f64; 3]> {
     }
 }
 
+/// A matrix of a shape.
+pub fn fixed<const D: usize, const N: usize>(name: &'static str, given: &Any<'_>) -> PyResult<[[f64; D]; N]> {
+    let (shape, values) = arrays::doubles(name, given)?;
+    let matrix = <[[f64; D]; N]>::try_from(values.as_chunks().0).ok().filter(|_| shape == [N, D]);
+    let wrong = || Error::argument(name, format!("shape ({N}, {D})"), format!("shape {shape:?}")).into();
+    matrix.ok_or_else(wrong)
+}
+
 /// A matrix of 3 x 3 values.
 pub fn square(name: &'static str, of: &str, given: &Any<'_>) -> PyResult<[[f64; 3]; 3]> {
     let (shape, values) = arrays::doubles(name, given)?;

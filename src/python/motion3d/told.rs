@@ -1,6 +1,6 @@
 //! Results as Python takes them: dictionaries with the names of the dataclasses' fields.
 
-use crate::motion3d::{Motion, MotionBound, MotionEstimate};
+use crate::motion3d::{CommonEffect, Motion, MotionBound, MotionEstimate};
 use crate::python::arrays;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -43,6 +43,21 @@ impl<'py> ToldMotion<'py> {
     }
 }
 
+/// What errors do that all flow has in common.
+#[derive(IntoPyObject)]
+struct ToldCommon<'py> {
+    scale: f64,
+    displacements: Array<'py>,
+    motion: Array<'py>,
+}
+
+impl<'py> ToldCommon<'py> {
+    fn new(py: Python<'py>, common: &CommonEffect) -> PyResult<Self> {
+        let (displacements, motion) = (matrix(py, &common.displaced)?, matrix(py, &common.motion)?);
+        Ok(Self { scale: common.scale, displacements, motion })
+    }
+}
+
 /// An estimate.
 #[derive(IntoPyObject)]
 pub struct ToldEstimate<'py> {
@@ -53,6 +68,7 @@ pub struct ToldEstimate<'py> {
     fell_back: bool,
     covariance: Array<'py>,
     tangent: Array<'py>,
+    common_errors: ToldCommon<'py>,
     crlb: Array<'py>,
     direction_std: f64,
     rotation_std: Array<'py>,
@@ -89,6 +105,7 @@ impl<'py> ToldEstimate<'py> {
             fell_back: found.fell_back,
             covariance: matrix(py, &found.covariance)?,
             tangent: matrix(py, &found.tangent)?,
+            common_errors: ToldCommon::new(py, &found.common)?,
             crlb: matrix(py, &found.bound)?,
             direction_std: found.direction_std,
             rotation_std: vector(py, found.rotation_std)?,
