@@ -8,8 +8,9 @@
 
 use super::covariance::{Matrix5, inverse};
 use super::kernels::information;
+use super::known::Known;
 use super::motion::{Motion, Projection};
-use super::observations::{Known, Observations, median, quantile};
+use super::observations::{Observations, median, quantile};
 use super::together::{Weighted, slopes};
 use crate::error::{Error, Result};
 use crate::math::Real;

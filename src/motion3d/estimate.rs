@@ -2,7 +2,8 @@
 
 use super::displaced::{beforehand, decides};
 use super::intake::Intake;
-use super::observations::{Known, Observations, ROUNDING};
+use super::known::Known;
+use super::observations::{Observations, ROUNDING};
 use super::options::{Flow, MotionOptions, Noise};
 use super::report::rotation_report;
 use super::result::{MotionEstimate, Status};
@@ -42,6 +43,8 @@ pub(super) struct Scaled {
     pub sigma: f64,
     /// Whether `sigma` has to be estimated.
     pub unknown: bool,
+    /// Whether the flow may be that of a rotation alone.
+    pub may_turn: bool,
 }
 
 impl Scaled {
@@ -58,7 +61,8 @@ impl Scaled {
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
     let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
     let intake = Intake::new(flow, noise, options.placement);
-    let mut scaled = Scaled { observations: intake.whitened(), sigma, unknown: matches!(noise, Noise::Unknown) };
+    let unknown = matches!(noise, Noise::Unknown);
+    let mut scaled = Scaled { observations: intake.whitened(), sigma, unknown, may_turn: true };
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
@@ -73,6 +77,12 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     scaled.observations.shared = options.shared.unwrap_or(1.0);
     let alone = |told: Option<f64>, usual: f64| told.is_none_or(|told| told == usual);
     scaled.observations.independent = alone(options.shared, 1.0) && alone(options.correlation_length, 0.0);
+    if unknown && options.rotation_prior.is_some() {
+        // What is known beforehand weighs nothing beside flow of no noise, and how large that is it does not tell.
+        let alone = estimate(flow, noise, &MotionOptions { rotation_prior: None, ..options.clone() });
+        scaled.take(alone.sigma);
+        scaled.may_turn = alone.status == Status::RotationOnly;
+    }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
     let rng = CounterRng::new(options.seed);
     if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {

@@ -145,6 +145,6 @@ const UPPER: [(usize, usize); 15] = [
 ];
 
 /// Adds a 3 x 3 matrix, times a factor, to the block of the rotation.
-fn add_to_rotation(h: &mut SMatrix<f64, 5, 5>, information: &Matrix3<f64>, factor: f64) {
+pub(super) fn add_to_rotation(h: &mut SMatrix<f64, 5, 5>, information: &Matrix3<f64>, factor: f64) {
     h.fixed_view_mut::<3, 3>(2, 2).add_assign(information * factor);
 }

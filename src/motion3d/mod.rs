@@ -43,6 +43,7 @@ mod field_patches;
 mod grid;
 mod intake;
 mod kernels;
+mod known;
 mod less_turned;
 mod likelihood;
 mod motion;

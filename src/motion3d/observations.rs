@@ -1,11 +1,11 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
 use super::kernels::PLANES;
+use super::known::Known;
 use super::motion::Rows;
-use super::options::RotationPrior;
 use super::turned::HalfTurn;
 use crate::simd::Level;
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
@@ -70,29 +70,6 @@ pub(super) struct Observations {
     units: f64,
 }
 
-/// A rotation known beforehand, with the inverse of its covariance.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
-    pub rotation: Vector3<f64>,
-    pub information: Matrix3<f64>,
-}
-
-impl Known {
-    /// `None` unless everything is finite and the covariance positive definite.
-    pub fn new(prior: &RotationPrior) -> Option<Self> {
-        let covariance = Matrix3::from_fn(|i, j| 0.5 * (prior.covariance[i][j] + prior.covariance[j][i]));
-        let known = Self { rotation: prior.rotation.into(), information: covariance.cholesky()?.inverse() };
-        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
-    }
-
-    /// `(w0 - w)` times the information, and the square of the difference in its units.
-    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
-        let off = self.rotation - w;
-        let pull = self.information * off;
-        (pull, off.dot(&pull))
-    }
-}
-
 impl Row {
     /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None` unless all is finite and `S` positive definite.
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
@@ -111,6 +88,11 @@ impl Row {
 }
 
 impl Observations {
+    /// What a rotation costs for not being the one that is known.
+    pub fn pulled(&self, w: &Vector3<f64>) -> f64 {
+        self.prior.map_or(0.0, |known| known.pull(w).1)
+    }
+
     /// Usable points in the order given; `source` tells where they come from. Their sites are left to be told.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();

@@ -2,8 +2,8 @@
 
 use super::camera::Intrinsics;
 use super::common::CommonErrors;
+use super::known::Known;
 use super::motion::{Motion, Projection, tangents};
-use super::observations::Known;
 use super::result::MotionEstimate;
 use super::smoothing::Smoother;
 use crate::error::{Error, Result, numbers};
@@ -67,7 +67,7 @@ pub enum Placement {
 
 /// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a thing that moves by itself.
 ///
-/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
+/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both. Where flow contradicts it beyond chance the status is ambiguous.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationPrior {
     /// Rotation rate `w`, rad/frame.

@@ -6,7 +6,8 @@ use super::contact::{Rates, Slopes};
 use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
 use super::efficient::Efficient;
-use super::kernels::{Depths, depths, equations};
+use super::kernels::{Depths, depths, equations, information};
+use super::known::contradiction;
 use super::likelihood::Candidate;
 use super::motion::Motion;
 use super::observations::Observations;
@@ -107,6 +108,20 @@ impl Solution {
     pub fn widen(&mut self, wider: f64, common: CommonEffect) {
         self.covariance = self.covariance.map(|covariance| covariance * wider + common.added());
         self.common = common;
+    }
+
+    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as far as the motion that the flow tells by itself.
+    pub fn contradicted(&mut self, inliers: &Observations) -> bool {
+        let (Some(known), Some(covariance)) = (inliers.prior.as_ref(), self.covariance) else { return false };
+        let told = if let Some(nu) = &self.smooth {
+            information(inliers, &self.motion, &self.tangent, nu, 0.0)
+        } else {
+            let here = equations(inliers, &self.motion, &self.tangent, None);
+            here.h - here.p
+        };
+        let Some(apart) = contradiction(known, &self.motion.w(), &told, &covariance) else { return false };
+        self.covariance = Some(covariance + apart * apart.transpose());
+        true
     }
 
     /// The depths in the weights, as long as the planes.

@@ -17,7 +17,7 @@ pub enum Status {
     TooFewPoints,
     /// The flow is that of a rotation, as far as its noise lets tell: `u` is NaN, inverse depths are 0.
     RotationOnly,
-    /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite direction where depths do not exclude it, another minimum, that of other points in a robust search.
+    /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite direction where depths do not exclude it, another minimum, that of other points in a robust search, that of the flow by itself where it contradicts what is known of the rotation.
     Ambiguous,
     /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or directions farther than the covariance has it explain the flow as well.
     IllConditioned,

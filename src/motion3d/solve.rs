@@ -6,6 +6,7 @@ use super::displaced::{matters, settle, shift};
 use super::efficient::{Efficient, WeightDepths, unsolved};
 use super::estimate::Scaled;
 use super::intake::Intake;
+use super::known::of_flow_alone;
 use super::likelihood::{Candidate, choose, different, minima};
 use super::motion::Motion;
 use super::observations::Observations;
@@ -62,11 +63,12 @@ impl Task<'_, '_> {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         settle(self.intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
-        if let Some(told) = self.without_translation(scaled, &mut inliers, found[0].equations.cost) {
+        let cost = found[0].equations.cost - inliers.pulled(&found[0].motion.w());
+        if let Some(told) = self.without_translation(scaled, &mut inliers, cost) {
             return told;
         }
         if scaled.unknown {
-            let sigma = (found[0].equations.cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
+            let sigma = (cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
             rescaled(scaled, &mut inliers, sigma);
             found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::of(inliers.n))).collect();
         }
@@ -85,6 +87,9 @@ impl Task<'_, '_> {
         }
         self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         solved.undecided = solved.undecided.or_else(|| contested(&candidates, &solved.solution));
+        if solved.solution.contradicted(&inliers) {
+            solved.undecided = Some(of_flow_alone(&inliers, &solved.solution.motion));
+        }
         solved.solution.alternatives = close(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
@@ -110,16 +115,19 @@ impl Task<'_, '_> {
         }
     }
 
-    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves. (Of all points in known noise that was asked before any motion was looked for.)
+    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves of the flow. (Of all points in known noise that was asked before any motion was looked for.)
     fn without_translation(
         &self,
         scaled: &mut Scaled,
         inliers: &mut Observations,
         cost: f64,
     ) -> Option<MotionEstimate> {
-        let rotation = if scaled.unknown {
+        let rotation = if !scaled.may_turn {
+            return None;
+        } else if scaled.unknown {
             let rotation = turning_in_unknown_noise(inliers, cost)?;
-            let sigma = (rotation.chi2 / (2 * inliers.n - 3) as f64).sqrt();
+            let left = rotation.chi2 - inliers.pulled(&rotation.rotation);
+            let sigma = (left / (2 * inliers.n - 3) as f64).sqrt();
             rotation.in_units(rescaled(scaled, inliers, sigma))
         } else if self.options.robust {
             turning(inliers)?

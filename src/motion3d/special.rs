@@ -84,7 +84,7 @@ pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
     }
     let factor = normal.cholesky()?;
     let rotation = factor.solve(&right);
-    let mut chi2 = observations.prior.map_or(0.0, |known| known.pull(&rotation).1);
+    let mut chi2 = observations.pulled(&rotation);
     for (component, first) in [6, 9].into_iter().enumerate() {
         let r = [plane(first), plane(first + 1), plane(first + 2)];
         for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(plane(12 + component)) {
@@ -106,15 +106,17 @@ pub(super) fn turning(observations: &Observations) -> Option<RotationOnly> {
     by_chance(rotation.chi2, (2 * observations.n - 3) as f64 / observations.shared).then_some(rotation)
 }
 
-/// The same where the noise is to be estimated: `cost` is what the best motion leaves.
+/// The same where the noise is to be estimated: `cost` is what the best motion leaves of the flow.
 ///
 /// If there were no translation, that would take no more away than the same share of any noise, and what the choice of a direction takes.
 pub(super) fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
     let rotation = rotation_only(observations)?;
     let n = observations.n as f64;
-    let sigma2 = rotation.chi2 / (2.0 * n - 3.0);
+    // A wrong rotation that is said to be known is no noise of the flow.
+    let chi2 = rotation.chi2 - observations.pulled(&rotation.rotation);
+    let sigma2 = chi2 / (2.0 * n - 3.0);
     let left = cost / (n - 5.0).max(1.0);
-    let none = rotation.chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
+    let none = chi2 <= ROUNDING * ROUNDING * observations.median_flow().powi(2) * n;
     (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
@@ -168,7 +170,7 @@ pub(super) fn twin(
     let behind = |motion: &Motion| -> f64 {
         let at = depths(&seen, motion);
         let behind: f64 = (0..seen.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
-        behind + seen.prior.map_or(0.0, |known| known.pull(&motion.w()).1)
+        behind + seen.pulled(&motion.w())
     };
     let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
     let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });

@@ -2,6 +2,7 @@
 
 mod by_name;
 mod confidence;
+mod contradicted;
 mod degenerate;
 mod dense;
 mod displaced;

@@ -50,7 +50,7 @@ class MotionEstimate:
     """Rotation rate `w` (3,) of the scene relative to the camera, rad/frame."""
     status: Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
     """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches, or too few to tell outliers from inliers); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (another
-    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees or 1.5 times the field, its confidence interval has no end, or directions beyond the covariance explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
+    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search, that of the flow by itself where it contradicts the `rotation_prior`); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees or 1.5 times the field, its confidence interval has no end, or directions beyond the covariance explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
     method_used: Literal["ml", "efficient"]
     """Whose result `translation` and `rotation` are (no unit)."""
     fell_back: bool

@@ -1,7 +1,8 @@
 //! The estimating equation with given depths in its weights.
 
+use super::super::known::Known;
 use super::super::motion::Motion;
-use super::super::observations::{Known, Observations};
+use super::super::observations::Observations;
 use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix2x3, SMatrix};
