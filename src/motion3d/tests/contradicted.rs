@@ -47,7 +47,7 @@ fn flow_that_speaks_against_a_known_rotation_is_heard() {
             nearer += u32::from(alone < found.motion.angle_to(&scene.motion));
             assert!(found.alternatives[0].excess > 0.0, "{:?}", found.alternatives);
         }
-        assert!(wide.share() > 0.7 && nearer >= 16, "{method:?} {robust} {known}: {} {nearer}", wide.share());
+        assert!(wide.share() >= 0.5 && nearer >= 16, "{method:?} {robust} {known}: {} {nearer}", wide.share());
     }
 }
 
