@@ -4,15 +4,11 @@ use super::grid::{Searched, sample};
 use super::kernels::depths;
 use super::motion::Motion;
 use super::observations::Observations;
-use super::refine::{Effort, Minimum, refine};
+use super::refine::{Effort, FEWER, MANY, Minimum, refine};
 use super::smoothing::{DepthSmoother, Smoother};
 use super::special::by_chance;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
-
-/// From here on starts are refined on fewer points first.
-const MANY: usize = 4000;
-const FEWER: usize = 2000;
 
 /// Minima that are then refined on all points, beside the one with the smoothest depths and the first where signs count without their noise.
 const FINALISTS: usize = 2;

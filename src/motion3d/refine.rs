@@ -5,8 +5,9 @@ use super::motion::{Motion, tangents};
 use super::observations::Observations;
 use nalgebra::{Matrix2x3, SMatrix};
 
-/// Points from which on there are many.
-const MANY: usize = 4000;
+/// Points from which on there are many: so that a search takes no longer, it begins with fewer of them.
+pub(super) const MANY: usize = 4000;
+pub(super) const FEWER: usize = 2000;
 
 /// The largest share of `H` that may be noise of the depths where steps are taken without that.
 const MOST: f64 = 0.95;

@@ -19,7 +19,7 @@ use super::grid::sample;
 use super::kernels::{consensus as truncated, depths};
 use super::motion::Motion;
 use super::observations::Observations;
-use super::refine::{Effort, refine};
+use super::refine::{Effort, FEWER, MANY, refine};
 use crate::math::random::CounterRng;
 use gate::Gate;
 pub(super) use hanging::hangs_on_few;
@@ -36,10 +36,6 @@ const INLIER: f64 = 3.0;
 /// Starts that are refined, and the least angle between them, degrees.
 const STARTS: usize = 5;
 const APART: f64 = 10.0;
-
-/// From here on starts are refined on fewer points.
-const MANY: usize = 4000;
-const FEWER: usize = 2000;
 
 /// Rounds towards a fixed set of inliers.
 const ROUNDS: usize = 10;

@@ -93,6 +93,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
         ({"projection": "sphere"}, ["projection: ", "sphere"]),
         ({"scene": whole}, ["scene: ", "region"]),
         ({"scene": whole, "region": box, "turning": -1.0}, ["turning: ", "positive"]),
+        ({"turning": np.nan}, ["turning: ", "positive"]),
         ({"scene": whole, "region": box, "rotation_prior": (np.zeros(3), np.eye(3))}, ["rotation_prior: ", "scene"]),
         ({"scene": dataclasses.replace(whole, rotation=np.full(3, np.nan)), "region": box}, ["scene: ", "rotation is known"]),
         ({"patches": 7}, ["patches: ", "at least 8"]),

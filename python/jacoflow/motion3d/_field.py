@@ -69,6 +69,8 @@ def estimate_field_motion(
     kind("field", field, FlowField)
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
+    if not number("turning", turning) > 0:
+        raise ValueError(f"turning: expected a positive number, got {turning}")
     options = _own(options)
     if patches is not None:
         _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
@@ -110,7 +112,7 @@ def _beside(scene: MotionEstimate, turning: float, region: Sequence[int] | None)
         raise TypeError(f"scene: expected a MotionEstimate, got {_kind(scene)}")
     if region is None:
         raise ValueError("scene: expected a region beside it, of the thing whose motion is wanted, got no region")
-    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, number("turning", turning))
+    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, turning)
     if known is None:
         raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
     return known

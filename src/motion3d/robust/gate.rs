@@ -7,6 +7,7 @@ use super::super::kernels::{Depths, depths};
 use super::super::motion::Motion;
 use super::super::neighbours::Tree;
 use super::super::observations::{Observations, median, quantile};
+use super::super::refine::MANY;
 use super::coherence::more_than_usual;
 use super::strays::{BAND, Bin, DOUBLING, Strays};
 use super::{Consensus, INLIER};
@@ -16,8 +17,7 @@ use std::ops::Range;
 /// Neighbours that a depth is compared with.
 const NEAREST: usize = 16;
 
-/// From here on a depth is compared with the inliers of its cell of the tree instead, of at most so many points: nearly the same neighbours, found at once.
-const MANY: usize = 4000;
+/// Most points of a cell.
 const CELL: usize = 32;
 
 /// Cells of one task.
@@ -46,6 +46,7 @@ pub(super) struct Gate<'a> {
 impl<'a> Gate<'a> {
     /// For these points.
     pub fn new(observations: &'a Observations) -> Self {
+        // Of many points a depth is compared with the inliers of its cell of the tree: nearly the same neighbours, found at once.
         let cells = (observations.n > MANY).then(|| {
             let tree = Tree::new(&observations.site);
             let cells = tree.cells(CELL);
