@@ -119,8 +119,13 @@ pub(super) struct Rival {
     pub others: bool,
 }
 
-/// The motion that most points obey. Where the noise is not known it is estimated, and the points are measured in it afterwards.
+/// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated, and the points are measured in it afterwards.
 pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let found = obeyed(scaled, rng)?;
+    Some(doubted(&scaled.observations, found, rng))
+}
+
+fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     if !scaled.unknown {
         return in_known_noise(&scaled.observations, rng);
     }
@@ -141,13 +146,8 @@ pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
-    let fewer;
-    let on = if observations.n > MANY {
-        fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(9)));
-        &fewer
-    } else {
-        observations
-    };
+    let fewer = some(observations, rng);
+    let on = fewer.as_ref().unwrap_or(observations);
     let candidates = candidates(on, rng)?;
     let &(best, _) = candidates.first()?;
     let mut rivals = rivals(on, &candidates);
@@ -185,14 +185,32 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         found.quiet = inner.quiet;
         found.rivals.extend(inner.rival);
     }
-    let shown = if on.n < observations.n { obeying(on, &found.motion) } else { found.inner.clone() };
-    // Errors that go together look like other motions everywhere.
-    if observations.independent {
-        let instead = otherwise::instead(on, &candidates, &found.motion, &shown);
-        found.rivals.retain(|known| instead.as_ref().is_none_or(|other| known.motion != other.motion));
-        found.rivals.extend(instead);
-    }
     Some(found)
+}
+
+/// The same with the motion that it may be instead.
+fn doubted(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
+    // Errors that go together look like other motions everywhere.
+    if !observations.independent {
+        return found;
+    }
+    let fewer = some(observations, rng);
+    let inner = fewer.is_none();
+    let mut on = fewer.unwrap_or_else(|| observations.clone());
+    // Residuals that are cut off where noise told too small ends pull nowhere.
+    let variance = larger(observations, &found.motion);
+    on.rescale(variance.sqrt().recip());
+    let shown = if inner && variance <= 1.0 { found.inner.clone() } else { obeying(&on, &found.motion) };
+    let instead = otherwise::instead(&on, &found.motion, &shown, rng);
+    let instead = instead.map(|other| Rival { excess: other.excess * variance, ..other });
+    found.rivals.retain(|known| instead.as_ref().is_none_or(|other| known.motion != other.motion));
+    found.rivals.extend(instead);
+    found
+}
+
+/// The points that a search begins with; `None` where it begins with all.
+fn some(observations: &Observations, rng: CounterRng) -> Option<Observations> {
+    (observations.n > MANY).then(|| observations.subset(&sample(observations.n, FEWER, rng.stream(9))))
 }
 
 /// Motions that many points obey, with what each costs: the cheapest first.

@@ -9,6 +9,7 @@ use super::super::refine::{Effort, refine};
 use super::super::special::chi2_deviation;
 use super::super::together::slopes;
 use nalgebra::{SVector, SymmetricEigen};
+use std::ops::Range;
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
 const PART: usize = 16;
@@ -20,29 +21,37 @@ const FAR: f64 = 3.4;
 /// Information about a combination of the unknowns that a part has of its own, as a share of all; less is rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Whether the residuals of a part of `points` pull the estimate on all of them farther than noise does.
+/// Parts of `points` whose residuals pull the estimate on all of them farther than noise does, the farthest first.
 ///
 /// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of the points, halves of these, and so on.
-pub(super) fn pull_apart(observations: &Observations, motion: &Motion, points: &[u32]) -> bool {
+pub(super) fn pulling(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
+    departing(observations, motion, points).unwrap_or_default()
+}
+
+fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     let own = observations.subset(points);
     let least = refine(&own, *motion, None, Effort::FULL);
-    let Some(factor) = least.equations.h.cholesky() else { return false };
-    let whiten = factor.l();
+    let whiten = least.equations.h.cholesky()?.l();
     let seen = depths(&own, &least.motion);
     let row = |k: usize| whiten.solve_lower_triangular(&slopes(&own, &least.motion, &least.tangent, seen.nu[k], k));
-    let Some(rows) = (0..own.n).map(row).collect::<Option<Vec<_>>>() else { return false };
+    let rows = (0..own.n).map(row).collect::<Option<Vec<_>>>()?;
     let variance = seen.e[..own.n].iter().map(|e| e * e).sum::<f64>() / own.n as f64;
     let tree = Tree::new(&own.site[..own.n]);
     let parts = tree.halves(FEWEST.max(own.n / PART));
-    parts.into_iter().any(|places| {
+    let departs = |places: &Range<usize>| {
         let (mut share, mut pull) = (Matrix5::zeros(), SVector::<f64, 5>::zeros());
-        for &k in &tree.order()[places] {
+        for &k in &tree.order()[places.clone()] {
             let row = &rows[k as usize];
             share += row * row.transpose();
             pull += row * seen.e[k as usize];
         }
-        departure(share, &pull, variance) > FAR
-    })
+        departure(share, &pull, variance)
+    };
+    let far = parts.into_iter().map(|places| (departs(&places), places)).filter(|(departs, _)| *departs > FAR);
+    let mut far: Vec<(f64, Range<usize>)> = far.collect();
+    far.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let given = |places: Range<usize>| tree.order()[places].iter().map(|&k| points[k as usize]).collect();
+    Some(far.into_iter().map(|(_, places)| given(places)).collect())
 }
 
 /// How far the `pull` of a part that has the `share` of all information is from noise, in deviations.
@@ -74,7 +83,7 @@ mod tests {
         let (mut chance, mut told) = (0, 0);
         for seed in 0..200 {
             let mut scene = Scene::oblique(400, 0.02, seed);
-            chance += u32::from(pull_apart(&scene.observations(), &oblique(), &all));
+            chance += u32::from(!pulling(&scene.observations(), &oblique(), &all).is_empty());
             // Two deviations of a point, most of which passes for depth.
             let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
             for k in (0..400).filter(|&k| scene.points[k][0] > 0.3) {
@@ -82,7 +91,7 @@ mod tests {
                 let (before, after) = (oblique().plane_flow(at, nu), turned.plane_flow(at, nu));
                 scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
             }
-            told += u32::from(pull_apart(&scene.observations(), &oblique(), &all));
+            told += u32::from(!pulling(&scene.observations(), &oblique(), &all).is_empty());
         }
         assert!(chance <= 6 && told >= 150, "{chance} {told}");
     }
@@ -91,7 +100,7 @@ mod tests {
     fn parts_that_determine_nothing_pull_nowhere() {
         // Halves of eight points, and none.
         let few = Scene::oblique(16, 0.02, 1).observations();
-        assert!(!pull_apart(&few, &oblique(), &(0..16).collect::<Vec<u32>>()));
-        assert!(!pull_apart(&few, &oblique(), &(0..5).collect::<Vec<u32>>()));
+        assert!(pulling(&few, &oblique(), &(0..16).collect::<Vec<u32>>()).is_empty());
+        assert!(pulling(&few, &oblique(), &(0..5).collect::<Vec<u32>>()).is_empty());
     }
 }
