@@ -84,7 +84,10 @@ pub(super) fn judge(
         solution.alternatives.insert(0, other);
     }
     let others = evidence.rivals.iter().filter(|rival| rival.others);
+    let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
     for (place, rival) in others.clone().enumerate() {
+        solution.alternatives.retain(|known| known.motion.angle_to(&rival.motion).to_degrees() > same);
+        let place = place.min(solution.alternatives.len());
         solution.alternatives.insert(place, Alternative { motion: rival.motion, excess: rival.excess });
     }
     let motions = [solution.motion, evidence.likelihood.0];
