@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,6 +74,7 @@ def drive(data: Path) -> list[Row]:
     folder = data / "kitti_odometry" / "KITTI_sequence_1"
     images, poses = frames(folder / "image_l"), np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)
     errors: dict[str, list[tuple[float, float, float, float]]] = {}
+    ok: Counter[str] = Counter()
 
     def add(name: str, direction: Array, true_direction: Array, turned: float) -> None:
         off = np.degrees(direction - true_direction)[:2]
@@ -83,6 +85,7 @@ def drive(data: Path) -> list[Row]:
         for preset in ("fast", "balanced"):
             found, _ = motion3d.estimate_field_motion(field(images[index], images[index + 1], preset), K_DRIVE)
             add(f"jacoflow, {preset} flow", found.translation, u, float(np.linalg.norm(found.rotation - w)))
+            ok[f"jacoflow, {preset} flow"] += found.status == "ok"
         if rivals.cv2 is None:
             continue
         points, flow = tracks(images[index], images[index + 1])
@@ -91,6 +94,7 @@ def drive(data: Path) -> list[Row]:
             add(f"{name} on LK tracks", direction, shift, np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
         found = motion3d.estimate_motion(points, flow, K_DRIVE, robust=True)
         add("jacoflow on LK tracks", found.translation, u, float(np.linalg.norm(found.rotation - w)))
+        ok["jacoflow on LK tracks"] += found.status == "ok"
     rows: list[Row] = []
     for name, values in errors.items():
         every, third, measured = (np.median(part, 0) for part in (values, values[::3], values[INTERPOLATED:]))
@@ -99,7 +103,7 @@ def drive(data: Path) -> list[Row]:
         rows.append(
             {
                 "method": name, "direction, deg": round(every[0], 3), "rotation, deg": round(every[1], 4), "every third pair": f"{third[0]:.3f} / {third[1]:.4f}",
-                "pairs with measured truth": f"{measured[0]:.3f} / {measured[1]:.4f}", "asked": "1.1 / 0.06" if name.startswith("5-point") else "",
+                "pairs with measured truth": f"{measured[0]:.3f} / {measured[1]:.4f}", "asked": "1.1 / 0.06" if name.startswith("5-point") else "", "ok": f"{ok[name]} of {len(values)}" if name in ok else "",
                 "their offset, deg": f"{mean[0]:.2f}, {mean[1]:.2f}", "scatter about it": f"{scatter[0]:.2f}, {scatter[1]:.2f}",
             }
         )  # fmt: skip

@@ -11,6 +11,7 @@ mod regions;
 mod rivals;
 mod search;
 mod strays;
+mod two;
 mod unknown;
 mod whole;
 

@@ -3,54 +3,42 @@
 use super::super::kernels::depths;
 use super::super::motion::Motion;
 use super::super::observations::Observations;
+use super::super::refine::{Effort, refine};
 use super::alike::{ENOUGH, alike};
-use super::narrowing::Narrowing;
 use super::regions::pulling;
-use super::{APART, Rival, STARTS, candidates, cheaper_sign, obeying};
+use super::two::{Division, Two};
+use super::{APART, INLIER, Rival, truncated};
 use crate::math::random::CounterRng;
-use std::collections::HashSet;
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;
 
-/// Parts of the picture without which the scene's motion is looked for.
+/// Parts of the picture from which two motions are looked for.
 const PARTS: usize = 4;
 
-/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the same: of the candidates, cheapest first, one that is another and leaves noise, else the first that is another. `None` where all agree, as where errors of flow go together and that is not told.
-///
-/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's motion alone, but it leaves residuals in both. It may be what every search among all points ends at: then others are made without a part that pulls another way.
-pub(super) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
-    let parts = otherwise(observations, found, points)?;
-    let among = candidates(observations, rng)?;
-    let least = among[0].1;
-    let another = |(motion, _): &(Motion, f64)| motion.angle_to(found).to_degrees() > APART;
-    let mut others: Vec<(Motion, f64)> = among.into_iter().filter(another).collect();
-    if others.is_empty() {
-        others = without(observations, points, &parts, rng);
-        others.retain(another);
-    }
-    let noise = |(motion, _): &&(Motion, f64)| {
-        let points = obeying(observations, motion);
-        points.len() >= ENOUGH && otherwise(observations, motion, &points).is_none()
-    };
-    let &(motion, cost) = others.iter().find(noise).or(others.first())?;
-    Some(Rival { motion, excess: (cost - least).max(0.0), others: true })
-}
+/// What two motions must explain more than one: twice the unknowns of one more, and which points have it. And of each point, where that of more points is the same: errors of flow that go together look like the motion of a few.
+const ALL: f64 = 20.0;
+const EACH: f64 = 0.12;
 
-/// Motions of all `points` but one of the `parts`, with what each costs on all; the cheapest first.
-fn without(observations: &Observations, points: &[u32], parts: &[Vec<u32>], rng: CounterRng) -> Vec<(Motion, f64)> {
-    let search = |part: &Vec<u32>| {
-        let left: HashSet<u32> = part.iter().copied().collect();
-        let rest: Vec<u32> = points.iter().copied().filter(|k| !left.contains(k)).collect();
-        if rest.len() < ENOUGH {
-            return Vec::new();
-        }
-        let found = Narrowing::new(&observations.subset(&rest)).motions(STARTS, rng);
-        found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect()
-    };
-    let mut found: Vec<(Motion, f64)> = parts.iter().take(PARTS).flat_map(search).collect();
-    found.sort_by(|a, b| a.1.total_cmp(&b.1));
-    found
+/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the same: where two motions explain them better, that of more points, or else of fewer, if it is another. `None` where that is not worth another motion, as where errors of flow go together and that is not told.
+///
+/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's motion alone, and what every search among all of them ends at; but it leaves residuals in both.
+pub(super) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
+    let mut parts = otherwise(observations, found, points)?;
+    let own = observations.subset(points);
+    let (n, together) = (own.n as f64, refine(&own, *found, None, Effort::FULL).equations.cost);
+    let division = Division::of(own);
+    if parts.is_empty() {
+        parts = division.quarters();
+    }
+    let divided = |part: &Vec<u32>| division.from(part, found, rng);
+    let two = parts.iter().take(PARTS).filter_map(divided).min_by(|a: &Two, b: &Two| a.cost.total_cmp(&b.cost))?;
+    let another = |motion: &&Motion| motion.angle_to(found).to_degrees() > APART;
+    let gain = together - two.cost;
+    let [more, fewer] = &two.motions;
+    let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
+    let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
+    (gain > ALL).then(|| Rival { motion: *motion, excess: excess.max(0.0), others: true })
 }
 
 /// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.

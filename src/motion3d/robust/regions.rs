@@ -21,7 +21,7 @@ const FAR: f64 = 3.4;
 /// Information about a combination of the unknowns that a part has of its own, as a share of all; less is rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Parts of `points` whose residuals pull the estimate on all of them farther than noise does, the farthest first.
+/// Parts of `points`, by their places among these, whose residuals pull the estimate on all of them farther than noise does, the farthest first.
 ///
 /// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of the points, halves of these, and so on.
 pub(super) fn pulling(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
@@ -50,8 +50,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
     let far = parts.into_iter().map(|places| (departs(&places), places)).filter(|(departs, _)| *departs > FAR);
     let mut far: Vec<(f64, Range<usize>)> = far.collect();
     far.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let given = |places: Range<usize>| tree.order()[places].iter().map(|&k| points[k as usize]).collect();
-    Some(far.into_iter().map(|(_, places)| given(places)).collect())
+    Some(far.into_iter().map(|(_, places)| tree.order()[places].to_vec()).collect())
 }
 
 /// How far the `pull` of a part that has the `share` of all information is from noise, in deviations.
