@@ -204,7 +204,6 @@ fn doubted(observations: &Observations, mut found: Consensus, rng: CounterRng) -
     let shown = if inner && variance <= 1.0 { found.inner.clone() } else { obeying(&on, &found.motion) };
     let instead = otherwise::instead(&on, &found.motion, &shown, rng);
     let instead = instead.map(|other| Rival { excess: other.excess * variance, ..other });
-    found.rivals.retain(|known| instead.as_ref().is_none_or(|other| known.motion != other.motion));
     found.rivals.extend(instead);
     found
 }
