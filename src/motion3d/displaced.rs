@@ -175,11 +175,11 @@ pub(super) fn settle(
     let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
     let before = inliers.turn.map_or_else(Vector3::zeros, |turn| turn.rotation);
     let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
-    if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
+    let (again, turned) = if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
         let Some(turned) = own.turned else { return };
         let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, Effort::ROUGH);
-        *found = different(others.par_iter().map(again).chain([own.minimum]).collect());
-        *inliers = turned;
+        let again = different(others.par_iter().map(again).chain([own.minimum]).collect());
+        (again, turned)
     } else {
         let mut followed: Vec<Followed> = others.par_iter().map(follow).collect();
         followed.push(own);
@@ -191,9 +191,13 @@ pub(super) fn settle(
             let there = refine(&turned, other.minimum.motion, None, Effort::ROUGH);
             (there.motion.angle_to(&other.minimum.motion).to_degrees() < APART).then_some(there)
         };
-        *found = different(good.filter_map(again).chain([best.minimum]).collect());
-        *inliers = turned;
+        (different(good.filter_map(again).chain([best.minimum]).collect()), turned)
+    };
+    // Without a rotation that can be taken out the linear model's minima stay.
+    if again.is_empty() {
+        return;
     }
+    (*found, *inliers) = (again, turned);
     if let Some(turn) = inliers.turn {
         *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, turn) };
     }

@@ -36,14 +36,29 @@ impl Known {
     }
 }
 
+/// What a motion's covariance is made of: `own`, in which errors that the information takes for independent may go together, times `wider`, and what all flow has in `common`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grown {
+    pub own: Matrix5,
+    pub wider: f64,
+    pub common: Matrix5,
+}
+
+impl Grown {
+    /// Together.
+    pub fn covariance(&self) -> Matrix5 {
+        self.own * self.wider + self.common
+    }
+}
+
 /// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains it, or where the flow alone does not determine a motion.
 ///
-/// `information`: of the flow and of the known rotation together; `covariance`: that of the motion, in which errors that the information takes for independent may go together.
+/// `information`: of the flow and of the known rotation together.
 pub(super) fn contradiction(
     known: &Known,
     w: &Vector3<f64>,
     information: &Matrix5,
-    covariance: &Matrix5,
+    told: &Grown,
 ) -> Option<SVector<f64, 5>> {
     let mut of_flow = *information;
     add_to_rotation(&mut of_flow, &known.information, -1.0);
@@ -53,7 +68,9 @@ pub(super) fn contradiction(
     let apart = (before + alone.fixed_view::<3, 3>(2, 2)) * force;
     // What errors do to the motion they do to that of the flow alone, which nothing holds back, the more.
     let freed = alone * information;
-    let spread = freed * covariance * freed.transpose() + alone - freed * alone;
+    let own = freed * told.own * freed.transpose() + alone - freed * alone;
+    // Of both only the flow's noise may be larger than it is told.
+    let spread = own * told.wider + freed * told.common * freed.transpose();
     let expected = before + spread.fixed_view::<3, 3>(2, 2);
     let expected = 0.5 * (expected + expected.transpose());
     let square = apart.dot(&expected.cholesky()?.solve(&apart));
@@ -67,4 +84,27 @@ pub(super) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternat
     let found = refine(&alone, *motion, None, Effort::of(inliers.n)).motion;
     let cost = |motion: &Motion| equations(inliers, motion, &tangents(&motion.u()), None).cost;
     Alternative { motion: found, excess: cost(&found) - cost(motion) }
+}
+
+/// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to be added to that, and what the flow tells by itself.
+pub(super) fn rotation_contradiction(
+    known: &Known,
+    w: &Vector3<f64>,
+    plain: &Matrix3<f64>,
+    own: &Matrix3<f64>,
+    common: &Matrix3<f64>,
+) -> Option<(Matrix3<f64>, Alternative)> {
+    // With a direction that nothing depends on.
+    let whole = |rotation: &Matrix3<f64>, direction: f64| {
+        let mut matrix = Matrix5::identity() * direction;
+        matrix.fixed_view_mut::<3, 3>(2, 2).copy_from(rotation);
+        matrix
+    };
+    let information = whole(&plain.cholesky()?.inverse(), 1.0);
+    let told = Grown { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
+    let apart = contradiction(known, w, &information, &told)?.fixed_rows::<3>(2).into_owned();
+    let (alone, (force, before)) = (w - apart, known.pull(w));
+    let excess = known.pull(&alone).1 - before - force.dot(&apart);
+    let motion = Motion { translation: [f64::NAN; 3], rotation: alone.into() };
+    Some((apart * apart.transpose(), Alternative { motion, excess }))
 }

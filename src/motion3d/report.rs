@@ -7,7 +7,7 @@ use super::covariance::{Matrix5, Plugged, direction_deviation, plugged};
 use super::departure::departure;
 use super::efficient::Efficient;
 use super::kernels::{Depths, depths, equations, information};
-use super::known::contradiction;
+use super::known::{Grown, contradiction, rotation_contradiction};
 use super::likelihood::Candidate;
 use super::motion::Motion;
 use super::observations::Observations;
@@ -32,6 +32,8 @@ pub(super) struct Solution {
     pub covariance: Option<Matrix5>,
     /// What is in it of errors that all flow has in common.
     common: CommonEffect,
+    /// What it was made of.
+    grown: Option<Grown>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     likelihood: Likelihood,
@@ -56,6 +58,7 @@ impl Solution {
             tangent: minimum.tangent,
             covariance: plugged.map(|plugged| plugged.likelihood),
             common: CommonEffect::default(),
+            grown: None,
             status: Status::Ok,
             alternatives: Vec::new(),
             likelihood,
@@ -106,21 +109,22 @@ impl Solution {
 
     /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
     pub fn widen(&mut self, wider: f64, common: CommonEffect) {
-        self.covariance = self.covariance.map(|covariance| covariance * wider + common.added());
+        self.grown = self.covariance.map(|own| Grown { own, wider, common: common.added() });
+        self.covariance = self.grown.as_ref().map(Grown::covariance);
         self.common = common;
     }
 
     /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as far as the motion that the flow tells by itself.
     pub fn contradicted(&mut self, inliers: &Observations) -> bool {
-        let (Some(known), Some(covariance)) = (inliers.prior.as_ref(), self.covariance) else { return false };
+        let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
         let told = if let Some(nu) = &self.smooth {
             information(inliers, &self.motion, &self.tangent, nu, 0.0)
         } else {
             let here = equations(inliers, &self.motion, &self.tangent, None);
             here.h - here.p
         };
-        let Some(apart) = contradiction(known, &self.motion.w(), &told, &covariance) else { return false };
-        self.covariance = Some(covariance + apart * apart.transpose());
+        let Some(apart) = contradiction(known, &self.motion.w(), &told, grown) else { return false };
+        self.covariance = Some(grown.covariance() + apart * apart.transpose());
         true
     }
 
@@ -244,7 +248,15 @@ pub(super) fn rotation_report(
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
         covariance = turning(&covariance, inliers, &rotation.rotation, flow, length);
     }
-    covariance += options.common.added_to_rotation(&rotation.rotation, &moved);
+    let common = options.common.added_to_rotation(&rotation.rotation, &moved);
+    if let Some(known) = &inliers.prior
+        && let Some((added, alone)) =
+            rotation_contradiction(known, &rotation.rotation, &rotation.covariance, &covariance, &common)
+    {
+        covariance += added;
+        out.alternatives.push(alone);
+    }
+    covariance += common;
     turned(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
     let rest = |k: usize| {
         let row = all.row(k);

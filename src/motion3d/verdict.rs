@@ -90,6 +90,7 @@ pub(super) fn judge(
         let place = place.min(solution.alternatives.len());
         solution.alternatives.insert(place, Alternative { motion: rival.motion, excess: rival.excess });
     }
+    once(&mut solution.alternatives);
     let motions = [solution.motion, evidence.likelihood.0];
     solution.status = if inliers.n < FEW {
         Status::FewPoints
@@ -115,6 +116,16 @@ pub(super) fn judge(
     } else {
         Status::Ok
     };
+}
+
+/// Keeps each motion the first time that it comes.
+fn once(alternatives: &mut Vec<Alternative>) {
+    let mut kept: Vec<Alternative> = Vec::with_capacity(alternatives.len());
+    alternatives.retain(|other| {
+        let new = kept.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > SAME);
+        kept.extend(new.then_some(*other));
+        new
+    });
 }
 
 /// Whether the points are one plane that has another motion, too; that is then the first alternative.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._jacoflow import FlowField, _motion3d_beside, _motion3d_contact_map, _motion3d_field_patches, _motion3d_field_points
 from ._checks import Array, count, kind, number, word
 from ._estimate import estimate_motion
-from ._results import MotionEstimate
+from ._results import CommonEffect, MotionEstimate
 
 OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
 """What may be said of the estimate; what a field tells itself is refused by name."""
@@ -69,7 +69,7 @@ def estimate_field_motion(
     kind("field", field, FlowField)
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    if not number("turning", turning) > 0:
+    if not 0 < number("turning", turning) < float("inf"):
         raise ValueError(f"turning: expected a positive number, got {turning}")
     options = _own(options)
     if patches is not None:
@@ -146,6 +146,7 @@ def time_to_contact_map(
     kind("result", result, MotionEstimate)
     word("placement", placement)
     common = result.common_errors
+    kind("result.common_errors", common, CommonEffect)
     told = {
         "translation": result.translation,
         "rotation": result.rotation,

@@ -65,3 +65,44 @@ fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
         assert_eq!(found.status, Status::Ambiguous, "{seed}");
     }
 }
+
+/// The more surely a wrong rotation is told, the larger residuals it leaves: they are no reason to hear the flow less.
+#[test]
+fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
+    for noise in [Noise::Sigma(0.01), Noise::Unknown] {
+        for deviation in [1e-3, 1e-4, 1e-5] {
+            for seed in 0..10 {
+                let (scene, mut prior) = told(seed, 15.0);
+                let shape = |i: usize, j: usize| if i == j { deviation * deviation } else { 0.0 };
+                prior.covariance = std::array::from_fn(|i| std::array::from_fn(|j| shape(i, j)));
+                let options = MotionOptions {
+                    rotation_prior: Some(prior),
+                    placement: Placement::Start,
+                    ..MotionOptions::default()
+                };
+                let found = estimate_motion(&scene.flow(), &noise, &options).unwrap();
+                assert_ne!(found.status, Status::Ok, "{noise:?} {deviation} {seed}");
+            }
+        }
+    }
+}
+
+/// Of a rotation alone there is no direction to be unsure of: the covariance says it.
+#[test]
+fn a_rotation_alone_that_speaks_against_the_known_one_is_as_unsure() {
+    let still = |seed| Scene::new(oblique(), 300, 0.6, 0.01, seed, |_, _, _| 0.0);
+    for seed in 0..10 {
+        let (scene, (_, prior)) = (still(seed), told(seed, 15.0));
+        let run = |rotation_prior| {
+            let options = MotionOptions { rotation_prior, placement: Placement::Start, ..MotionOptions::default() };
+            estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap()
+        };
+        let (found, alone) = (run(Some(prior)), run(None));
+        assert_eq!((found.status, alone.status), (Status::RotationOnly, Status::RotationOnly), "{seed}");
+        let (told, own) = (Vector3::from(found.alternatives[0].motion.rotation), Vector3::from(alone.motion.rotation));
+        assert!((told - own).norm() < 0.2 * DEVIATION && found.alternatives[0].excess > 0.0, "{told} {own}");
+        let off = Vector3::from(found.motion.rotation) - Vector3::from(scene.motion.rotation);
+        let spread = nalgebra::Matrix3::from_fn(|i, j| found.covariance[2 + i][2 + j]);
+        assert!(off.dot(&(spread.try_inverse().unwrap() * off)) < 16.0, "{seed}: {off}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Displacements over a whole frame of fast turns.
 
 use super::super::*;
-use super::scenes::{ELLIPSOID, mahalanobis};
+use super::scenes::{ELLIPSOID, Scene, mahalanobis, oblique};
 use crate::math::random::CounterRng;
 use nalgebra::{Matrix3, Vector3};
 
@@ -253,5 +253,19 @@ fn exact_patches_give_the_exact_motion() {
         let patches = AffinePatches { points: &points, motion: &motion, covariances: &covariances, camera: None };
         let found = estimate_patch_motion(&patches, &MotionOptions::default()).unwrap();
         assert!(off(&found.motion, &truth) < 1e-7, "{turn} {scale}: {}", off(&found.motion, &truth));
+    }
+}
+
+/// Whatever the flow is, as displacements in pixels of points on the plane at distance 1 are: rotations that lead all points behind the camera are no reason to stop.
+#[test]
+fn flow_that_no_rotation_can_be_taken_out_of_is_no_reason_to_stop() {
+    for seed in 0..60 {
+        let scale = [1.0, 100.0, 1e5][seed as usize % 3];
+        let scene = Scene::new(oblique(), 12 + 20 * (seed as usize % 4), 0.5, scale, seed, |_, _, r| 0.5 + r);
+        for robust in [false, true] {
+            let options = MotionOptions { robust, ..MotionOptions::default() };
+            let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
+            assert_ne!(found.status, Status::TooFewPoints, "{seed}");
+        }
     }
 }
