@@ -67,7 +67,7 @@ pub enum Placement {
 
 /// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a thing that moves by itself.
 ///
-/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both. Where flow contradicts it beyond chance the status is ambiguous.
+/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both. Where flow contradicts it beyond chance the status is [`Ambiguous`](super::Status::Ambiguous); of a rotation alone the covariance and the alternative tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationPrior {
     /// Rotation rate `w`, rad/frame.

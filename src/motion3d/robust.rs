@@ -123,7 +123,7 @@ pub(super) struct Rival {
 /// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated, and the points are measured in it afterwards.
 pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let found = obeyed(scaled, rng)?;
-    Some(doubted(&scaled.observations, found, rng))
+    Some(with_doubts(&scaled.observations, found, rng))
 }
 
 fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
@@ -147,7 +147,7 @@ fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
 }
 
 fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
-    let fewer = some(observations, rng);
+    let fewer = first_asked(observations, rng);
     let on = fewer.as_ref().unwrap_or(observations);
     let candidates = candidates(on, rng)?;
     let &(best, _) = candidates.first()?;
@@ -190,12 +190,12 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
 }
 
 /// The same with the motion that it may be instead.
-fn doubted(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
+fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
     // Errors that go together look like other motions everywhere.
     if !observations.independent {
         return found;
     }
-    let fewer = some(observations, rng);
+    let fewer = first_asked(observations, rng);
     let inner = fewer.is_none();
     let mut on = fewer.unwrap_or_else(|| observations.clone());
     // Residuals that are cut off where noise told too small ends pull nowhere.
@@ -209,7 +209,7 @@ fn doubted(observations: &Observations, mut found: Consensus, rng: CounterRng) -
 }
 
 /// The points that a search begins with; `None` where it begins with all.
-fn some(observations: &Observations, rng: CounterRng) -> Option<Observations> {
+fn first_asked(observations: &Observations, rng: CounterRng) -> Option<Observations> {
     (observations.n > MANY).then(|| observations.subset(&sample(observations.n, FEWER, rng.stream(9))))
 }
 

@@ -67,7 +67,7 @@ def estimate_motion(
     weight_inv_depth : array (N,), units of |u| per frame
         Inverse depths for the weights, known from elsewhere, in any unit: a common factor is found, which is positive as the depths are. What is wrong with them costs variance, which the covariance tells, and causes no bias; where they have nothing to do with the flow's depths, `ml` is returned (`fell_back`). Points whose value is not finite are left out.
     rotation_prior : (rotation (3,) in rad/frame, covariance (3, 3))
-        The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides. Where the flow contradicts it by more than chance, the status is "ambiguous", what the flow tells by itself is among the `alternatives`, and the covariance reaches as far.
+        The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides. Where the flow contradicts it by more than chance, the status is "ambiguous", what the flow tells by itself is among the `alternatives`, and the covariance reaches as far; of a rotation alone the status stays "rotation_only", with both.
     initial : (translation (3,), rotation (3,) in rad/frame)
         Look for the minimum near this motion instead of everywhere.
     shared : float, no unit

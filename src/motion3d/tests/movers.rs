@@ -91,7 +91,7 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
     assert!(held.of >= 150 && held.honest() && wrong < 0.025, "{held:?}, {wrong}");
 }
 
-/// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene it may obey a third motion, at which every search ends. The residuals there are hardly larger than noise, but those of a part pull another way, and without that part a search ends elsewhere.
+/// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene it may obey a third motion, at which every search ends. The residuals there are hardly larger than noise, but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {
     let sigma = 1e-3;
