@@ -1,5 +1,6 @@
 //! Plain data: frames, masks, regions, flow fields. No algorithms.
 
+mod colour;
 mod field;
 mod frame;
 mod motion;
@@ -7,6 +8,7 @@ mod region;
 mod status;
 mod track;
 
+pub use colour::{AnyColourFrame, ColourFrame};
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};
