@@ -38,6 +38,7 @@
 
 mod extended;
 mod kalman;
+pub mod particle;
 mod sigma_points;
 mod state;
 #[cfg(test)]

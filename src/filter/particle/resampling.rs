@@ -1,0 +1,281 @@
+//! Resampling (selection): particles are copied in proportion to their weights.
+//!
+//! Schemes: R. Douc, O. Cappé, E. Moulines, "Comparison of resampling schemes for particle filtering", 2005. In each the expected number of
+//! copies of particle i is `count w_i`; they differ in its variance.
+
+use crate::error::{Error, Result};
+use crate::math::random::CounterRng;
+use serde::{Deserialize, Serialize};
+
+/// How particles are selected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Resampling {
+    /// Independent draws: the largest variance, `count w (1 - w)`.
+    Multinomial,
+    /// One position in each of `count` equal intervals, each with its own uniform number.
+    Stratified,
+    /// Positions `(i + u) / count` with one uniform number for all: copies differ from `count w` by less than 1.
+    #[default]
+    Systematic,
+    /// `floor(count w)` copies of each, the rest by independent draws from the remainders (J. S. Liu and R. Chen 1998).
+    Residual,
+}
+
+impl Resampling {
+    /// Every scheme.
+    pub const ALL: [Self; 4] = [Self::Multinomial, Self::Stratified, Self::Systematic, Self::Residual];
+
+    /// Name in options and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Multinomial => "multinomial",
+            Self::Stratified => "stratified",
+            Self::Systematic => "systematic",
+            Self::Residual => "residual",
+        }
+    }
+
+    /// The scheme called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `resampling`.
+    pub fn parse(name: &str) -> Result<Self> {
+        let names = || Self::ALL.map(|scheme| format!("\"{}\"", scheme.name())).join(", ");
+        let found = Self::ALL.into_iter().find(|scheme| scheme.name() == name);
+        found.ok_or_else(|| Error::argument("resampling", format!("one of {}", names()), format!("{name:?}")))
+    }
+
+    /// Largest number of uniform numbers that a selection of `count` particles takes.
+    pub fn uniforms(self, count: usize) -> usize {
+        if self == Self::Systematic { count.min(1) } else { count }
+    }
+
+    /// `count` indices of particles by the uniform numbers of `rng`, into `out`; see [`resample_indices`].
+    pub fn indices(self, weights: &[f64], count: usize, rng: &CounterRng, out: &mut Vec<usize>) {
+        resample_indices(self, weights, count, |i| rng.uniform(i), out);
+    }
+}
+
+/// `count` indices of particles, into `out`, by `scheme` and the numbers `uniform(0), uniform(1), ...` in [0, 1].
+///
+/// `weights` are linear and need not be normalised. A position t in [0, 1] selects the first particle with a weight above zero whose
+/// cumulative weight is at least t times the sum. Indices ascend, except that multinomial draws keep the order of their numbers, as do
+/// those at the end of residual resampling. A weight that is negative or NaN counts as zero. `out` stays empty if no weight is positive.
+pub fn resample_indices(
+    scheme: Resampling,
+    weights: &[f64],
+    count: usize,
+    uniform: impl Fn(u64) -> f64,
+    out: &mut Vec<usize>,
+) {
+    out.clear();
+    let share = |i: usize, u: f64| (i as f64 + u) / count as f64;
+    match scheme {
+        Resampling::Multinomial => draw(&Cumulative::new(weights.iter().copied()), count, uniform, out),
+        Resampling::Stratified => walk(weights, (0..count).map(|i| share(i, uniform(i as u64))), out),
+        Resampling::Systematic => {
+            let u = uniform(0);
+            walk(weights, (0..count).map(|i| share(i, u)), out);
+        }
+        Resampling::Residual => residual(weights, count, uniform, out),
+    }
+}
+
+/// Cumulative weights of particles.
+struct Cumulative {
+    sums: Vec<f64>,
+    /// The last particle with a weight above zero.
+    last: Option<usize>,
+}
+
+impl Cumulative {
+    fn new(weights: impl Iterator<Item = f64>) -> Self {
+        let (mut total, mut last) = (0.0, None);
+        let sums = weights.enumerate().map(|(i, weight)| {
+            if weight > 0.0 {
+                (total, last) = (total + weight, Some(i));
+            }
+            total
+        });
+        Self { sums: sums.collect(), last }
+    }
+
+    fn total(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// The particle of each ascending position, in one pass.
+fn walk(weights: &[f64], positions: impl Iterator<Item = f64>, out: &mut Vec<usize>) {
+    let cumulative = Cumulative::new(weights.iter().copied());
+    let (Some(last), total) = (cumulative.last, cumulative.total()) else { return };
+    let mut j = 0;
+    out.extend(positions.map(|position| {
+        let target = position * total;
+        // A sum of zero belongs to particles before the first weight above zero.
+        while j < last && (cumulative.sums[j] < target || cumulative.sums[j] == 0.0) {
+            j += 1;
+        }
+        j
+    }));
+}
+
+/// `count` independent draws, by bisection.
+fn draw(cumulative: &Cumulative, count: usize, uniform: impl Fn(u64) -> f64, out: &mut Vec<usize>) {
+    let (Some(last), total) = (cumulative.last, cumulative.total()) else { return };
+    out.extend((0..count as u64).map(|i| {
+        let target = uniform(i) * total;
+        cumulative.sums.partition_point(|&sum| sum < target || sum == 0.0).min(last)
+    }));
+}
+
+/// Whole copies first, then independent draws from what is left of each weight.
+fn residual(weights: &[f64], count: usize, uniform: impl Fn(u64) -> f64, out: &mut Vec<usize>) {
+    let total: f64 = weights.iter().filter(|weight| **weight > 0.0).sum();
+    if total <= 0.0 {
+        return;
+    }
+    let expected = |weight: f64| count as f64 * (weight.max(0.0) / total);
+    for (i, &weight) in weights.iter().enumerate() {
+        // Rounding may make the whole copies one too many.
+        let copies = (expected(weight).floor() as usize).min(count - out.len());
+        out.extend(std::iter::repeat_n(i, copies));
+    }
+    if out.len() < count {
+        let rest = Cumulative::new(weights.iter().map(|&weight| expected(weight).fract()));
+        draw(&rest, count - out.len(), uniform, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const WEIGHTS: [f64; 4] = [0.1, 0.2, 0.3, 0.4];
+
+    fn select(scheme: Resampling, weights: &[f64], count: usize, uniforms: &[f64]) -> Vec<usize> {
+        let mut out = vec![9];
+        resample_indices(scheme, weights, count, |i| uniforms[i as usize], &mut out);
+        out
+    }
+
+    /// The first particle with a positive weight whose cumulative weight reaches `target`.
+    fn naive(weights: &[f64], target: f64) -> usize {
+        let mut sum = 0.0;
+        for (i, weight) in weights.iter().enumerate() {
+            sum += weight;
+            if sum >= target && *weight > 0.0 {
+                return i;
+            }
+        }
+        weights.iter().rposition(|weight| *weight > 0.0).unwrap()
+    }
+
+    #[test]
+    fn systematic_case_without_random_numbers() {
+        assert_eq!(select(Resampling::Systematic, &WEIGHTS, 8, &[0.3]), [0, 1, 1, 2, 2, 3, 3, 3]);
+    }
+
+    #[test]
+    fn residual_copies_the_whole_part_and_draws_the_rest() {
+        // Expected copies 0.8, 1.6, 2.4, 3.2: remainders 0.8, 0.6, 0.4, 0.2 of 2 draws.
+        assert_eq!(select(Resampling::Residual, &WEIGHTS, 8, &[0.95, 0.1]), [1, 2, 2, 3, 3, 3, 3, 0]);
+        // Halves are exact in binary: no draw is left.
+        assert_eq!(select(Resampling::Residual, &[0.25, 0.5, 0.25], 4, &[]), [0, 1, 1, 2]);
+    }
+
+    #[test]
+    fn copies_have_the_published_mean_and_variance() {
+        let published = [
+            (Resampling::Multinomial, [0.72, 1.28, 1.68, 1.92]),
+            (Resampling::Stratified, [0.16, 0.40, 0.40, 0.16]),
+            (Resampling::Systematic, [0.16, 0.24, 0.24, 0.16]),
+            // Two draws from the remainders (.8, .6, .4, .2) / 2: variance 2 p (1 - p).
+            (Resampling::Residual, [0.48, 0.42, 0.32, 0.18]),
+        ];
+        const DRAWS: u64 = 20_000;
+        for (scheme, variances) in published {
+            let (mut sums, mut squares, mut out) = ([0.0; 4], [0.0; 4], vec![]);
+            for draw in 0..DRAWS {
+                scheme.indices(&WEIGHTS, 8, &CounterRng::new(3).stream(draw), &mut out);
+                for i in 0..4 {
+                    let copies = out.iter().filter(|&&j| j == i).count() as f64;
+                    sums[i] += copies;
+                    squares[i] += copies * copies;
+                }
+            }
+            for i in 0..4 {
+                let mean = sums[i] / DRAWS as f64;
+                let variance = squares[i] / DRAWS as f64 - mean * mean;
+                assert!((mean - 8.0 * WEIGHTS[i]).abs() < 0.02, "{}: mean {mean} of {i}", scheme.name());
+                assert!((variance - variances[i]).abs() < 0.05, "{}: variance {variance} of {i}", scheme.name());
+            }
+        }
+    }
+
+    #[test]
+    fn zero_weights_are_never_selected() {
+        let weights = [0.0, 0.5, f64::NAN, 0.0, 0.5, -1.0, 0.0];
+        for scheme in Resampling::ALL {
+            for u in [0.0, 0.5, 1.0 - f64::EPSILON / 2.0, 1.0] {
+                let indices = select(scheme, &weights, 6, &[u; 6]);
+                assert!(
+                    indices.len() == 6 && indices.iter().all(|i| [1, 4].contains(i)),
+                    "{} {indices:?}",
+                    scheme.name()
+                );
+            }
+            assert!(select(scheme, &[0.0, f64::NAN], 3, &[0.5; 3]).is_empty());
+            assert!(select(scheme, &[], 3, &[0.5; 3]).is_empty() && select(scheme, &[1.0], 0, &[0.5]).is_empty());
+        }
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for scheme in Resampling::ALL {
+            assert_eq!(Resampling::parse(scheme.name()).unwrap(), scheme);
+        }
+        let message = Resampling::parse("fair").unwrap_err().to_string();
+        assert!(message.starts_with("resampling: expected one of \"multinomial\", ") && message.ends_with("\"fair\""));
+    }
+
+    proptest! {
+        #[test]
+        fn positions_select_as_the_naive_search_does(
+            weights in prop::collection::vec(prop_oneof![Just(0.0), 0.01f64..1.0], 1..30),
+            uniforms in prop::collection::vec(0.0f64..1.0, 50),
+            count in 1usize..50,
+        ) {
+            let total: f64 = weights.iter().sum();
+            prop_assume!(total > 0.0);
+            for (i, j) in select(Resampling::Multinomial, &weights, count, &uniforms).into_iter().enumerate() {
+                prop_assert_eq!(j, naive(&weights, uniforms[i] * total));
+            }
+            for (i, j) in select(Resampling::Stratified, &weights, count, &uniforms).into_iter().enumerate() {
+                prop_assert_eq!(j, naive(&weights, (i as f64 + uniforms[i]) / count as f64 * total));
+            }
+            for (i, j) in select(Resampling::Systematic, &weights, count, &uniforms).into_iter().enumerate() {
+                prop_assert_eq!(j, naive(&weights, (i as f64 + uniforms[0]) / count as f64 * total));
+            }
+        }
+
+        #[test]
+        fn systematic_and_residual_copies_are_near_their_expectation(
+            weights in prop::collection::vec(0.0f64..1.0, 1..30), count in 1usize..60, seed in 0u64..1000
+        ) {
+            let total: f64 = weights.iter().sum();
+            prop_assume!(total > 0.0);
+            for scheme in [Resampling::Systematic, Resampling::Residual] {
+                let mut out = vec![];
+                scheme.indices(&weights, count, &CounterRng::new(seed), &mut out);
+                prop_assert_eq!(out.len(), count);
+                for (i, weight) in weights.iter().enumerate() {
+                    let (copies, expected) = (out.iter().filter(|&&j| j == i).count() as f64, count as f64 * weight / total);
+                    prop_assert!(copies > expected - 1.0 - 1e-9);
+                    prop_assert!(scheme != Resampling::Systematic || copies < expected + 1.0 + 1e-9);
+                }
+            }
+        }
+    }
+}

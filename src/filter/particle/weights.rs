@@ -1,0 +1,90 @@
+//! Weights of particles: normalisation in logarithms and the effective sample size.
+
+/// Normalises log weights so that their exponentials sum to 1, by log-sum-exp; returns the logarithm of the sum before.
+///
+/// NaN counts as `-inf`, a weight of zero. With `w_i L_i` given, `w` normalised, the result is the log evidence `log sum_i w_i L_i`.
+/// `None`, and nothing is changed, if no weight is above zero or if one is `+inf`: these cannot be normalised.
+pub fn normalise_log_weights(log_weights: &mut [f64]) -> Option<f64> {
+    let largest = log_weights.iter().fold(f64::NEG_INFINITY, |most, &value| most.max(value));
+    if !largest.is_finite() {
+        return None;
+    }
+    let sum: f64 = log_weights.iter().filter(|value| !value.is_nan()).map(|value| (value - largest).exp()).sum();
+    let log_sum = largest + sum.ln();
+    for value in log_weights {
+        *value = if value.is_nan() { f64::NEG_INFINITY } else { *value - log_sum };
+    }
+    Some(log_sum)
+}
+
+/// `exp` of each log weight, into `out`.
+pub fn linear_weights(log_weights: &[f64], out: &mut Vec<f64>) {
+    out.clear();
+    out.extend(log_weights.iter().map(|value| value.exp()));
+}
+
+/// Effective sample size `(sum w)^2 / sum w^2` of linear weights, from 1 to their number; `1 / sum w^2` where they are normalised.
+///
+/// Source: A. Kong, J. S. Liu, W. H. Wong, "Sequential imputations and Bayesian missing data problems", 1994. 0 if every weight is 0.
+pub fn effective_sample_size(weights: &[f64]) -> f64 {
+    effective(weights.iter().copied())
+}
+
+/// [`effective_sample_size`] of normalised log weights.
+pub(super) fn effective_sample_size_of_logs(log_weights: &[f64]) -> f64 {
+    effective(log_weights.iter().map(|value| value.exp()))
+}
+
+fn effective(weights: impl Iterator<Item = f64>) -> f64 {
+    let (sum, squares) = weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
+    if squares > 0.0 { sum * sum / squares } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn ten_thirds_of_four_particles_are_effective() {
+        assert!((effective_sample_size(&[0.1, 0.2, 0.3, 0.4]) - 10.0 / 3.0).abs() < 1e-14);
+        assert_eq!((effective_sample_size(&[2.0; 5]), effective_sample_size(&[0.0, 0.0])), (5.0, 0.0));
+    }
+
+    #[test]
+    fn nan_is_a_weight_of_zero_and_huge_logarithms_do_not_overflow() {
+        let mut logs = [f64::NAN, -5000.0, f64::NEG_INFINITY, -5000.0 + 3.0f64.ln()];
+        let sum = normalise_log_weights(&mut logs).unwrap();
+        assert!((sum - (-5000.0 + 4.0f64.ln())).abs() < 1e-11);
+        assert_eq!((logs[0], logs[2]), (f64::NEG_INFINITY, f64::NEG_INFINITY));
+        assert!((logs[1] - 0.25f64.ln()).abs() < 1e-11 && (logs[3] - 0.75f64.ln()).abs() < 1e-11);
+    }
+
+    #[test]
+    fn weights_that_cannot_be_normalised_stay() {
+        let (nan, none) = (f64::NAN, f64::NEG_INFINITY);
+        for given in [[nan, nan], [none, none], [nan, none], [0.0, f64::INFINITY]] {
+            let mut logs = given;
+            assert_eq!(normalise_log_weights(&mut logs), None);
+            assert_eq!(logs.map(f64::to_bits), given.map(f64::to_bits));
+        }
+        assert_eq!(normalise_log_weights(&mut []), None);
+    }
+
+    proptest! {
+        #[test]
+        fn normalised_weights_are_those_of_division(
+            weights in prop::collection::vec(1e-6f64..1.0, 1..40), shift in -600.0f64..600.0
+        ) {
+            let mut logs: Vec<f64> = weights.iter().map(|w| w.ln() + shift).collect();
+            let sum: f64 = weights.iter().sum();
+            prop_assert!((normalise_log_weights(&mut logs).unwrap() - (sum.ln() + shift)).abs() < 1e-10);
+            for (log, weight) in logs.iter().zip(&weights) {
+                prop_assert!((log.exp() - weight / sum).abs() < 1e-11);
+            }
+            let ess = effective_sample_size_of_logs(&logs);
+            prop_assert!((ess - effective_sample_size(&weights)).abs() < 1e-9 * ess);
+            prop_assert!(ess > 1.0 - 1e-9 && ess < weights.len() as f64 + 1e-9);
+        }
+    }
+}
