@@ -1,6 +1,7 @@
 //! The lower bound of the evidence, which every round raises.
 
-use super::posterior::{Factors, Posterior};
+use super::densities::Factors;
+use super::posterior::Posterior;
 use super::prior::Prior;
 use crate::error::Result;
 use crate::math::special::ln_gamma;
@@ -54,13 +55,30 @@ pub(super) fn lower_bound(
     factors: &Factors,
     (negentropy, total): (f64, f64),
 ) -> f64 {
-    let (d, components) = (posterior.dimensions, posterior.components());
-    let concentration = log_dirichlet(&vec![prior.weight_concentration; components]);
-    let mut sum = -negentropy + concentration - log_dirichlet(&posterior.weight_concentration);
-    for k in 0..components {
+    let concentration = log_dirichlet(&vec![prior.weight_concentration; posterior.components()]);
+    let sum = -negentropy + concentration - log_dirichlet(&posterior.weight_concentration);
+    with_gaussians(sum, prior, terms, posterior, factors) - gaussian_constant(posterior.dimensions, total)
+}
+
+/// `sum` and what the bound has of every Gaussian: `ln B(W0, nu0) - ln B(W_k, nu_k) + D / 2 ln (beta0 / beta_k)`. Less [`gaussian_constant`] that is the log evidence of the points, as they
+/// are divided among the components.
+pub(super) fn with_gaussians(
+    mut sum: f64,
+    prior: &Prior,
+    terms: &PriorTerms,
+    posterior: &Posterior,
+    factors: &Factors,
+) -> f64 {
+    let d = posterior.dimensions;
+    for k in 0..posterior.components() {
         let own = log_wishart(factors.log_determinants[k], posterior.degrees_of_freedom[k], d);
         let precision = 0.5 * d as f64 * (prior.mean_precision / posterior.mean_precision[k]).ln();
         sum += terms.log_wishart - own + precision;
     }
-    sum - 0.5 * d as f64 * total * TAU.ln()
+    sum
+}
+
+/// `D F / 2 ln 2 pi`, F the weight of all points.
+pub(super) fn gaussian_constant(d: usize, total: f64) -> f64 {
+    0.5 * d as f64 * total * TAU.ln()
 }

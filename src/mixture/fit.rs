@@ -1,18 +1,17 @@
 //! Rounds of M and E steps until the lower bound stands.
 
 use super::bound::{PriorTerms, lower_bound};
+use super::densities::{Densities, Factors};
 use super::expectation::{Expected, expect};
 use super::moments::Moments;
 use super::options::{MixtureOptions, Seeding};
 use super::points::{Planes, Points};
-use super::posterior::{Densities, Factors, Posterior};
+use super::posterior::Posterior;
 use super::prior::Prior;
 use super::seeding;
-use crate::error::{Error, Result};
+use super::start::{from_labels, from_shares};
+use crate::error::Result;
 use crate::math::random::CounterRng;
-
-/// How far from 1 the responsibilities of a point may sum up.
-const SUM_TOLERANCE: f64 = 1e-6;
 
 /// Where a fit begins.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +59,9 @@ pub fn fit(points: &Points, options: &MixtureOptions, start: Start) -> Result<Fi
     let problem = Problem::new(points, points.mean(), prior, options, None)?;
     options.threads.install(|| match start {
         Start::Seeds => best_of_seeds(points, &problem),
-        Start::Responsibilities(shares) => problem.rounds(from_shares(points, &problem, shares, options.components)?),
+        Start::Responsibilities(shares) => {
+            problem.rounds(from_shares(points, &problem.planes.centre, options.components, shares)?)
+        }
         Start::Components(posterior) => {
             posterior.check(points.dimensions)?;
             let posterior = posterior.clone().moved(&problem.planes.centre, -1.0);
@@ -73,15 +74,14 @@ pub fn fit(points: &Points, options: &MixtureOptions, start: Start) -> Result<Fi
 /// The best of `n_init` fits.
 pub(super) fn best_of_seeds(points: &Points, problem: &Problem) -> Result<Fit> {
     let options = problem.options;
+    let (centre, components) = (&problem.planes.centre, options.components);
     let rng = CounterRng::new(options.seed);
     let mut best: Option<Fit> = None;
     for init in 0..options.n_init {
         let stream = rng.stream(init as u64);
         let expected = match options.seeding {
-            Seeding::KMeans => from_labels(points, problem, &seeding::k_means(points, options.components, stream)),
-            Seeding::Random => {
-                from_shares(points, problem, &seeding::random(points, options.components, stream), options.components)?
-            }
+            Seeding::KMeans => from_labels(points, centre, components, &seeding::k_means(points, components, stream)),
+            Seeding::Random => from_shares(points, centre, components, &seeding::random(points, components, stream))?,
         };
         let fit = problem.rounds(expected)?;
         if best.as_ref().is_none_or(|best| fit.lower_bound() > best.lower_bound()) {
@@ -89,36 +89,6 @@ pub(super) fn best_of_seeds(points: &Points, problem: &Problem) -> Result<Fit> {
         }
     }
     Ok(best.expect("n_init is positive"))
-}
-
-/// What an E step would have left that gave every point to one component.
-fn from_labels(points: &Points, problem: &Problem, labels: &[usize]) -> Expected {
-    let centre = &problem.planes.centre;
-    let moments = Moments::of(points, centre, problem.options.components, |n, take| take(labels[n], 1.0));
-    Expected { moments, negentropy: 0.0 }
-}
-
-/// What an E step with these responsibilities would have left.
-fn from_shares(points: &Points, problem: &Problem, shares: &[f64], components: usize) -> Result<Expected> {
-    if shares.len() != points.count() * components {
-        let expected = format!("responsibilities ({}, {components})", points.count());
-        return Err(Error::argument("resp", expected, format!("{} numbers", shares.len())));
-    }
-    if let Some(share) = shares.iter().find(|r| !(r.is_finite() && **r >= 0.0)) {
-        return Err(Error::argument("resp", "finite responsibilities that are not negative", share));
-    }
-    let sums = shares.chunks_exact(components).map(|row| row.iter().sum::<f64>());
-    if let Some((n, sum)) = sums.enumerate().find(|(_, sum)| (sum - 1.0).abs() > SUM_TOLERANCE) {
-        return Err(Error::argument("resp", "rows that sum to 1", format!("{sum} in row {n}")));
-    }
-    let entropy = |row: &[f64]| row.iter().filter(|r| **r > 0.0).map(|r| r * r.ln()).sum::<f64>();
-    let rows = shares.chunks_exact(components).enumerate();
-    let negentropy = rows.map(|(n, row)| points.weight(n) * entropy(row)).sum();
-    let moments = Moments::of(points, &problem.planes.centre, components, |n, take| {
-        let row = &shares[n * components..(n + 1) * components];
-        row.iter().enumerate().filter(|(_, share)| **share > 0.0).for_each(|(k, share)| take(k, *share));
-    });
-    Ok(Expected { moments, negentropy })
 }
 
 /// What earlier points left: their sums about the planes' centre, negative entropy and total weight.

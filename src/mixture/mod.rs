@@ -1,4 +1,4 @@
-//! Mixtures of Gaussians fitted by variational Bayes, with weighted points.
+//! Mixtures of Gaussians for weighted points: with a Dirichlet prior on the proportions by variational Bayes ([`fit()`]), and Dirichlet-process mixtures ([`fit_dirichlet`]).
 //!
 //! A mixture of K Gaussians in D dimensions with a Dirichlet prior on its proportions and Gauss-Wishart priors on means and precisions; q(Z) q(pi, mu, Lambda) approximates its posterior (C. Bishop, "Pattern Recognition and Machine
 //! Learning", 2006, section 10.2; equations (6) to (28) of the stereo paper, which adds the weights). A point's weight is evidence: a weight of 3 is the point three times. Surplus components lose their points and go back to the prior.
@@ -18,6 +18,8 @@
 //! ```
 
 mod bound;
+mod densities;
+mod dirichlet;
 mod expectation;
 mod fit;
 mod moments;
@@ -27,9 +29,11 @@ mod points;
 mod posterior;
 mod prior;
 mod seeding;
+mod start;
 #[cfg(test)]
 mod tests;
 
+pub use dirichlet::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
 pub use fit::{Fit, Start, fit};
 pub use moments::Moments;
 pub use online::{Retained, partial_fit};

@@ -94,6 +94,28 @@ impl Moments {
         all
     }
 
+    /// The components in another order: component k of the result is component `order[k]`. Fewer or more than all of them are allowed.
+    pub(super) fn reordered(&self, order: &[usize]) -> Self {
+        let d = self.dimensions;
+        let rows = |values: &[f64], length: usize| -> Vec<f64> {
+            order.iter().flat_map(|k| &values[k * length..(k + 1) * length]).copied().collect()
+        };
+        Self {
+            dimensions: d,
+            counts: rows(&self.counts, 1),
+            means: rows(&self.means, d),
+            scatters: rows(&self.scatters, d * d),
+        }
+    }
+
+    /// Puts the only component of `one` in the place of component `k`.
+    pub(super) fn replace(&mut self, k: usize, one: &Self) {
+        let d = self.dimensions;
+        self.counts[k] = one.counts[0];
+        self.means[k * d..(k + 1) * d].copy_from_slice(&one.means);
+        self.scatters[k * d * d..(k + 1) * d * d].copy_from_slice(&one.scatters);
+    }
+
     /// Only the components for which `keep` holds.
     pub(super) fn retain(&mut self, keep: &[bool]) {
         let d = self.dimensions;

@@ -1,12 +1,11 @@
-//! What is believed of the components after the M step, and what densities that means.
+//! What is believed of the components after the M step.
 
+use super::densities::{Densities, Factors, inverse_of_lower};
 use super::moments::{Moments, keep_rows};
-use super::points::{BAND, Points};
+use super::points::Points;
 use super::prior::Prior;
 use crate::error::{Error, Result};
-use crate::math::dense;
 use crate::math::special::digamma;
-use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 
 /// The posterior of every component: `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k ~ W(W_k, nu_k)` (24).
@@ -162,56 +161,18 @@ impl Posterior {
     pub fn log_densities(&self, points: &Points) -> Result<(Vec<f64>, Vec<f64>)> {
         points.check_values()?;
         self.check(points.dimensions)?;
-        let densities = Densities::of(self, &Factors::of(self)?);
-        let components = self.components();
-        let mut shares = vec![0.0; points.count() * components];
-        let mut sums = vec![0.0; points.count()];
-        let bands = shares.par_chunks_mut(BAND * components).zip(sums.par_chunks_mut(BAND)).enumerate();
-        bands.for_each(|(band, (shares, sums))| {
-            for (n, (row, sum)) in shares.chunks_exact_mut(components).zip(sums).enumerate() {
-                *sum = densities.share(points.at(band * BAND + n), row);
-            }
-        });
-        Ok((sums, shares))
+        Ok(Densities::of(self, &Factors::of(self)?).log_densities(points))
     }
-}
-
-/// Lower Cholesky factors of the `W_k^-1`, and `ln |W_k^-1|`.
-#[derive(Debug)]
-pub(super) struct Factors {
-    pub lower: Vec<f64>,
-    pub log_determinants: Vec<f64>,
 }
 
 impl Factors {
+    /// Those of the `W_k^-1`.
+    ///
     /// # Errors
     /// [`Error::Numerical`] for a matrix that cannot be mended.
     pub fn of(posterior: &Posterior) -> Result<Self> {
-        let d = posterior.dimensions;
-        let mut lower = vec![0.0; posterior.scale_inverses.len()];
-        for (k, (matrix, l)) in
-            posterior.scale_inverses.chunks_exact(d * d).zip(lower.chunks_exact_mut(d * d)).enumerate()
-        {
-            if !dense::cholesky(matrix, d, l) && dense::factor(&mut matrix.to_vec(), d, l).is_none() {
-                return Err(Error::Numerical(format!("the covariance of component {k} is not positive definite")));
-            }
-        }
-        let log_determinants =
-            lower.chunks_exact(d * d).map(|l| 2.0 * (0..d).map(|i| l[i * (d + 1)].ln()).sum::<f64>()).collect();
-        Ok(Self { lower, log_determinants })
+        Self::of_matrices(&posterior.scale_inverses, posterior.dimensions)
     }
-}
-
-/// `ln rho_nk = constant_k - |A_k (x_n - m_k)|^2` (14) with `A_k^T A_k = nu_k W_k / 2`, lower triangular.
-#[derive(Debug)]
-pub(super) struct Densities {
-    pub dimensions: usize,
-    /// (K).
-    pub constants: Vec<f64>,
-    /// (K, D).
-    pub means: Vec<f64>,
-    /// Rows of the lower triangles, one after another: (K, D (D + 1) / 2).
-    pub whitening: Vec<f64>,
 }
 
 impl Densities {
@@ -236,60 +197,4 @@ impl Densities {
         }
         Self { dimensions: d, constants, means: posterior.means.clone(), whitening }
     }
-
-    /// K.
-    pub fn components(&self) -> usize {
-        self.constants.len()
-    }
-
-    /// Values of a lower triangle.
-    pub fn triangle(&self) -> usize {
-        self.dimensions * (self.dimensions + 1) / 2
-    }
-
-    /// `ln rho` of one point under one component.
-    fn log_density(&self, k: usize, x: &[f64]) -> f64 {
-        let mean = &self.means[k * self.dimensions..];
-        let mut rows = &self.whitening[k * self.triangle()..];
-        let mut square = 0.0;
-        for i in 0..self.dimensions {
-            let (row, rest) = rows.split_at(i + 1);
-            let z: f64 = row.iter().zip(x.iter().zip(mean)).map(|(a, (x, m))| a * (x - m)).sum();
-            square += z * z;
-            rows = rest;
-        }
-        self.constants[k] - square
-    }
-
-    /// Shares of the components in one point (K); returns `ln sum_k rho_k`.
-    pub fn share(&self, x: &[f64], shares: &mut [f64]) -> f64 {
-        for (k, share) in shares.iter_mut().enumerate() {
-            *share = self.log_density(k, x);
-        }
-        let most = shares.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let mut sum = 0.0;
-        for share in shares.iter_mut() {
-            *share = (*share - most).exp();
-            sum += *share;
-        }
-        for share in shares.iter_mut() {
-            *share /= sum;
-        }
-        most + sum.ln()
-    }
-}
-
-/// `l^-1` of a lower triangular matrix, row-major.
-fn inverse_of_lower(l: &[f64], d: usize) -> Vec<f64> {
-    let mut inverse = vec![0.0; d * d];
-    let mut column = vec![0.0; d];
-    for j in 0..d {
-        column.fill(0.0);
-        column[j] = 1.0;
-        dense::forward(l, d, &mut column);
-        for i in 0..d {
-            inverse[i * d + j] = column[i];
-        }
-    }
-    inverse
 }

@@ -47,13 +47,15 @@ impl Prior {
                 CovariancePrior::Full(matrix) => matrix.clone(),
             },
         };
-        this.check(dimensions)?;
+        this.check(dimensions, "degrees_of_freedom_prior")?;
         Ok(this)
     }
 
+    /// `freedom`: how the caller calls the degrees of freedom.
+    ///
     /// # Errors
     /// As [`Prior::resolve`].
-    fn check(&self, dimensions: usize) -> Result<()> {
+    pub(super) fn check(&self, dimensions: usize, freedom: &'static str) -> Result<()> {
         if self.mean.len() != dimensions || self.mean.iter().any(|m| !m.is_finite() || m.abs() > LARGEST) {
             let got = format!("{:?}", self.mean);
             return Err(Error::argument("mean_prior", format!("{dimensions} finite numbers up to {LARGEST:e}"), got));
@@ -61,7 +63,7 @@ impl Prior {
         let least = dimensions as f64 - 1.0;
         if !(self.degrees_of_freedom.is_finite() && self.degrees_of_freedom > least) {
             let expected = format!("a finite number above {least}");
-            return Err(Error::argument("degrees_of_freedom_prior", expected, self.degrees_of_freedom));
+            return Err(Error::argument(freedom, expected, self.degrees_of_freedom));
         }
         let expected = format!("a symmetric positive definite matrix ({dimensions}, {dimensions})");
         if self.scale_inverse.len() != dimensions * dimensions {
@@ -79,13 +81,13 @@ impl Prior {
     }
 }
 
-fn scaled_identity(n: usize, value: f64) -> Vec<f64> {
+pub(super) fn scaled_identity(n: usize, value: f64) -> Vec<f64> {
     (0..n * n).map(|at| if at % (n + 1) == 0 { value } else { 0.0 }).collect()
 }
 
 /// Weighted covariance of the points, over the sum of the weights less one, so that weights are repetitions, or over half of that sum where that is more: below 2 there is nothing
 /// to repeat, and the prior must not jump where the weights pass it. Raised where the points lie in a plane.
-fn data_covariance(points: &Points) -> Vec<f64> {
+pub(super) fn data_covariance(points: &Points) -> Vec<f64> {
     let d = points.dimensions;
     let mean = points.mean();
     let mut sums = vec![0.0; d * d];

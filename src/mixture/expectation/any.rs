@@ -1,8 +1,8 @@
 //! The E step in lanes for any number of dimensions: differences of a block are kept in memory and read for two rows of a matrix at a time, so that reading is not what it waits for.
 
 use super::{Sums, shares};
+use crate::mixture::densities::Densities;
 use crate::mixture::points::{BLOCK, Planes};
-use crate::mixture::posterior::Densities;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 

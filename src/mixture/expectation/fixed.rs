@@ -1,8 +1,8 @@
 //! The E step in lanes for few dimensions, whose sums stay in registers.
 
 use super::{Sums, shares};
+use crate::mixture::densities::Densities;
 use crate::mixture::points::{BLOCK, Planes};
-use crate::mixture::posterior::Densities;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 

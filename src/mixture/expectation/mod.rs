@@ -3,9 +3,9 @@
 mod any;
 mod fixed;
 
+use super::densities::Densities;
 use super::moments::Moments;
 use super::points::{BAND, BLOCK, Planes};
-use super::posterior::Densities;
 use crate::simd::{Lanes, Level, dispatch, exp};
 use any::AnyBand;
 use fixed::Band;
@@ -127,8 +127,9 @@ fn exponentials<V: Lanes<Scalar = f64>>(
 mod tests {
     use super::*;
     use crate::math::random::CounterRng;
+    use crate::mixture::densities::Factors;
     use crate::mixture::points::Points;
-    use crate::mixture::posterior::{Factors, Posterior};
+    use crate::mixture::posterior::Posterior;
     use crate::mixture::prior::Prior;
 
     /// The sums for any number of dimensions, point by point; the oracle of the kernels.
