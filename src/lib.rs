@@ -8,7 +8,7 @@
 //!
 //! # Map
 //! Level by level, a module imports only from lower levels: [`types`], [`math`], [`parallel`], [`simd`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2);
-//! [`flow`], [`filter`], [`mixture`], [`motion3d`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5); the binary and the Python binding (6).
+//! [`flow`], [`filter`], [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5); the binary and the Python binding (6).
 
 pub mod error;
 pub mod filter;
@@ -21,6 +21,7 @@ pub mod mixture;
 pub mod motion3d;
 pub mod parallel;
 pub mod pipeline;
+pub mod segment;
 pub mod simd;
 pub mod stereo;
 pub mod synth;

@@ -20,6 +20,7 @@ const LEVELS: &[(&str, u8)] = &[
     ("filter", 3),
     ("mixture", 3),
     ("motion3d", 3),
+    ("segment", 3),
     ("stereo", 3),
     ("temporal", 4),
     ("track", 4),

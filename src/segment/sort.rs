@@ -1,0 +1,69 @@
+//! Stable sorting of edges by weight: least significant digit first.
+
+use super::edges::{Edge, EdgeKey};
+
+/// Bits of a digit: the counters of 2^11 digits stay in the first-level cache.
+const DIGIT_BITS: u32 = 11;
+const DIGITS: usize = 1 << DIGIT_BITS;
+
+/// Sorts edges by increasing key; edges of equal key keep their order.
+pub(super) fn sort_by_weight<K: EdgeKey>(edges: &mut Vec<Edge<K>>) {
+    let passes = K::BITS.div_ceil(DIGIT_BITS) as usize;
+    let mut counts = vec![[0u32; DIGITS]; passes];
+    for edge in edges.iter() {
+        for (pass, counts) in counts.iter_mut().enumerate() {
+            counts[digit(edge, pass)] += 1;
+        }
+    }
+    let mut sorted = vec![Edge::default(); edges.len()];
+    for (pass, counts) in counts.iter_mut().enumerate() {
+        // All edges share this digit: nothing to do.
+        if counts.iter().any(|&count| count as usize == edges.len()) {
+            continue;
+        }
+        let mut next = 0;
+        for count in counts.iter_mut() {
+            next += std::mem::replace(count, next);
+        }
+        for edge in edges.iter() {
+            let place = &mut counts[digit(edge, pass)];
+            sorted[*place as usize] = *edge;
+            *place += 1;
+        }
+        std::mem::swap(edges, &mut sorted);
+    }
+}
+
+#[inline(always)]
+fn digit<K: EdgeKey>(edge: &Edge<K>, pass: usize) -> usize {
+    edge.key.digit(pass as u32 * DIGIT_BITS, DIGITS - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn numbered<K: Copy>(keys: &[K]) -> Vec<Edge<K>> {
+        keys.iter().zip(0..).map(|(&key, code)| Edge { key, code }).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_the_standard_stable_sort(
+            narrow in prop::collection::vec(0u32..50, 0..200),
+            wide in prop::collection::vec(any::<u64>(), 0..200),
+        ) {
+            let mut expected = numbered(&narrow);
+            expected.sort_by_key(|edge| edge.key);
+            let mut edges = numbered(&narrow);
+            sort_by_weight(&mut edges);
+            prop_assert_eq!(edges, expected);
+            let mut expected = numbered(&wide);
+            expected.sort_by_key(|edge| edge.key);
+            let mut edges = numbered(&wide);
+            sort_by_weight(&mut edges);
+            prop_assert_eq!(edges, expected);
+        }
+    }
+}
