@@ -1,10 +1,8 @@
-//! Image files to grey frames.
+//! Image files to grey or colour frames.
 
+use super::channels::{ChannelPolicy, Channels, StoredSample};
 use super::jpeg;
-use super::source::Colour;
 use crate::error::{Error, Result};
-use crate::image::luminance;
-use crate::types::{AnyFrame, Frame, Sample};
 use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};
@@ -37,23 +35,16 @@ pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<()>
     Err(Error::format(path, format!("a frame of {width} x {height} px (expected 1 to {MAX_SIDE} px each way)")))
 }
 
-/// What colour input is answered with.
-pub(crate) fn refuse_colour(path: &Path) -> Error {
-    Error::format(
-        path,
-        "holds colour; expected grey. Ask for luminance (0.299 R + 0.587 G + 0.114 B) by --luminance or colour=\"luminance\", or convert it to grey first",
-    )
-}
-
-/// Reads the picture in an image file, whatever its extension says.
+/// Reads the picture in an image file, whatever its extension says: a grey frame with a policy of type [`Colour`](super::Colour), a colour
+/// frame with one of type [`Grey`](super::Grey).
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or too large, has several pages, or holds
-/// colour and `colour` refuses it.
-pub fn read_image(path: impl AsRef<Path>, colour: Colour) -> Result<AnyFrame> {
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or too large, has several pages, or
+/// `policy` refuses it.
+pub fn read_image<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P) -> Result<P::Frame> {
     let path = path.as_ref();
     if is_tiff(path)? {
-        let mut pages = TiffPages::open(path, colour)?;
+        let mut pages = TiffPages::open(path, policy)?;
         let first = pages.next_page()?.ok_or_else(|| Error::format(path, "holds no picture"))?;
         if pages.at_end() {
             return Ok(first);
@@ -61,7 +52,7 @@ pub fn read_image(path: impl AsRef<Path>, colour: Colour) -> Result<AnyFrame> {
         let message = "holds several pages; expected one picture a file (or open this file by itself, as a sequence)";
         return Err(Error::format(path, message));
     }
-    read_one_picture(path, colour)
+    read_one_picture(path, policy)
 }
 
 /// Whether the file's content is TIFF.
@@ -83,7 +74,7 @@ fn guessing_reader(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     Ok(reader)
 }
 
-fn read_one_picture(path: &Path, colour: Colour) -> Result<AnyFrame> {
+fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame> {
     let reader = guessing_reader(path)?;
     if reader.format() == Some(ImageFormat::Jpeg)
         && !jpeg::is_whole(&std::fs::read(path).map_err(|e| Error::io(path, e))?)
@@ -96,46 +87,33 @@ fn read_one_picture(path: &Path, colour: Colour) -> Result<AnyFrame> {
     let picture = reader.decode().map_err(|error| image_error(path, error))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     check_size(path, width, height)?;
-    let grey = Grey { path, width, height, colour };
+    let place = Place { path, width, height };
     match picture {
-        DynamicImage::ImageLuma8(p) => grey.from(1, &p).map(AnyFrame::U8),
-        DynamicImage::ImageLumaA8(p) => grey.from(2, &p).map(AnyFrame::U8),
-        DynamicImage::ImageRgb8(p) => grey.from(3, &p).map(AnyFrame::U8),
-        DynamicImage::ImageRgba8(p) => grey.from(4, &p).map(AnyFrame::U8),
-        DynamicImage::ImageLuma16(p) => grey.from(1, &p).map(AnyFrame::U16),
-        DynamicImage::ImageLumaA16(p) => grey.from(2, &p).map(AnyFrame::U16),
-        DynamicImage::ImageRgb16(p) => grey.from(3, &p).map(AnyFrame::U16),
-        DynamicImage::ImageRgba16(p) => grey.from(4, &p).map(AnyFrame::U16),
-        DynamicImage::ImageRgb32F(p) => grey.from(3, &p).map(AnyFrame::F32),
-        DynamicImage::ImageRgba32F(p) => grey.from(4, &p).map(AnyFrame::F32),
+        DynamicImage::ImageLuma8(p) => place.frame(1, p.into_raw(), policy),
+        DynamicImage::ImageLumaA8(p) => place.frame(2, p.into_raw(), policy),
+        DynamicImage::ImageRgb8(p) => place.frame(3, p.into_raw(), policy),
+        DynamicImage::ImageRgba8(p) => place.frame(4, p.into_raw(), policy),
+        DynamicImage::ImageLuma16(p) => place.frame(1, p.into_raw(), policy),
+        DynamicImage::ImageLumaA16(p) => place.frame(2, p.into_raw(), policy),
+        DynamicImage::ImageRgb16(p) => place.frame(3, p.into_raw(), policy),
+        DynamicImage::ImageRgba16(p) => place.frame(4, p.into_raw(), policy),
+        DynamicImage::ImageRgb32F(p) => place.frame(3, p.into_raw(), policy),
+        DynamicImage::ImageRgba32F(p) => place.frame(4, p.into_raw(), policy),
         _ => Err(Error::format(path, "a kind of picture that is not supported")),
     }
 }
 
-/// Interleaved samples of a picture on their way to a grey frame.
-struct Grey<'a> {
+/// A picture's file and size.
+struct Place<'a> {
     path: &'a Path,
     width: usize,
     height: usize,
-    colour: Colour,
 }
 
-impl Grey<'_> {
-    fn from<S: Sample>(&self, channels: usize, samples: &[S]) -> Result<Frame<S>> {
-        if channels > 2 && self.colour == Colour::Error && holds_colour(channels, samples) {
-            return Err(refuse_colour(self.path));
-        }
-        // A damaged file may decode to another number of samples than its size promises.
-        luminance(self.width, self.height, channels, samples).map_err(|e| Error::format(self.path, e.to_string()))
+impl Place<'_> {
+    fn frame<S: StoredSample, P: ChannelPolicy>(&self, count: usize, samples: Vec<S>, policy: P) -> Result<P::Frame> {
+        policy.frame(Channels { path: self.path, width: self.width, height: self.height, count, samples })
     }
-}
-
-/// Whether any pixel's red, green and blue differ. Grey stored as RGB (the only way in BMP) is grey: its luma is the level itself.
-fn holds_colour<S: Sample>(channels: usize, samples: &[S]) -> bool {
-    samples.chunks_exact(channels).any(|p| {
-        let [r, g, b] = [p[0], p[1], p[2]].map(S::to_real::<f64>);
-        (r != g || g != b) && !(r.is_nan() && g.is_nan() && b.is_nan())
-    })
 }
 
 /// Failures of the system stay such; everything else says that the file is damaged.
@@ -174,22 +152,22 @@ fn tiff_error(path: &Path, error: tiff::TiffError) -> Error {
 
 /// The pages of a TIFF file: uint8, uint16, float32 or float64, grey or colour.
 #[derive(Debug)]
-pub(crate) struct TiffPages {
+pub(crate) struct TiffPages<P> {
     path: PathBuf,
-    colour: Colour,
+    policy: P,
     /// `None` after the last page.
     decoder: Option<Decoder<BufReader<File>>>,
     page: usize,
 }
 
-impl TiffPages {
-    pub(crate) fn open(path: &Path, colour: Colour) -> Result<Self> {
+impl<P: ChannelPolicy> TiffPages<P> {
+    pub(crate) fn open(path: &Path, policy: P) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         let memory = memory_limit(&file).map_err(|e| Error::io(path, e))?;
         let mut limits = tiff::decoder::Limits::default();
         limits.decoding_buffer_size = memory as usize;
         let decoder = Decoder::new(BufReader::with_capacity(1 << 16, file)).map_err(|e| tiff_error(path, e))?;
-        Ok(Self { path: path.to_path_buf(), colour, decoder: Some(decoder.with_limits(limits)), page: 0 })
+        Ok(Self { path: path.to_path_buf(), policy, decoder: Some(decoder.with_limits(limits)), page: 0 })
     }
 
     pub(crate) fn at_end(&self) -> bool {
@@ -208,15 +186,20 @@ impl TiffPages {
         Ok(true)
     }
 
-    pub(crate) fn next_page(&mut self) -> Result<Option<AnyFrame>> {
+    pub(crate) fn next_page(&mut self) -> Result<Option<P::Frame>> {
         let Some(decoder) = &mut self.decoder else { return Ok(None) };
-        let frame = read_page(decoder, &self.path, self.colour, self.page)?;
+        let frame = read_page(decoder, &self.path, self.policy, self.page)?;
         self.skip_page()?;
         Ok(Some(frame))
     }
 }
 
-fn read_page(decoder: &mut Decoder<BufReader<File>>, path: &Path, colour: Colour, page: usize) -> Result<AnyFrame> {
+fn read_page<P: ChannelPolicy>(
+    decoder: &mut Decoder<BufReader<File>>,
+    path: &Path,
+    policy: P,
+    page: usize,
+) -> Result<P::Frame> {
     let (width, height) = decoder.dimensions().map_err(|e| tiff_error(path, e))?;
     let (width, height) = (width as usize, height as usize);
     check_size(path, width, height)?;
@@ -227,15 +210,15 @@ fn read_page(decoder: &mut Decoder<BufReader<File>>, path: &Path, colour: Colour
         ColorType::RGB(8 | 16 | 32 | 64) => 3,
         ColorType::RGBA(8 | 16 | 32 | 64) => 4,
         // Palettes, bilevel and the like: the general reader knows them for files of one page.
-        _ if page == 0 && !decoder.more_images() => return read_one_picture(path, colour),
+        _ if page == 0 && !decoder.more_images() => return read_one_picture(path, policy),
         other => return Err(Error::format(path, format!("TIFF pages of kind {other:?} are not supported"))),
     };
-    let grey = Grey { path, width, height, colour };
+    let place = Place { path, width, height };
     match decoder.read_image().map_err(|e| tiff_error(path, e))? {
-        DecodingResult::U8(samples) => grey.from(channels, &samples).map(AnyFrame::U8),
-        DecodingResult::U16(samples) => grey.from(channels, &samples).map(AnyFrame::U16),
-        DecodingResult::F32(samples) => grey.from(channels, &samples).map(AnyFrame::F32),
-        DecodingResult::F64(samples) => grey.from(channels, &samples).map(AnyFrame::F64),
+        DecodingResult::U8(samples) => place.frame(channels, samples, policy),
+        DecodingResult::U16(samples) => place.frame(channels, samples, policy),
+        DecodingResult::F32(samples) => place.frame(channels, samples, policy),
+        DecodingResult::F64(samples) => place.frame(channels, samples, policy),
         _ => Err(Error::format(path, "TIFF samples other than uint8, uint16, float32 and float64 are not supported")),
     }
 }

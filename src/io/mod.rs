@@ -1,8 +1,9 @@
-//! Frames in, results out: sources of grey frames, and readers and writers of flow, disparity, arrays, tables, tracks and pictures.
+//! Frames in, results out: sources of grey and of colour frames, and readers and writers of flow, disparity, arrays, tables, tracks and pictures.
 //!
 //! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader takes damaged and hostile files for what they
 //! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
 
+mod channels;
 mod decode;
 mod disparity;
 mod field_format;
@@ -24,7 +25,9 @@ mod table;
 mod text_boxes;
 mod track_table;
 pub mod write;
+mod ycbcr;
 
+pub use channels::{ChannelPolicy, Colour, FrameFormat, Grey};
 pub use decode::read_image;
 pub use disparity::{DisparityFormat, DisparityMap};
 pub use field_format::FieldFormat;
@@ -40,8 +43,8 @@ pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_frame_png, write_picture};
 pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_sink};
 pub use source::{
-    Colour, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout,
-    ViewPairs, Y4mSource, kind_of, open,
+    FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout, ViewPairs,
+    Y4mSource, kind_of, open, open_colour,
 };
 pub use table::{FieldTable, TableWriter, cell};
 pub use text_boxes::read_otb;

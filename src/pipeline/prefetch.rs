@@ -2,7 +2,7 @@
 //! keeps the run from being stopped.
 
 use crate::error::{Error, Result};
-use crate::io::{FrameSource, ViewPairs};
+use crate::io::{FrameFormat, FrameSource, ViewPairs};
 use crate::types::AnyFrame;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -18,9 +18,9 @@ pub(super) struct Prefetch<T = AnyFrame> {
     frames: Receiver<Result<T>>,
 }
 
-impl Prefetch {
+impl<F: FrameFormat> Prefetch<F> {
     /// Starts to read the frames of `source`.
-    pub(super) fn start(mut source: Box<dyn FrameSource>) -> Result<Self> {
+    pub(super) fn start(mut source: Box<dyn FrameSource<F>>) -> Result<Self> {
         Self::of(move || source.next_frame())
     }
 }
@@ -63,14 +63,14 @@ impl<T: Send + 'static> Prefetch<T> {
 }
 
 /// A source whose first frame has been looked at.
-struct Peeked {
+struct Peeked<F> {
     hint: Option<usize>,
-    first: Option<AnyFrame>,
-    rest: Box<dyn FrameSource>,
+    first: Option<F>,
+    rest: Box<dyn FrameSource<F>>,
 }
 
-impl FrameSource for Peeked {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<F: FrameFormat> FrameSource<F> for Peeked<F> {
+    fn next_frame(&mut self) -> Result<Option<F>> {
         match self.first.take() {
             Some(frame) => Ok(Some(frame)),
             None => self.rest.next_frame(),
@@ -100,7 +100,9 @@ pub struct FirstFrame {
 ///
 /// # Errors
 /// Those of the source.
-pub fn peek(mut source: Box<dyn FrameSource>) -> Result<(Option<FirstFrame>, Box<dyn FrameSource>)> {
+pub fn peek<F: FrameFormat>(
+    mut source: Box<dyn FrameSource<F>>,
+) -> Result<(Option<FirstFrame>, Box<dyn FrameSource<F>>)> {
     // A source may count what is left, so the hint is asked before the first frame is taken.
     let hint = source.len_hint();
     let first = source.next_frame()?;

@@ -30,6 +30,7 @@ impl SelectionArguments {
             first: self.first,
             limit: self.limit,
             step: self.step,
+            ..OpenOptions::default()
         }
     }
 

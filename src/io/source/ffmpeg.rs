@@ -1,8 +1,8 @@
 //! Compressed video, decoded by an `ffmpeg` program on the `PATH`.
 
-use super::{Colour, FrameSource, Kind, Y4mSource};
+use super::{FrameSource, Kind, Y4mSource};
 use crate::error::{Error, Result};
-use crate::types::AnyFrame;
+use crate::io::channels::{ChannelPolicy, Colour, ColourUse};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -11,19 +11,23 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
-    open: |spec, colour| Ok(Box::new(FfmpegSource::open(spec)?.with_colour(colour))),
+    open: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
+    open_colour: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
 };
 
 /// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier ones.
 const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0"]];
 
-/// Frames of a video file: the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]).
+/// Conversion to what [`Y4mSource`] takes colour for, whatever matrix and depth the file has. Limited range, since older programs say nothing of the range.
+const COLOUR: [&str; 2] = ["-vf", "scale=out_color_matrix=bt601:out_range=tv,format=yuv444p"];
+
+/// Frames of a video file. Grey ones are the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]); colour ones have 8 bit, converted by the program.
 ///
 /// The program runs beside this process and is stopped when the source is dropped.
 #[derive(Debug)]
-pub struct FfmpegSource {
+pub struct FfmpegSource<P = Colour> {
     path: PathBuf,
-    stream: Y4mSource<BufReader<ChildStdout>>,
+    stream: Y4mSource<BufReader<ChildStdout>, P>,
     running: Running,
 }
 
@@ -35,27 +39,33 @@ struct Running {
 }
 
 impl FfmpegSource {
-    /// Opens a video with the `ffmpeg` on the `PATH`.
+    /// Opens a video with the `ffmpeg` on the `PATH`, its luma as grey frames.
     ///
     /// # Errors
-    /// [`Error::Missing`] when there is no `ffmpeg`; [`Error::Format`] with its own words when it cannot decode the file.
+    /// As [`FfmpegSource::open_with`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
-        Self::open_with("ffmpeg", path)
+        Self::open_with("ffmpeg", path, Colour::Luminance)
     }
+}
 
-    /// As [`FfmpegSource::open`], with another program that understands the same options.
+impl<P: ChannelPolicy> FfmpegSource<P> {
+    /// Opens a video with a program that understands the options of `ffmpeg`: grey frames with the policy [`Colour`], colour frames with
+    /// [`Grey`](crate::io::Grey).
     ///
     /// # Errors
-    /// As [`FfmpegSource::open`].
-    pub fn open_with(program: impl AsRef<Path>, path: impl AsRef<Path>) -> Result<Self> {
+    /// [`Error::Missing`] when there is no such program; [`Error::Format`] with its own words when it cannot decode the file.
+    pub fn open_with(program: impl AsRef<Path>, path: impl AsRef<Path>, policy: P) -> Result<Self> {
         let (program, path) = (program.as_ref(), path.as_ref());
         File::open(path).map_err(|e| Error::io(path, e))?;
+        let conversion: &[&str] = if policy.colour_use() == ColourUse::Kept { &COLOUR } else { &[] };
         let mut failure = None;
         for every_frame in EVERY_FRAME {
-            let mut running = Running::start(program, path, every_frame)?;
+            let mut running = Running::start(program, path, every_frame, conversion)?;
             let Some(output) = running.child.stdout.take() else { break };
             match Y4mSource::new(path, BufReader::with_capacity(1 << 18, output)) {
-                Ok(stream) => return Ok(Self { path: path.to_path_buf(), stream, running }),
+                Ok(stream) => {
+                    return Ok(Self { path: path.to_path_buf(), stream: stream.with_policy(policy), running });
+                }
                 Err(error) => failure = Some(running.explain(path, error)),
             }
             // Only a program that does not know the option deserves the older spelling.
@@ -67,15 +77,8 @@ impl FfmpegSource {
     }
 }
 
-impl FfmpegSource {
-    /// What to do with colour: see [`Y4mSource::with_colour`].
-    pub fn with_colour(self, colour: Colour) -> Self {
-        Self { stream: self.stream.with_colour(colour), ..self }
-    }
-}
-
 impl Running {
-    fn start(program: &Path, path: &Path, every_frame: [&str; 2]) -> Result<Self> {
+    fn start(program: &Path, path: &Path, every_frame: [&str; 2], conversion: &[&str]) -> Result<Self> {
         let messages = tempfile::tempfile().map_err(|e| Error::io(std::env::temp_dir(), e))?;
         let for_child = messages.try_clone().map_err(|e| Error::io(std::env::temp_dir(), e))?;
         // A name that begins with a dash or holds a colon must not be taken for an option or a protocol.
@@ -86,6 +89,7 @@ impl Running {
             .arg(input)
             .args(["-map", "0:v:0"])
             .args(every_frame)
+            .args(conversion)
             .args(["-strict", "-1", "-f", "yuv4mpegpipe", "-"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -139,8 +143,8 @@ impl Drop for Running {
     }
 }
 
-impl FrameSource for FfmpegSource {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<P: ChannelPolicy> FrameSource<P::Frame> for FfmpegSource<P> {
+    fn next_frame(&mut self) -> Result<Option<P::Frame>> {
         match self.stream.next_frame() {
             Ok(None) => self.running.finish(&self.path).map(|()| None),
             Err(error) => Err(self.running.explain(&self.path, error)),
@@ -161,6 +165,8 @@ impl FrameSource for FfmpegSource {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use crate::io::Grey;
+    use crate::types::{AnyColourFrame, Frame};
     use std::os::unix::fs::PermissionsExt;
 
     /// A stand-in program: a shell script.
@@ -175,7 +181,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let film = folder.path().join("-film.mp4");
         std::fs::write(&film, b"x").unwrap();
-        let source = FfmpegSource::open_with(program(folder.path(), script), &film);
+        let source = FfmpegSource::open_with(program(folder.path(), script), &film, Colour::Luminance);
         (folder, source)
     }
 
@@ -186,6 +192,19 @@ mod tests {
         assert_eq!(source.frame_rate(), Some(50.0));
         assert_eq!(source.next_frame().unwrap().unwrap().to_real::<f64>().data(), &[97.0, 98.0]);
         assert_eq!(source.skip(1).unwrap(), 1);
+        assert!(source.next_frame().unwrap().is_none());
+    }
+
+    #[test]
+    fn colour_is_asked_for_in_the_coding_that_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let film = folder.path().join("film.mp4");
+        std::fs::write(&film, b"x").unwrap();
+        let script = r#"case "$*" in *out_color_matrix=bt601:out_range=tv,format=yuv444p*) ;; *) exit 1;; esac
+            printf 'YUV4MPEG2 W1 H1 F25:1 C444\nFRAME\n\353\200\200'"#;
+        let mut source = FfmpegSource::open_with(program(folder.path(), script), &film, Grey::Error).unwrap();
+        let white = AnyColourFrame::U8(Frame::filled(1, 1, [255; 3]));
+        assert_eq!(source.next_frame().unwrap(), Some(white));
         assert!(source.next_frame().unwrap().is_none());
     }
 
@@ -213,7 +232,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let film = folder.path().join("film.mp4");
         std::fs::write(&film, b"x").unwrap();
-        let error = FfmpegSource::open_with("/no/such/ffmpeg", &film).unwrap_err();
+        let error = FfmpegSource::open_with("/no/such/ffmpeg", &film, Colour::Luminance).unwrap_err();
         assert!(
             matches!(&error, Error::Missing(m) if m.contains("Install ffmpeg") && m.contains("film.mp4")),
             "{error}"

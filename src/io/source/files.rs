@@ -1,9 +1,9 @@
 //! Image files: a folder of them, or one (whose pages are frames when it is a TIFF).
 
-use super::{Colour, FrameSource, Kind, has_extension};
+use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
+use crate::io::channels::{ChannelPolicy, Colour, FrameFormat};
 use crate::io::decode::{EXTENSIONS, TiffPages, is_tiff, read_image};
-use crate::types::AnyFrame;
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
@@ -12,17 +12,20 @@ pub(super) const KIND: Kind = Kind {
         Path::new(spec).is_dir()
             || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !super::glob::is_pattern(spec)))
     },
-    open: |spec, colour| {
-        let path = Path::new(spec);
-        if path.is_dir() {
-            return Ok(Box::new(FilesSource::new(images_in(path)?, colour)?));
-        }
-        if is_tiff(path)? {
-            return Ok(Box::new(PagesSource::open(path, colour)?));
-        }
-        Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], colour)?))
-    },
+    open: open_files,
+    open_colour: open_files,
 };
+
+fn open_files<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameSource<P::Frame>>> {
+    let path = Path::new(spec);
+    if path.is_dir() {
+        return Ok(Box::new(FilesSource::new(images_in(path)?, policy)?));
+    }
+    if is_tiff(path)? {
+        return Ok(Box::new(PagesSource::open(path, policy)?));
+    }
+    Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], policy)?))
+}
 
 /// The image files of a folder in natural order (`frame9` before `frame10`); hidden files and other extensions are left out.
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
@@ -52,7 +55,7 @@ pub(super) fn sort_naturally(paths: &mut [PathBuf]) {
 struct Uniform(Option<(PathBuf, (usize, usize), &'static str)>);
 
 impl Uniform {
-    fn check(&mut self, path: &Path, frame: &AnyFrame) -> Result<()> {
+    fn check(&mut self, path: &Path, frame: &impl FrameFormat) -> Result<()> {
         let (size, dtype) = (frame.size(), frame.dtype());
         match &self.0 {
             None => self.0 = Some((path.to_path_buf(), size, dtype)),
@@ -73,32 +76,32 @@ impl Uniform {
     }
 }
 
-/// One frame a file, in the order given.
+/// One frame a file, in the order given: grey with the policy [`Colour`], colour with [`Grey`](crate::io::Grey).
 #[derive(Debug)]
-pub struct FilesSource {
+pub struct FilesSource<P = Colour> {
     paths: Vec<PathBuf>,
     next: usize,
-    colour: Colour,
+    policy: P,
     uniform: Uniform,
 }
 
-impl FilesSource {
+impl<P: ChannelPolicy> FilesSource<P> {
     /// A source of these image files. They are opened when their frame is asked for; each must have the size and sample type of the first.
     ///
     /// # Errors
     /// [`Error::Argument`] named `frames` for an empty list.
-    pub fn new(paths: Vec<PathBuf>, colour: Colour) -> Result<Self> {
+    pub fn new(paths: Vec<PathBuf>, policy: P) -> Result<Self> {
         if paths.is_empty() {
             return Err(Error::argument("frames", "at least one image file", "none"));
         }
-        Ok(Self { paths, next: 0, colour, uniform: Uniform::default() })
+        Ok(Self { paths, next: 0, policy, uniform: Uniform::default() })
     }
 }
 
-impl FrameSource for FilesSource {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<P: ChannelPolicy> FrameSource<P::Frame> for FilesSource<P> {
+    fn next_frame(&mut self) -> Result<Option<P::Frame>> {
         let Some(path) = self.paths.get(self.next) else { return Ok(None) };
-        let frame = read_image(path, self.colour)?;
+        let frame = read_image(path, self.policy)?;
         self.uniform.check(path, &frame)?;
         self.next += 1;
         Ok(Some(frame))
@@ -122,26 +125,26 @@ impl FrameSource for FilesSource {
 
 /// The pages of one TIFF file.
 #[derive(Debug)]
-struct PagesSource {
+struct PagesSource<P> {
     path: PathBuf,
-    pages: TiffPages,
+    pages: TiffPages<P>,
     left: usize,
     uniform: Uniform,
 }
 
-impl PagesSource {
-    fn open(path: &Path, colour: Colour) -> Result<Self> {
-        let mut counted = TiffPages::open(path, colour)?;
+impl<P: ChannelPolicy> PagesSource<P> {
+    fn open(path: &Path, policy: P) -> Result<Self> {
+        let mut counted = TiffPages::open(path, policy)?;
         let mut left = 0;
         while counted.skip_page()? {
             left += 1;
         }
-        Ok(Self { path: path.to_path_buf(), pages: TiffPages::open(path, colour)?, left, uniform: Uniform::default() })
+        Ok(Self { path: path.to_path_buf(), pages: TiffPages::open(path, policy)?, left, uniform: Uniform::default() })
     }
 }
 
-impl FrameSource for PagesSource {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<P: ChannelPolicy> FrameSource<P::Frame> for PagesSource<P> {
+    fn next_frame(&mut self) -> Result<Option<P::Frame>> {
         let frame = self.pages.next_page()?;
         if let Some(frame) = &frame {
             self.uniform.check(&self.path, frame)?;

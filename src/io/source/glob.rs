@@ -9,7 +9,8 @@ use std::path::PathBuf;
 pub(super) const KIND: Kind = Kind {
     name: "glob",
     accepts: is_pattern,
-    open: |spec, colour| Ok(Box::new(FilesSource::new(matches(spec)?, colour)?)),
+    open: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
+    open_colour: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
 };
 
 /// Whether the text has a pattern's special characters.

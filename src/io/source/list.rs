@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "list",
     accepts: |spec| has_extension(spec, &["txt", "lst"]),
-    open: |spec, colour| Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, colour)?)),
+    open: |spec, policy| Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, policy)?)),
+    open_colour: |spec, policy| Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, policy)?)),
 };
 
 /// Longest list read, bytes.

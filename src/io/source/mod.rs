@@ -18,27 +18,19 @@ pub use select::Selected;
 pub use views::{ViewLayout, ViewPairs};
 pub use y4m::Y4mSource;
 
+use super::channels::{Colour, Grey};
 use crate::error::{Error, Result};
-use crate::types::AnyFrame;
+use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
-/// What to do with colour pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Colour {
-    /// Refuse them with a message that says how to convert. The default: which grey is right depends on the scene. Grey stored as RGB (red, green and
-    /// blue equal in every pixel of an image file) is not colour and is taken as grey.
-    #[default]
-    Error,
-    /// Convert by [`luminance`](crate::image::luminance).
-    Luminance,
-}
-
-/// How a source is opened: colour policy and the frames wanted, `first`, `first + step`, ... at most `limit` of them.
+/// How a source is opened: what to do with colour or grey, and the frames wanted, `first`, `first + step`, ... at most `limit` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct OpenOptions {
-    /// What to do with colour pictures; default: refuse.
+    /// What [`open`] does with colour pictures; default: refuse.
     pub colour: Colour,
+    /// What [`open_colour`] does with grey pictures; default: refuse.
+    pub grey: Grey,
     /// Index of the first frame wanted; default 0.
     pub first: usize,
     /// How many frames are wanted at most; default `None`: all.
@@ -49,17 +41,17 @@ pub struct OpenOptions {
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { colour: Colour::Error, first: 0, limit: None, step: 1 }
+        Self { colour: Colour::Error, grey: Grey::Error, first: 0, limit: None, step: 1 }
     }
 }
 
-/// A sequence of grey frames, one at a time, all of one size and sample type.
-pub trait FrameSource: Send {
+/// A sequence of frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or [`AnyColourFrame`].
+pub trait FrameSource<F = AnyFrame>: Send {
     /// The next frame; `None` after the last.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Format`] with the path of the file that cannot be read.
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>>;
+    fn next_frame(&mut self) -> Result<Option<F>>;
 
     /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many there were.
     ///
@@ -88,8 +80,8 @@ pub trait FrameSource: Send {
     fn describe(&self) -> String;
 }
 
-impl<S: FrameSource + ?Sized> FrameSource for Box<S> {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<F, S: FrameSource<F> + ?Sized> FrameSource<F> for Box<S> {
+    fn next_frame(&mut self) -> Result<Option<F>> {
         (**self).next_frame()
     }
     fn skip(&mut self, count: usize) -> Result<usize> {
@@ -111,12 +103,13 @@ struct Kind {
     name: &'static str,
     accepts: fn(&str) -> bool,
     open: fn(&str, Colour) -> Result<Box<dyn FrameSource>>,
+    open_colour: fn(&str, Grey) -> Result<Box<dyn FrameSource<AnyColourFrame>>>,
 }
 
 /// Every kind of source; the first that accepts a specification opens it.
 const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, ffmpeg::KIND];
 
-/// Opens a frame source by its specification.
+/// Opens a source of grey frames by its specification.
 ///
 /// | specification | source |
 /// |---|---|
@@ -133,12 +126,28 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems, [`Error::Argument`] for a `step` of 0,
 /// [`Error::Missing`] for video without `ffmpeg`.
 pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    let source = (kind_for(spec, options)?.open)(spec, options.colour)?;
+    Ok(Box::new(Selected::new(source, options)?))
+}
+
+/// Opens a source of colour frames by its specification: as [`open`], with red, green and blue of each pixel.
+///
+/// Y4M is converted by ITU-R BT.601 (see [`Y4mSource`]); compressed video has 8 bit. A `*.npy` stack of colour is `(T, H, W, 3)` or `(T, H, W, 4)`, one
+/// frame `(H, W, 3)` or `(H, W, 4)`. Alpha is left out. Grey pictures are an [`Error::Format`] that says that colour is needed, unless
+/// `options.grey` is [`Grey::Repeat`].
+///
+/// # Errors
+/// As [`open`].
+pub fn open_colour(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource<AnyColourFrame>>> {
+    let source = (kind_for(spec, options)?.open_colour)(spec, options.grey)?;
+    Ok(Box::new(Selected::new(source, options)?))
+}
+
+fn kind_for(spec: &str, options: &OpenOptions) -> Result<&'static Kind> {
     if options.step == 0 {
         return Err(Error::argument("step", "a positive integer", 0));
     }
-    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))?;
-    let source = (kind.open)(spec, options.colour)?;
-    Ok(Box::new(Selected::new(source, options)?))
+    KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))
 }
 
 /// The name of the kind of source that `spec` would be opened as.

@@ -1,11 +1,10 @@
 //! `.npy` stacks, read a few frames at a time.
 
-use super::{Colour, FrameSource, Kind, has_extension};
+use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
-use crate::image::luminance;
-use crate::io::decode::{check_size, refuse_colour};
+use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, StoredSample};
+use crate::io::decode::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
-use crate::types::{AnyFrame, Frame, Sample};
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -14,19 +13,22 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "npy",
     accepts: |spec| has_extension(spec, &["npy"]),
-    open: |spec, colour| Ok(Box::new(NpySource::open(spec, colour)?)),
+    open: |spec, policy| Ok(Box::new(NpySource::open(spec, policy)?)),
+    open_colour: |spec, policy| Ok(Box::new(NpySource::open(spec, policy)?)),
 };
 
 /// Bytes of frames held at once when the first axis varies fastest in the file.
 const BATCH_BYTES: usize = 64 << 20;
 
 /// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16, float32 or float64, either byte order.
+/// Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one colour frame.
 ///
 /// In C order each frame is read when it is asked for. In Fortran order the samples of one frame are spread over the whole file, so each
 /// pass over the file gathers as many frames as fit 64 MiB (at least one).
 #[derive(Debug)]
-pub struct NpySource {
+pub struct NpySource<P: ChannelPolicy = Colour> {
     path: PathBuf,
+    policy: P,
     file: BufReader<File>,
     header: NpyHeader,
     data_start: u64,
@@ -35,16 +37,16 @@ pub struct NpySource {
     height: usize,
     channels: usize,
     next: usize,
-    gathered: VecDeque<AnyFrame>,
+    gathered: VecDeque<P::Frame>,
 }
 
-impl NpySource {
-    /// Opens a stack.
+impl<P: ChannelPolicy> NpySource<P> {
+    /// Opens a stack: grey frames with the policy [`Colour`], colour frames with [`Grey`](crate::io::Grey).
     ///
     /// # Errors
-    /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is no such stack, is shorter than its header says, or holds colour
-    /// and `colour` refuses it.
-    pub fn open(path: impl AsRef<Path>, colour: Colour) -> Result<Self> {
+    /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is no such stack, is shorter than its header says, or
+    /// `policy` refuses it.
+    pub fn open(path: impl AsRef<Path>, policy: P) -> Result<Self> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         let available = file.metadata().map_err(|e| Error::io(path, e))?.len();
@@ -59,6 +61,7 @@ impl NpySource {
         }
         let (frames, height, width, channels) = match header.shape[..] {
             [h, w] => (1, h, w, 1),
+            [h, w, c @ (3 | 4)] if policy.colour_use() == ColourUse::Kept => (1, h, w, c),
             [t, h, w] => (t, h, w, 1),
             [t, h, w, c @ (1 | 3 | 4)] => (t, h, w, c),
             _ => {
@@ -70,39 +73,30 @@ impl NpySource {
             }
         };
         check_size(path, width, height)?;
-        if channels > 1 && colour == Colour::Error {
-            return Err(refuse_colour(path));
-        }
-        if channels > 1 && header.fortran_order {
-            return Err(Error::format(
-                path,
-                "colour stacks are read in C order only (save numpy.ascontiguousarray of it)",
-            ));
-        }
+        policy.check_layout(path, channels)?;
         let needed = header.byte_count().map(|n| n as u64 + data_start as u64);
         if needed.is_none_or(|n| n > available) {
             let message = format!("cut off: shape {:?} needs more than the {available} bytes there are", header.shape);
             return Err(Error::format(path, message));
         }
         let (path, data_start) = (path.to_path_buf(), data_start as u64);
-        Ok(Self { path, file, header, data_start, frames, width, height, channels, next: 0, gathered: VecDeque::new() })
+        let gathered = VecDeque::new();
+        Ok(Self { path, policy, file, header, data_start, frames, width, height, channels, next: 0, gathered })
     }
 
-    fn frame_of<T: Element + Sample>(&self, samples: Vec<T>) -> Result<Frame<T>> {
-        if self.channels == 1 {
-            return Frame::new(self.width, self.height, samples);
+    fn frame_of<T: Element + StoredSample>(&self, bytes: &[u8]) -> Result<P::Frame> {
+        let (path, width, height, count) = (self.path.as_path(), self.width, self.height, self.channels);
+        let samples = T::decode(bytes, self.header.big_endian);
+        self.policy.frame(Channels { path, width, height, count, samples })
+    }
+
+    fn any_frame(&self, bytes: &[u8]) -> Result<P::Frame> {
+        match self.header.element {
+            ElementType::U8 => self.frame_of::<u8>(bytes),
+            ElementType::U16 => self.frame_of::<u16>(bytes),
+            ElementType::F32 => self.frame_of::<f32>(bytes),
+            _ => self.frame_of::<f64>(bytes),
         }
-        luminance(self.width, self.height, self.channels, &samples)
-    }
-
-    fn any_frame(&self, bytes: &[u8]) -> Result<AnyFrame> {
-        let big = self.header.big_endian;
-        Ok(match self.header.element {
-            ElementType::U8 => AnyFrame::U8(self.frame_of(u8::decode(bytes, big))?),
-            ElementType::U16 => AnyFrame::U16(self.frame_of(u16::decode(bytes, big))?),
-            ElementType::F32 => AnyFrame::F32(self.frame_of(f32::decode(bytes, big))?),
-            _ => AnyFrame::F64(self.frame_of(f64::decode(bytes, big))?),
-        })
     }
 
     fn frame_bytes(&self) -> usize {
@@ -110,7 +104,7 @@ impl NpySource {
     }
 
     /// One frame, stored in one piece.
-    fn read_frame(&mut self) -> Result<AnyFrame> {
+    fn read_frame(&mut self) -> Result<P::Frame> {
         let length = self.frame_bytes();
         let at = self.data_start + self.next as u64 * length as u64;
         let mut bytes = vec![0; length];
@@ -130,13 +124,14 @@ impl NpySource {
         let mut frames = vec![vec![0; self.frame_bytes()]; batch];
         let mut line = vec![0; stack * size];
         self.file.seek(SeekFrom::Start(self.data_start)).map_err(|e| Error::io(&self.path, e))?;
-        for x in 0..self.width {
-            for y in 0..self.height {
-                self.file.read_exact(&mut line).map_err(|e| file_error(&self.path, e))?;
-                let to = (y * self.width + x) * size;
-                for (frame, sample) in frames.iter_mut().zip(line[self.next * size..].chunks_exact(size)) {
-                    frame[to..to + size].copy_from_slice(sample);
-                }
+        // Rows vary fastest, then columns, then channels.
+        let (rows, columns) = (self.height, self.width);
+        for at in 0..rows * columns * self.channels {
+            let (y, x, channel) = (at % rows, at / rows % columns, at / (rows * columns));
+            self.file.read_exact(&mut line).map_err(|e| file_error(&self.path, e))?;
+            let to = ((y * columns + x) * self.channels + channel) * size;
+            for (frame, sample) in frames.iter_mut().zip(line[self.next * size..].chunks_exact(size)) {
+                frame[to..to + size].copy_from_slice(sample);
             }
         }
         for bytes in frames {
@@ -156,8 +151,8 @@ fn file_error(path: &Path, error: std::io::Error) -> Error {
     }
 }
 
-impl FrameSource for NpySource {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<P: ChannelPolicy> FrameSource<P::Frame> for NpySource<P> {
+    fn next_frame(&mut self) -> Result<Option<P::Frame>> {
         if self.next >= self.frames {
             return Ok(None);
         }
@@ -189,7 +184,9 @@ impl FrameSource for NpySource {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::Grey;
     use crate::io::npy::write_values;
+    use crate::types::{AnyColourFrame, AnyFrame, Frame};
     use proptest::prelude::*;
     use std::io::Write;
 
@@ -246,6 +243,41 @@ mod tests {
         assert_eq!(all(&path), [AnyFrame::U8(Frame::new(2, 1, vec![76, 9]).unwrap())]);
         let refused = NpySource::open(&path, Colour::Error).unwrap_err().to_string();
         assert!(refused.contains("luminance") && refused.contains("stack.npy"), "{refused}");
+    }
+
+    #[test]
+    fn colour_frames_come_in_either_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let (t, h, w) = (3, 2, 4);
+        let value = |i: usize, y: usize, x: usize, c: usize| (1000 * i + 100 * y + 10 * x + c) as u16;
+        let pixel = |i: usize, y: usize, x: usize| [0, 1, 2].map(|c| value(i, y, x, c));
+        let want: Vec<_> = (0..t).map(|i| AnyColourFrame::U16(Frame::from_fn(w, h, |x, y| pixel(i, y, x)))).collect();
+        let places = |outer: usize, inner: usize| (0..outer).flat_map(move |a| (0..inner).map(move |b| (a, b)));
+        let c_order: Vec<u16> = (0..t).flat_map(|i| places(h, w).flat_map(move |(y, x)| pixel(i, y, x))).collect();
+        let fortran: Vec<u16> =
+            (0..3).flat_map(|c| places(w, h).flat_map(move |(x, y)| (0..t).map(move |i| value(i, y, x, c)))).collect();
+        let mut header = NpyHeader::new(ElementType::U16, &[t, h, w, 3]);
+        let read = |path: &Path| {
+            let mut source = NpySource::open(path, Grey::Error).unwrap();
+            std::iter::from_fn(|| source.next_frame().unwrap()).collect::<Vec<_>>()
+        };
+        assert_eq!(read(&save(folder.path(), &header, &c_order)), want);
+        header.fortran_order = true;
+        assert_eq!(read(&save(folder.path(), &header, &fortran)), want);
+        let one = save(folder.path(), &NpyHeader::new(ElementType::U16, &[h, w, 3]), &c_order[..h * w * 3]);
+        assert_eq!(read(&one), want[..1]);
+    }
+
+    #[test]
+    fn grey_stacks_are_refused_where_colour_is_needed_or_repeated() {
+        let folder = tempfile::tempdir().unwrap();
+        for shape in [vec![2, 1, 2], vec![2, 1, 2, 1]] {
+            let path = save(folder.path(), &NpyHeader::new(ElementType::F32, &shape), &[0.5_f32, 1.0, 2.0, 3.0]);
+            let message = NpySource::open(&path, Grey::Error).unwrap_err().to_string();
+            assert!(message.contains("colour is needed") && message.contains("stack.npy"), "{message}");
+            let first = NpySource::open(&path, Grey::Repeat).unwrap().next_frame().unwrap().unwrap();
+            assert_eq!(first, AnyColourFrame::F32(Frame::new(2, 1, vec![[0.5; 3], [1.0; 3]]).unwrap()));
+        }
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use super::{FrameSource, OpenOptions};
 use crate::error::{Error, Result};
-use crate::types::AnyFrame;
 
 /// The frames `first`, `first + step`, ... of another source, at most `limit` of them.
 #[derive(Debug)]
@@ -14,7 +13,7 @@ pub struct Selected<S> {
     left: Option<usize>,
 }
 
-impl<S: FrameSource> Selected<S> {
+impl<S> Selected<S> {
     /// The part of `inner` that `options` asks for.
     ///
     /// # Errors
@@ -27,8 +26,8 @@ impl<S: FrameSource> Selected<S> {
     }
 }
 
-impl<S: FrameSource> FrameSource for Selected<S> {
-    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+impl<F, S: FrameSource<F>> FrameSource<F> for Selected<S> {
+    fn next_frame(&mut self) -> Result<Option<F>> {
         if self.left == Some(0) || self.inner.skip(self.gap)? < self.gap {
             self.left = Some(0);
             return Ok(None);
@@ -61,7 +60,7 @@ impl<S: FrameSource> FrameSource for Selected<S> {
 mod tests {
     use super::super::MemorySource;
     use super::*;
-    use crate::types::Frame;
+    use crate::types::{AnyFrame, Frame};
     use proptest::prelude::*;
 
     proptest! {

@@ -1,5 +1,6 @@
 use super::super::{OpenOptions, open};
 use super::*;
+use crate::types::AnyFrame;
 use ::image::{GrayImage, ImageBuffer, Luma, RgbImage};
 use proptest::prelude::*;
 use std::fs;

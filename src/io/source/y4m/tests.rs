@@ -1,4 +1,6 @@
 use super::*;
+use crate::io::Grey;
+use crate::types::{AnyColourFrame, AnyFrame, Frame};
 use proptest::prelude::*;
 
 fn read(bytes: &[u8]) -> Result<Vec<AnyFrame>> {
@@ -48,7 +50,7 @@ fn luma_is_taken_from_every_layout() {
 #[test]
 fn colour_is_refused_unless_luminance_is_asked_for() {
     let grey = |bytes: &[u8], colour| {
-        let mut source = Y4mSource::new("test.y4m", bytes).unwrap().with_colour(colour);
+        let mut source = Y4mSource::new("test.y4m", bytes).unwrap().with_policy(colour);
         source.next_frame().and_then(|_| source.next_frame())
     };
     // The chroma of the stream is 99 and not 128; mono has none, and alpha is no colour.
@@ -77,6 +79,60 @@ fn deep_samples_are_scaled_to_sixteen_bits() {
     assert_eq!(read(&bytes).unwrap(), [AnyFrame::U16(Frame::new(2, 1, vec![1023 << 6, 1 << 6]).unwrap())]);
     let bytes = b"YUV4MPEG2 W1 H1 Cmono16\nFRAME\n\x34\x12";
     assert_eq!(read(bytes).unwrap(), [AnyFrame::U16(Frame::new(1, 1, vec![0x1234]).unwrap())]);
+}
+
+fn first_colour(bytes: &[u8], policy: Grey) -> Result<AnyColourFrame> {
+    Ok(Y4mSource::new("test.y4m", bytes)?.with_policy(policy).next_frame()?.unwrap())
+}
+
+/// One frame of 3 x 3 pixels, luma 40 to 48, and chroma samples that count up from 100 (blue) and from 150 (red).
+fn chroma_stream(layout: &str, count: u8, range: &str) -> Vec<u8> {
+    let mut bytes = format!("YUV4MPEG2 W3 H3 {layout} {range}\nFRAME\n").into_bytes();
+    bytes.extend(40..49);
+    bytes.extend(100..100 + count);
+    bytes.extend(150..150 + count);
+    bytes
+}
+
+#[test]
+fn each_pixel_has_the_chroma_that_covers_it() {
+    for (layout, columns, rows, across, down) in
+        [("C420", 2, 2, 2, 2), ("C422", 2, 3, 2, 1), ("C440", 3, 2, 1, 2), ("C444", 3, 3, 1, 1), ("C411", 1, 3, 4, 1)]
+    {
+        for (range, full) in [("XCOLORRANGE=FULL", true), ("XCOLORRANGE=LIMITED", false), ("", false)] {
+            let AnyColourFrame::U8(got) =
+                first_colour(&chroma_stream(layout, columns * rows, range), Grey::Error).unwrap()
+            else {
+                panic!("another type")
+            };
+            for (x, y) in (0..3).flat_map(|y| (0..3).map(move |x| (x, y))) {
+                let sample = f64::from(x / across + columns * (y / down));
+                let (luma, blue, red) = (f64::from(40 + x + 3 * y), 100.0 + sample - 128.0, 150.0 + sample - 128.0);
+                // ITU-R BT.601-7 with its constants written out.
+                let (luma, scale) = if full { (luma, 1.0) } else { (255.0 / 219.0 * (luma - 16.0), 255.0 / 224.0) };
+                let want = [
+                    luma + scale * 1.402 * red,
+                    luma - scale * (0.344_136 * blue + 0.714_136 * red),
+                    luma + scale * 1.772 * blue,
+                ];
+                assert_eq!(got.get(x.into(), y.into()), want.map(|v| v.round() as u8), "{layout} {range} {x} {y}");
+            }
+        }
+    }
+}
+
+#[test]
+fn deep_colour_fills_sixteen_bits_and_mono_is_grey() {
+    let white = [940_u16, 512, 512].map(u16::to_le_bytes).concat();
+    let bytes = [&b"YUV4MPEG2 W1 H1 C444p10\nFRAME\n"[..], &white].concat();
+    assert_eq!(first_colour(&bytes, Grey::Error).unwrap(), AnyColourFrame::U16(Frame::filled(1, 1, [65535; 3])));
+    let mono = stream("Cmono", 0);
+    let message = first_colour(&mono, Grey::Error).unwrap_err().to_string();
+    assert!(message.contains("test.y4m") && message.contains("colour is needed"), "{message}");
+    let AnyColourFrame::U8(repeated) = first_colour(&mono, Grey::Repeat).unwrap() else { panic!("another type") };
+    assert_eq!(repeated.row(1), [[3; 3], [4; 3], [5; 3]]);
+    let cut = stream("C444", 11);
+    assert!(first_colour(&cut[..cut.len() - 50], Grey::Error).unwrap_err().to_string().contains("cut off"));
 }
 
 #[test]

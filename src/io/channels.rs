@@ -1,0 +1,233 @@
+//! From decoded channels to frames: what becomes of colour where grey is wanted, and of grey where colour is wanted.
+
+use crate::error::{Error, Result};
+use crate::image::luminance;
+use crate::types::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Sample};
+use std::fmt::Debug;
+use std::path::Path;
+
+/// What to do with colour pictures where grey frames are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Colour {
+    /// Refuse them with a message that says how to convert. The default: which grey is right depends on the scene. Grey stored as RGB (red, green and
+    /// blue equal in every pixel of an image file) is not colour and is taken as grey.
+    #[default]
+    Error,
+    /// Convert by [`luminance`].
+    Luminance,
+}
+
+/// What to do with grey pictures where colour frames are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Grey {
+    /// Refuse them: a method that needs colour has none to use. The default. Grey stored as RGB is taken as it is.
+    #[default]
+    Error,
+    /// Take the grey level for red, green and blue alike.
+    Repeat,
+}
+
+/// How a source treats the colour that it finds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColourUse {
+    /// Colour is an error.
+    Refused,
+    /// Only the luma is used.
+    Luma,
+    /// Red, green and blue are used.
+    Kept,
+}
+
+/// Size and sample type of a frame, grey or colour.
+pub trait FrameFormat: Send + 'static {
+    /// `(width, height)`, px.
+    fn size(&self) -> (usize, usize);
+    /// numpy's name of the sample type.
+    fn dtype(&self) -> &'static str;
+}
+
+/// A sample type that frames are stored in.
+pub trait StoredSample: Sample {
+    /// The frame with its type as data.
+    fn grey(frame: Frame<Self>) -> AnyFrame;
+    /// The frame with its type as data.
+    fn colour(frame: ColourFrame<Self>) -> AnyColourFrame;
+}
+
+macro_rules! formats {
+    ($($frame:ident)*) => {$(
+        impl FrameFormat for $frame {
+            fn size(&self) -> (usize, usize) {
+                Self::size(self)
+            }
+            fn dtype(&self) -> &'static str {
+                Self::dtype(self)
+            }
+        }
+    )*};
+}
+formats!(AnyFrame AnyColourFrame);
+
+macro_rules! stored {
+    ($($t:ty => $variant:ident),*) => {$(
+        impl StoredSample for $t {
+            fn grey(frame: Frame<Self>) -> AnyFrame {
+                AnyFrame::$variant(frame)
+            }
+            fn colour(frame: ColourFrame<Self>) -> AnyColourFrame {
+                AnyColourFrame::$variant(frame)
+            }
+        }
+    )*};
+}
+stored!(u8 => U8, u16 => U16, f32 => F32, f64 => F64);
+
+/// Decoded samples of a picture, `[row][col][channel]`, on their way to a frame.
+#[derive(Debug)]
+pub struct Channels<'a, S> {
+    /// The file, for messages.
+    pub path: &'a Path,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
+    pub count: usize,
+    /// The samples.
+    pub samples: Vec<S>,
+}
+
+impl<S: Sample> Channels<'_, S> {
+    /// Whether any pixel's red, green and blue differ. Grey stored as RGB (the only way in BMP) is grey: its luma is the level itself.
+    fn holds_colour(&self) -> bool {
+        self.count > 2
+            && self.samples.chunks_exact(self.count).any(|p| {
+                let [r, g, b] = [p[0], p[1], p[2]].map(S::to_real::<f64>);
+                (r != g || g != b) && !(r.is_nan() && g.is_nan() && b.is_nan())
+            })
+    }
+
+    /// Red, green and blue of each pixel; grey is repeated.
+    fn pixels(&self) -> Vec<[S; 3]> {
+        let pixels = self.samples.chunks_exact(self.count);
+        if self.count < 3 { pixels.map(|p| [p[0]; 3]).collect() } else { pixels.map(|p| [p[0], p[1], p[2]]).collect() }
+    }
+}
+
+/// Which frames are read: [`Colour`] reads grey ones, [`Grey`] colour ones.
+pub trait ChannelPolicy: Copy + Debug + Send + Sync + 'static {
+    /// What is read.
+    type Frame: FrameFormat + Debug;
+
+    /// The frame of a picture.
+    ///
+    /// # Errors
+    /// [`Error::Format`] with the path when the policy refuses the picture, or it holds another number of samples than its size says.
+    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<Self::Frame>;
+
+    /// Refuses a layout of `count` channels whose content need not be looked at.
+    ///
+    /// # Errors
+    /// [`Error::Format`] with the path.
+    fn check_layout(self, path: &Path, count: usize) -> Result<()>;
+
+    /// What colour is used for.
+    fn colour_use(self) -> ColourUse;
+}
+
+impl ChannelPolicy for Colour {
+    type Frame = AnyFrame;
+
+    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<AnyFrame> {
+        if self == Self::Error && picture.holds_colour() {
+            return Err(refuse_colour(picture.path));
+        }
+        let Channels { path, width, height, count, samples } = picture;
+        let frame =
+            if count == 1 { Frame::new(width, height, samples) } else { luminance(width, height, count, &samples) };
+        // A damaged file may decode to another number of samples than its size promises.
+        frame.map(S::grey).map_err(|e| Error::format(path, e.to_string()))
+    }
+
+    fn check_layout(self, path: &Path, count: usize) -> Result<()> {
+        if self == Self::Error && count > 2 { Err(refuse_colour(path)) } else { Ok(()) }
+    }
+
+    fn colour_use(self) -> ColourUse {
+        if self == Self::Error { ColourUse::Refused } else { ColourUse::Luma }
+    }
+}
+
+impl ChannelPolicy for Grey {
+    type Frame = AnyColourFrame;
+
+    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<AnyColourFrame> {
+        self.check_layout(picture.path, picture.count)?;
+        let Channels { path, width, height, .. } = picture;
+        let frame = Frame::new(width, height, picture.pixels());
+        frame.map(S::colour).map_err(|e| Error::format(path, e.to_string()))
+    }
+
+    fn check_layout(self, path: &Path, count: usize) -> Result<()> {
+        if self == Self::Error && count < 3 { Err(refuse_grey(path)) } else { Ok(()) }
+    }
+
+    fn colour_use(self) -> ColourUse {
+        ColourUse::Kept
+    }
+}
+
+/// The answer to colour input where grey is wanted.
+pub(crate) fn refuse_colour(path: &Path) -> Error {
+    Error::format(
+        path,
+        "holds colour; expected grey. Ask for luminance (0.299 R + 0.587 G + 0.114 B) by --luminance or colour=\"luminance\", or convert it to grey first",
+    )
+}
+
+/// The answer to grey input where colour is wanted.
+fn refuse_grey(path: &Path) -> Error {
+    Error::format(path, "holds grey; colour is needed (red, green and blue)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture<S>(count: usize, samples: Vec<S>) -> Channels<'static, S> {
+        Channels { path: Path::new("a.png"), width: 2, height: 1, count, samples }
+    }
+
+    #[test]
+    fn colour_is_kept_for_colour_and_weighed_for_grey() {
+        let rgba = || picture(4, vec![255_u8, 0, 0, 7, 1, 2, 3, 9]);
+        assert_eq!(
+            Grey::Error.frame(rgba()).unwrap(),
+            AnyColourFrame::U8(Frame::new(2, 1, vec![[255, 0, 0], [1, 2, 3]]).unwrap())
+        );
+        assert_eq!(Colour::Luminance.frame(rgba()).unwrap(), AnyFrame::U8(Frame::new(2, 1, vec![76, 2]).unwrap()));
+        assert!(Colour::Error.frame(rgba()).unwrap_err().to_string().contains("holds colour"));
+    }
+
+    #[test]
+    fn grey_is_repeated_only_where_it_may_be() {
+        for count in [1, 2] {
+            let grey = || picture(count, vec![300_u16; 2 * count]);
+            let message = Grey::Error.frame(grey()).unwrap_err().to_string();
+            assert!(message.contains("a.png") && message.contains("colour is needed"), "{message}");
+            let repeated = AnyColourFrame::U16(Frame::filled(2, 1, [300; 3]));
+            assert_eq!(Grey::Repeat.frame(grey()).unwrap(), repeated);
+        }
+        let stored_as_rgb = picture(3, vec![0.5_f32; 6]);
+        assert_eq!(Grey::Error.frame(stored_as_rgb).unwrap(), AnyColourFrame::F32(Frame::filled(2, 1, [0.5; 3])));
+    }
+
+    #[test]
+    fn samples_that_do_not_fill_the_picture_are_damage() {
+        for count in [1, 3] {
+            let short = || picture(count, vec![0.0_f64; count]);
+            assert!(matches!(Grey::Repeat.frame(short()), Err(Error::Format { .. })));
+            assert!(matches!(Colour::Luminance.frame(short()), Err(Error::Format { .. })));
+        }
+    }
+}
