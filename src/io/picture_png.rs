@@ -3,7 +3,7 @@
 use super::write::atomic;
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
-use crate::types::AnyFrame;
+use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
 /// Writes a picture as an 8-bit RGB PNG.
@@ -24,15 +24,37 @@ pub fn write_frame_png(path: impl AsRef<Path>, frame: &AnyFrame) -> Result<()> {
     match frame {
         AnyFrame::U8(f) => write_png(path, f.size(), png::ColorType::Grayscale, png::BitDepth::Eight, f.data()),
         AnyFrame::U16(f) => {
-            let bytes: Vec<u8> = f.data().iter().flat_map(|s| s.to_be_bytes()).collect();
-            write_png(path, f.size(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+            write_png(path, f.size(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &big_endian(f.data()))
         }
-        AnyFrame::F32(_) | AnyFrame::F64(_) => Err(Error::Type {
-            argument: "frame",
-            expected: "uint8 or uint16 samples for PNG (floats go to .npy)".into(),
-            got: frame.dtype().into(),
-        }),
+        AnyFrame::F32(_) | AnyFrame::F64(_) => Err(refuse_floats(frame.dtype())),
     }
+}
+
+/// Writes a colour frame as an RGB PNG: 8 bit for uint8, 16 bit for uint16.
+///
+/// # Errors
+/// As [`write_frame_png`].
+pub fn write_colour_png(path: impl AsRef<Path>, frame: &AnyColourFrame) -> Result<()> {
+    let path = path.as_ref();
+    match frame {
+        AnyColourFrame::U8(f) => {
+            write_png(path, f.size(), png::ColorType::Rgb, png::BitDepth::Eight, f.data().as_flattened())
+        }
+        AnyColourFrame::U16(f) => {
+            let bytes = big_endian(f.data().as_flattened());
+            write_png(path, f.size(), png::ColorType::Rgb, png::BitDepth::Sixteen, &bytes)
+        }
+        AnyColourFrame::F32(_) | AnyColourFrame::F64(_) => Err(refuse_floats(frame.dtype())),
+    }
+}
+
+fn big_endian(samples: &[u16]) -> Vec<u8> {
+    samples.iter().flat_map(|sample| sample.to_be_bytes()).collect()
+}
+
+fn refuse_floats(dtype: &str) -> Error {
+    let expected = "uint8 or uint16 samples for PNG (floats go to .npy)".into();
+    Error::Type { argument: "frame", expected, got: dtype.into() }
 }
 
 fn write_png(

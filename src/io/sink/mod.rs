@@ -7,18 +7,19 @@ mod y4m;
 pub use npy::NpySink;
 pub use png::PngSink;
 pub use y4m::Y4mSink;
-pub(super) use y4m::ratio;
+pub(super) use y4m::{eight_bit_planes, ratio};
 
+use super::channels::FrameFormat;
 use crate::error::{Error, Result};
-use crate::types::AnyFrame;
+use crate::types::{AnyColourFrame, AnyFrame};
 
-/// Takes grey frames, one at a time, all of one size and sample type.
-pub trait FrameSink: Send {
+/// Takes frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or [`AnyColourFrame`].
+pub trait FrameSink<F = AnyFrame>: Send {
     /// Adds a frame.
     ///
     /// # Errors
     /// [`Error::Argument`] or [`Error::Type`] named `frame` for a frame unlike the first or of a type that the format cannot hold; [`Error::Io`] with the path.
-    fn write(&mut self, frame: &AnyFrame) -> Result<()>;
+    fn write(&mut self, frame: &F) -> Result<()>;
 
     /// Ends the sequence; files of several frames get their name only now.
     ///
@@ -31,20 +32,33 @@ pub trait FrameSink: Send {
 struct Kind {
     accepts: fn(&str) -> bool,
     open: fn(&str, f64) -> Result<Box<dyn FrameSink>>,
+    open_colour: fn(&str, f64) -> Result<Box<dyn FrameSink<AnyColourFrame>>>,
 }
 
 /// Every kind of sink; the first that accepts a specification opens it.
 const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, png::KIND];
 
-/// Opens a frame sink by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for numbered PNG files.
+/// Opens a sink of grey frames by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for numbered PNG files.
 ///
 /// # Errors
 /// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or `output` for an extension that no sink has.
 pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
+    (kind_at_rate(spec, frame_rate)?.open)(spec, frame_rate)
+}
+
+/// Opens a sink of colour frames by its specification, as [`open_sink`].
+///
+/// # Errors
+/// As [`open_sink`].
+pub fn open_colour_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink<AnyColourFrame>>> {
+    (kind_at_rate(spec, frame_rate)?.open_colour)(spec, frame_rate)
+}
+
+fn kind_at_rate(spec: &str, frame_rate: f64) -> Result<&'static Kind> {
     if !(frame_rate > 0.0 && frame_rate.is_finite()) {
         return Err(Error::argument("frame_rate", "a positive number of frames per second", frame_rate));
     }
-    (kind_of(spec)?.open)(spec, frame_rate)
+    kind_of(spec)
 }
 
 /// Whether [`open_sink`] knows what to make of a specification; nothing is made yet.
@@ -68,7 +82,7 @@ struct Uniform(Option<((usize, usize), &'static str)>);
 
 impl Uniform {
     /// Whether this is the first frame; an error for one unlike the first.
-    fn check(&mut self, frame: &AnyFrame) -> Result<bool> {
+    fn check(&mut self, frame: &impl FrameFormat) -> Result<bool> {
         let this = (frame.size(), frame.dtype());
         match self.0 {
             None => {
@@ -86,7 +100,7 @@ impl Uniform {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{OpenOptions, open};
+    use super::super::{OpenOptions, open, open_colour};
     use super::*;
     use crate::types::Frame;
 
@@ -125,6 +139,58 @@ mod tests {
         assert_eq!(written(&spec, &float).unwrap(), float);
         let spec = folder.path().join("d.y4m").to_string_lossy().into_owned();
         assert_eq!(written(&spec, &deep).unwrap(), deep);
+    }
+
+    fn written_in_colour(spec: &str, frames: &[AnyColourFrame]) -> Result<Vec<AnyColourFrame>> {
+        let mut sink = open_colour_sink(spec, 25.0)?;
+        for frame in frames {
+            sink.write(frame)?;
+        }
+        sink.finish()?;
+        let mut source = open_colour(spec, &OpenOptions::default())?;
+        let mut back = Vec::new();
+        while let Some(frame) = source.next_frame()? {
+            back.push(frame);
+        }
+        Ok(back)
+    }
+
+    /// Largest difference of any two samples, in levels.
+    fn apart(a: &[AnyColourFrame], b: &[AnyColourFrame]) -> f32 {
+        assert_eq!(a.len(), b.len());
+        let pixels = |frames: &[AnyColourFrame]| {
+            frames.iter().flat_map(|f| f.scaled(1.0).into_data()).flatten().collect::<Vec<f32>>()
+        };
+        pixels(a).iter().zip(pixels(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn colour_is_read_back_by_its_source() {
+        let folder = tempfile::tempdir().unwrap();
+        let spec = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+        let level = |i: usize, x: usize, y: usize| [60 * i + 40 * x, 255 - 50 * x - 20 * y, 90 * y + i];
+        let bytes: Vec<_> =
+            (0..2).map(|i| AnyColourFrame::U8(Frame::from_fn(5, 3, |x, y| level(i, x, y).map(|v| v as u8)))).collect();
+        let deep: Vec<_> = (0..2)
+            .map(|i| AnyColourFrame::U16(Frame::from_fn(5, 3, |x, y| level(i, x, y).map(|v| 255 * v as u16))))
+            .collect();
+        for (kind, frames) in [("u8", &bytes), ("u16", &deep)] {
+            for name in [format!("{kind}.npy"), format!("{kind}_pictures")] {
+                assert_eq!(&written_in_colour(&spec(&name), frames).unwrap(), frames, "{name}");
+            }
+            // Luma and chroma are rounded: at most (1 + 1.772) / 2 levels away before the last rounding.
+            let film = written_in_colour(&spec(&format!("{kind}.y4m")), frames).unwrap();
+            assert!(film[0].dtype() == frames[0].dtype() && apart(&film, frames) <= 1.0, "{}", apart(&film, frames));
+        }
+        let float = vec![AnyColourFrame::F64(Frame::filled(2, 2, [0.5, 0.25, -1.0])); 2];
+        assert_eq!(written_in_colour(&spec("f.npy"), &float).unwrap(), float);
+        for name in ["f.y4m", "f_pictures"] {
+            let error = written_in_colour(&spec(name), &float).unwrap_err();
+            assert!(matches!(error, Error::Type { argument: "frame", .. }), "{error}");
+        }
+        let mixed = [bytes[0].clone(), deep[0].clone()];
+        assert!(written_in_colour(&spec("mixed.npy"), &mixed).unwrap_err().to_string().contains("uint16"));
+        assert!(!folder.path().join("mixed.npy").exists());
     }
 
     #[test]

@@ -1,14 +1,15 @@
-//! Numbered grey PNG files in a folder.
+//! Numbered PNG files in a folder.
 
 use super::{FrameSink, Kind, Uniform};
 use crate::error::Result;
-use crate::io::{NumberedFiles, write_frame_png};
-use crate::types::AnyFrame;
+use crate::io::{NumberedFiles, write_colour_png, write_frame_png};
+use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
 pub(super) const KIND: Kind = Kind {
     accepts: |spec| spec.ends_with('/') || Path::new(spec).is_dir() || Path::new(spec).extension().is_none(),
     open: |spec, _| Ok(Box::new(PngSink::create(spec)?)),
+    open_colour: |spec, _| Ok(Box::new(PngSink::create(spec)?)),
 };
 
 /// Writes frames as `frame_000000.png`, ... of 8 or 16 bit, each whole.
@@ -33,6 +34,18 @@ impl FrameSink for PngSink {
     fn write(&mut self, frame: &AnyFrame) -> Result<()> {
         self.uniform.check(frame)?;
         write_frame_png(self.files.path(self.next), frame)?;
+        self.next += 1;
+        Ok(())
+    }
+    fn finish(self: Box<Self>) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl FrameSink<AnyColourFrame> for PngSink {
+    fn write(&mut self, frame: &AnyColourFrame) -> Result<()> {
+        self.uniform.check(frame)?;
+        write_colour_png(self.files.path(self.next), frame)?;
         self.next += 1;
         Ok(())
     }

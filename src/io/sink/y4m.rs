@@ -1,27 +1,21 @@
-//! A grey YUV4MPEG2 stream, to a file or standard output.
+//! A YUV4MPEG2 stream, grey or in colour, to a file or standard output.
 
 use super::{FrameSink, Kind, Uniform};
 use crate::error::{Error, Result};
+use crate::io::channels::FrameFormat;
 use crate::io::write::AtomicFile;
-use crate::types::AnyFrame;
+use crate::io::ycbcr::Coding;
+use crate::types::{AnyColourFrame, AnyFrame, Sample};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
     accepts: |spec| spec == "-" || Path::new(spec).extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m")),
-    open: |spec, frame_rate| {
-        Ok(match spec {
-            "-" => Box::new(Y4mSink::new(
-                Output::Stream(BufWriter::new(io::stdout())),
-                "standard output".into(),
-                frame_rate,
-            )),
-            path => Box::new(Y4mSink::create(path, frame_rate)?),
-        })
-    },
+    open: |spec, frame_rate| Ok(Box::new(Y4mSink::open(spec, frame_rate)?)),
+    open_colour: |spec, frame_rate| Ok(Box::new(Y4mSink::open(spec, frame_rate)?)),
 };
 
-/// Writes uint8 frames as `Cmono`, uint16 frames as `Cmono16`.
+/// Writes uint8 frames as `Cmono`, uint16 frames as `Cmono16`; colour as `C444` and `C444p16`, full range, by the matrix of ITU-R BT.601.
 #[derive(Debug)]
 pub struct Y4mSink {
     output: Output,
@@ -62,26 +56,62 @@ impl Y4mSink {
         Ok(Self::new(Output::File(AtomicFile::create(path)?), path.to_path_buf(), frame_rate))
     }
 
+    /// A file, or standard output for `-`.
+    fn open(spec: &str, frame_rate: f64) -> Result<Self> {
+        if spec == "-" {
+            let output = Output::Stream(BufWriter::new(io::stdout()));
+            return Ok(Self::new(output, "standard output".into(), frame_rate));
+        }
+        Self::create(spec, frame_rate)
+    }
+
     fn new(output: Output, path: PathBuf, frame_rate: f64) -> Self {
         Self { output, path, rate: ratio(frame_rate), uniform: Uniform::default() }
     }
 
-    fn put(&mut self, frame: &AnyFrame, first: bool) -> io::Result<()> {
-        if first {
-            let ((w, h), (a, b)) = (frame.size(), self.rate);
-            let layout = if matches!(frame, AnyFrame::U8(_)) { "mono" } else { "mono16" };
-            writeln!(self.output, "YUV4MPEG2 W{w} H{h} F{a}:{b} Ip A1:1 C{layout} XCOLORRANGE=FULL")?;
-        }
-        self.output.write_all(b"FRAME\n")?;
-        match frame {
-            AnyFrame::U8(f) => self.output.write_all(f.data()),
-            AnyFrame::U16(f) => {
-                let bytes: Vec<u8> = f.data().iter().flat_map(|s| s.to_le_bytes()).collect();
-                self.output.write_all(&bytes)
-            }
-            AnyFrame::F32(_) | AnyFrame::F64(_) => Ok(()),
+    /// Adds a frame in a layout; `planes` are its bytes.
+    fn put(&mut self, frame: &impl FrameFormat, layout: &str, planes: &[u8]) -> Result<()> {
+        let first = self.uniform.check(frame)?;
+        let ((w, h), (a, b)) = (frame.size(), self.rate);
+        let header = format!("YUV4MPEG2 W{w} H{h} F{a}:{b} Ip A1:1 C{layout} XCOLORRANGE=FULL\n");
+        let parts = [if first { header.as_bytes() } else { &[] }, b"FRAME\n", planes];
+        let written = parts.iter().try_for_each(|part| self.output.write_all(part));
+        written.map_err(|e| Error::io(&self.path, e))
+    }
+
+    fn end(self) -> Result<()> {
+        match self.output {
+            Output::File(file) => file.commit(),
+            Output::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
         }
     }
+}
+
+/// As [`planes`], of 8 bits each.
+pub(in crate::io) fn eight_bit_planes(pixels: &[[u8; 3]]) -> Vec<u8> {
+    planes(pixels, 8).into_iter().map(|code| code as u8).collect()
+}
+
+fn little_endian(samples: &[u16]) -> Vec<u8> {
+    samples.iter().flat_map(|sample| sample.to_le_bytes()).collect()
+}
+
+/// Luma and both planes of chroma, one after the other, of `bits` bits.
+fn planes<S: Sample>(pixels: &[[S; 3]], bits: u32) -> Vec<u16> {
+    let coding = Coding::new(bits, true);
+    let mut planes = vec![0; 3 * pixels.len()];
+    for (at, pixel) in pixels.iter().enumerate() {
+        let codes = coding.encode(pixel.map(|sample| sample.to_real::<f64>() / S::FULL_SCALE));
+        for (plane, code) in codes.into_iter().enumerate() {
+            planes[plane * pixels.len() + at] = code;
+        }
+    }
+    planes
+}
+
+fn refuse_floats(dtype: &str) -> Error {
+    let expected = "uint8 or uint16 samples for Y4M (floats go to .npy)".into();
+    Error::Type { argument: "frame", expected, got: dtype.into() }
 }
 
 /// A frame rate as a ratio: whole, of the family 1000 n / 1001 (29.97, 23.976, ...), or to a millionth.
@@ -98,18 +128,27 @@ pub(in crate::io) fn ratio(rate: f64) -> (u64, u64) {
 
 impl FrameSink for Y4mSink {
     fn write(&mut self, frame: &AnyFrame) -> Result<()> {
-        if matches!(frame, AnyFrame::F32(_) | AnyFrame::F64(_)) {
-            let expected = "uint8 or uint16 samples for Y4M (floats go to .npy)".into();
-            return Err(Error::Type { argument: "frame", expected, got: frame.dtype().into() });
+        match frame {
+            AnyFrame::U8(f) => self.put(frame, "mono", f.data()),
+            AnyFrame::U16(f) => self.put(frame, "mono16", &little_endian(f.data())),
+            AnyFrame::F32(_) | AnyFrame::F64(_) => Err(refuse_floats(frame.dtype())),
         }
-        let first = self.uniform.check(frame)?;
-        self.put(frame, first).map_err(|e| Error::io(&self.path, e))
     }
     fn finish(self: Box<Self>) -> Result<()> {
-        match self.output {
-            Output::File(file) => file.commit(),
-            Output::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
+        self.end()
+    }
+}
+
+impl FrameSink<AnyColourFrame> for Y4mSink {
+    fn write(&mut self, frame: &AnyColourFrame) -> Result<()> {
+        match frame {
+            AnyColourFrame::U8(f) => self.put(frame, "444", &eight_bit_planes(f.data())),
+            AnyColourFrame::U16(f) => self.put(frame, "444p16", &little_endian(&planes(f.data(), 16))),
+            AnyColourFrame::F32(_) | AnyColourFrame::F64(_) => Err(refuse_floats(frame.dtype())),
         }
+    }
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.end()
     }
 }
 

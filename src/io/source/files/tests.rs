@@ -1,6 +1,7 @@
-use super::super::{OpenOptions, open};
+use super::super::{OpenOptions, open, open_colour};
 use super::*;
-use crate::types::AnyFrame;
+use crate::io::Grey;
+use crate::types::{AnyColourFrame, AnyFrame, Frame};
 use ::image::{GrayImage, ImageBuffer, Luma, RgbImage};
 use proptest::prelude::*;
 use std::fs;
@@ -79,6 +80,62 @@ fn colour_is_refused_with_advice_or_converted() {
         assert!(message.contains(name) && message.contains("luminance"), "{message}");
         assert_eq!(read_image(&path, Colour::Luminance).unwrap().to_real::<f64>().get(1, 1), 76.0, "{name}");
     }
+}
+
+#[test]
+fn colour_is_kept_whole_and_grey_says_that_colour_is_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    let rgb = |x: u32, y: u32| [(60 * x) as u8, (70 * y) as u8, 200];
+    let picture = RgbImage::from_fn(4, 3, |x, y| ::image::Rgb(rgb(x, y)));
+    let deep: ImageBuffer<::image::Rgb<u16>, Vec<u16>> =
+        ImageBuffer::from_fn(4, 3, |x, y| ::image::Rgb(rgb(x, y).map(|v| 257 * u16::from(v))));
+    let want = AnyColourFrame::U8(Frame::from_fn(4, 3, |x, y| rgb(x as u32, y as u32)));
+    for name in ["c.png", "c.tif", "c.bmp", "c.ppm"] {
+        picture.save(folder.path().join(name)).unwrap();
+        assert_eq!(read_image(folder.path().join(name), Grey::Error).unwrap(), want, "{name}");
+    }
+    for name in ["d.png", "d.tif", "d.ppm"] {
+        deep.save(folder.path().join(name)).unwrap();
+        let AnyColourFrame::U16(got) = read_image(folder.path().join(name), Grey::Error).unwrap() else {
+            panic!("{name}")
+        };
+        assert_eq!(got.get(3, 2), rgb(3, 2).map(|v| 257 * u16::from(v)), "{name}");
+    }
+    RgbImage::from_pixel(16, 16, ::image::Rgb([200, 30, 60])).save(folder.path().join("e.jpg")).unwrap();
+    let AnyColourFrame::U8(got) = read_image(folder.path().join("e.jpg"), Grey::Error).unwrap() else {
+        panic!("e.jpg")
+    };
+    assert!(got.get(8, 8).iter().zip([200_u8, 30, 60]).all(|(a, b)| a.abs_diff(b) < 5), "{:?}", got.get(8, 8));
+    for name in ["g.png", "g.tif", "g.pgm", "g.jpg"] {
+        let path = folder.path().join(name);
+        grey(5).save(&path).unwrap();
+        let message = read_image(&path, Grey::Error).unwrap_err().to_string();
+        assert!(message.contains(name) && message.contains("colour is needed"), "{message}");
+        assert_eq!(read_image(&path, Grey::Repeat).unwrap().size(), (4, 3));
+    }
+}
+
+#[test]
+fn sources_of_files_give_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    for i in [2_u8, 10, 1] {
+        RgbImage::from_pixel(4, 3, ::image::Rgb([i, 0, 9])).save(folder.path().join(format!("f{i}.png"))).unwrap();
+    }
+    fs::write(folder.path().join("list.txt"), "f10.png\nf1.png\n").unwrap();
+    let reds = |spec: &str, options: &OpenOptions| {
+        let mut source = open_colour(&folder.path().join(spec).to_string_lossy(), options).unwrap();
+        let frames = std::iter::from_fn(|| source.next_frame().unwrap());
+        frames.map(|frame| frame.scaled(1.0).get(0, 0)[0]).collect::<Vec<f32>>()
+    };
+    let options = OpenOptions::default();
+    assert_eq!(reds("", &options), [1.0, 2.0, 10.0]);
+    assert_eq!(reds("f1*.png", &options), [1.0, 10.0]);
+    assert_eq!(reds("list.txt", &options), [10.0, 1.0]);
+    assert_eq!(reds("", &OpenOptions { first: 1, step: 2, ..options }), [2.0]);
+    grey(0).save(folder.path().join("f3.png")).unwrap();
+    let error = open_colour(&folder.path().join("f3.png").to_string_lossy(), &options).unwrap().next_frame();
+    assert!(error.unwrap_err().to_string().contains("colour is needed"));
+    assert_eq!(reds("f3.png", &OpenOptions { grey: Grey::Repeat, ..options }), [0.0]);
 }
 
 #[test]
