@@ -9,6 +9,7 @@
 //! * [`windowed`]: the same equations over a window in which the motion is affine.
 //! * [`baseline`]: Lucas-Kanade and Horn-Schunck, for comparison.
 //! * [`model`]: the motion models; one file and one line each.
+//! * [`points`]: at single points of two frames, by gradient steps on a pyramid.
 //! * [`observability`]: which condition of theorem 1 holds at each pixel.
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 
@@ -22,6 +23,7 @@ mod least_squares;
 pub mod model;
 mod observability;
 mod options;
+pub mod points;
 mod site;
 pub mod windowed;
 

@@ -1,7 +1,8 @@
-//! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling; and pictures of results.
+//! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling, corners; and pictures of results.
 
 mod blocks;
 mod border;
+mod corners;
 mod cubic;
 #[allow(dead_code)] // offered to the estimators that warp
 mod fill;
@@ -19,6 +20,7 @@ mod smooth;
 mod spline;
 
 pub use border::Border;
+pub use corners::{CORNER_WINDOW, CornerOptions, corner_score, corner_score_into, select_corners};
 pub use luminance::luminance;
 pub use preprocess::Preprocess;
 pub use quantise::Quantiser;
