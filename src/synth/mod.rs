@@ -13,6 +13,7 @@ mod ramp;
 pub mod registry;
 mod scene;
 mod sensor;
+pub mod targets;
 pub mod texture;
 mod truth;
 

@@ -1,0 +1,33 @@
+//! Colour scenes with targets that look alike, cross and hide each other before a moving camera, with exact boxes.
+//!
+//! People and cars drawn from signed distances move over a textured world, which a camera that pans, shakes, rolls and zooms looks at. All targets of a
+//! scene share one texture, and rectangles of the world have their colours: neither colour nor texture alone tells them apart. Lengths are those of a
+//! window of 720 x 480 px and are multiplied by the scale of [`TargetSceneOptions`].
+//!
+//! ```
+//! use jacoflow::synth::targets::{TargetScene, TargetSceneOptions};
+//! # fn main() -> jacoflow::Result<()> {
+//! let scene = TargetScene::new("people_static", TargetSceneOptions { scale: 0.25, ..TargetSceneOptions::default() })?;
+//! assert_eq!((scene.size(), scene.frame_count(), scene.target_count()), ((180, 120), 110, 2));
+//! assert_eq!(scene.frame(3).size(), scene.size());
+//! # Ok(())
+//! # }
+//! ```
+
+mod camera;
+mod colour;
+mod list;
+mod options;
+mod path;
+mod render;
+mod scene;
+mod shape;
+mod sprite;
+#[cfg(test)]
+mod tests;
+mod value_noise;
+mod world;
+
+pub use list::{SCENES, TargetSceneKind};
+pub use options::TargetSceneOptions;
+pub use scene::TargetScene;
