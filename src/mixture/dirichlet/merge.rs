@@ -3,7 +3,7 @@
 //! The mode of the sticks cannot empty a component, so a large Gaussian stays divided among several. The idea of N. Ueda,
 //! R. Nakano, Z. Ghahramani and G. Hinton, "SMEM algorithm for mixture models" (2000), with F as the judge.
 
-use super::fit::{Problem, Run};
+use super::em::{Problem, Run};
 use crate::error::Result;
 use crate::mixture::moments::Moments;
 
@@ -23,7 +23,7 @@ type Pair = (usize, usize);
 /// [`Error::Numerical`](crate::Error::Numerical) for a covariance without a factor.
 pub(super) fn pool_pairs(problem: &Problem, mut run: Run) -> Result<Run> {
     'pooled: loop {
-        for pair in candidates(problem, &run)? {
+        for (_, pair) in candidates(problem, &run)? {
             let mut moments = run.expected.moments.clone();
             pool(&mut moments, pair);
             let mut other = problem.run(moments)?;
@@ -44,8 +44,8 @@ fn pool(moments: &mut Moments, (i, j): Pair) {
     moments.replace(j, &Moments::none(1, moments.dimensions));
 }
 
-/// The pairs whose pooling would raise F most with the responsibilities held, the best first.
-fn candidates(problem: &Problem, run: &Run) -> Result<Vec<Pair>> {
+/// Gain of F with the responsibilities held, of the pairs where it is largest; the largest first.
+pub(super) fn candidates(problem: &Problem, run: &Run) -> Result<Vec<(f64, Pair)>> {
     let mut bounds = bounds(problem, &run.expected.moments)?;
     bounds.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut shares = None;
@@ -63,7 +63,7 @@ fn candidates(problem: &Problem, run: &Run) -> Result<Vec<Pair>> {
             best.truncate(TRIALS);
         }
     }
-    Ok(best.into_iter().map(|(_, pair)| pair).collect())
+    Ok(best)
 }
 
 /// For every pair the gain of F without the change of entropy, which only lowers it.

@@ -17,6 +17,7 @@
 //! ```
 
 mod components;
+mod em;
 mod fit;
 mod merge;
 mod options;
