@@ -1,0 +1,167 @@
+//! Which target a corner track belongs to.
+
+use super::appearance::CentredBox;
+use super::corners::Track;
+use super::geometry::{distance, holds};
+use crate::math::median;
+
+/// A label is kept, and gained, inside the target's box enlarged by this.
+const KEEP: f64 = 1.3;
+/// A track without a label gains one if it is background with less than the rest of this probability.
+const MIN_FOREGROUND: f64 = 0.7;
+/// Below this probability of not being background a track is doubtful.
+const DOUBTFUL: f64 = 0.3;
+/// Greatest difference between a track's motion and its target's when it gains a label, px/frame at 480 rows.
+const GAIN_DIFFERENCE: f64 = 3.6;
+/// A motion differs from another by more than this, px/frame at 480 rows.
+const DIFFERENT: f64 = 2.4;
+/// A motion agrees with another up to this, px/frame at 480 rows.
+const ALIKE: f64 = 1.2;
+/// If more than this share would lose its label at once, the target itself has changed its motion.
+const MAX_LOSS: f64 = 0.6;
+
+/// What the labels need of a target.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Labelled {
+    pub id: u64,
+    /// Its box: predicted before the frame, estimated after it.
+    pub bounds: CentredBox,
+    /// Its velocity relative to the background, px/frame.
+    pub velocity: [f64; 2],
+    /// Whether it is hidden.
+    pub is_hidden: bool,
+    /// Whether its colours are unlike those it usually has.
+    pub is_unlike: bool,
+}
+
+/// Takes labels away that the new motion speaks against.
+pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
+    for own in targets {
+        let mine: Vec<usize> = (0..tracks.len()).filter(|&j| tracks[j].owner == Some(own.id)).collect();
+        let inside_other =
+            |track: &Track| targets.iter().any(|l| l.id != own.id && holds(l.bounds, track.position, 1.0, 0.0));
+        let leaves = |track: &Track| has_jumped(track, scale) || follows_other(track, own, targets, scale);
+        let leaving: Vec<usize> = mine.iter().copied().filter(|&j| leaves(&tracks[j])).collect();
+        if leaving.len() as f64 <= MAX_LOSS * mine.len() as f64 {
+            for j in leaving {
+                tracks[j].owner = None;
+            }
+        }
+        let left: Vec<usize> = mine.into_iter().filter(|&j| tracks[j].owner.is_some()).collect();
+        let Some(middle) = median_residual(left.iter().map(|&j| &tracks[j])) else { continue };
+        for j in left {
+            let track = &tracks[j];
+            let doubtful = track.foreground < DOUBTFUL;
+            let deviates = track.residual.is_none_or(|r| distance(r, middle) > ALIKE * scale);
+            if deviates && (doubtful || inside_other(track)) || own.is_unlike && doubtful {
+                tracks[j].owner = None;
+            }
+        }
+    }
+}
+
+/// Whether a track's motion differs from its own in the frame before.
+fn has_jumped(track: &Track, scale: f64) -> bool {
+    match (track.residual, track.last_residual) {
+        (Some(now), Some(last)) => distance(now, last) > DIFFERENT * scale,
+        _ => false,
+    }
+}
+
+/// Whether a track lies in another target's box and moves as that one does.
+fn follows_other(track: &Track, own: &Labelled, targets: &[Labelled], scale: f64) -> bool {
+    let Some(residual) = track.residual else { return false };
+    distance(residual, own.velocity) > DIFFERENT * scale
+        && targets.iter().any(|other| {
+            other.id != own.id
+                && holds(other.bounds, track.position, 1.0, 0.0)
+                && distance(residual, other.velocity) < ALIKE * scale
+                && distance(other.velocity, own.velocity) > DIFFERENT * scale
+        })
+}
+
+/// Middle motion of some tracks relative to the background, px/frame.
+pub(super) fn median_residual<'a>(tracks: impl Iterator<Item = &'a Track> + Clone) -> Option<[f64; 2]> {
+    let along = |i: usize| median(&mut tracks.clone().filter_map(|track| Some(track.residual?[i])).collect::<Vec<_>>());
+    Some([along(0)?, along(1)?])
+}
+
+/// Gives and takes labels after a frame, by the estimated boxes.
+pub(super) fn assign(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
+    for track in tracks {
+        if let Some(owner) = track.owner {
+            let stays = targets.iter().any(|own| own.id == owner && holds(own.bounds, track.position, KEEP, 0.0));
+            if stays {
+                continue;
+            }
+            track.owner = None;
+        }
+        let mut around = targets.iter().filter(|target| holds(target.bounds, track.position, KEEP, 0.0));
+        let (Some(own), None, Some(residual)) = (around.next(), around.next(), track.residual) else { continue };
+        let fits = holds(own.bounds, track.position, 1.0, 0.0)
+            && track.foreground > MIN_FOREGROUND
+            && distance(residual, own.velocity) < GAIN_DIFFERENCE * scale;
+        if fits && !own.is_hidden {
+            track.owner = Some(own.id);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn track(position: [f64; 2], residual: [f64; 2], foreground: f64, owner: Option<u64>) -> Track {
+        let residual = Some(residual);
+        Track { id: 0, position, flow: [0.0; 2], residual, last_residual: residual, foreground, owner }
+    }
+
+    fn target(id: u64, x: f64, velocity: [f64; 2]) -> Labelled {
+        Labelled { id, bounds: [x, 50.0, 20.0, 40.0], velocity, is_hidden: false, is_unlike: false }
+    }
+
+    #[test]
+    fn labels_are_gained_inside_one_box_only() {
+        let targets = [target(1, 50.0, [2.0, 0.0]), target(2, 73.0, [-2.0, 0.0])];
+        let mut tracks = [
+            track([45.0, 50.0], [2.0, 0.0], 0.9, None),
+            track([61.5, 50.0], [2.0, 0.0], 0.9, None),
+            track([45.0, 50.0], [2.0, 0.0], 0.5, None),
+            track([45.0, 50.0], [-3.0, 0.0], 0.9, None),
+            track([62.0, 50.0], [2.0, 0.0], 0.1, Some(1)),
+            track([90.0, 50.0], [2.0, 0.0], 0.1, Some(1)),
+        ];
+        assign(&mut tracks, &targets, 1.0);
+        assert_eq!(tracks.map(|track| track.owner), [Some(1), None, None, None, Some(1), None]);
+        let hidden = [Labelled { is_hidden: true, ..targets[0] }];
+        let mut tracks = [track([45.0, 50.0], [2.0, 0.0], 0.9, None)];
+        assign(&mut tracks, &hidden, 1.0);
+        assert_eq!(tracks[0].owner, None);
+    }
+
+    #[test]
+    fn a_target_that_stops_keeps_its_tracks_and_one_that_covers_takes_none() {
+        let targets = [target(1, 50.0, [3.0, 0.0]), target(2, 55.0, [-3.0, 0.0])];
+        // All jump at once: the target itself has stopped.
+        let stopped = |_| Track { last_residual: Some([3.0, 0.0]), ..track([45.0, 50.0], [0.0, 0.0], 0.5, Some(1)) };
+        let mut tracks = [0, 1, 2, 3].map(stopped);
+        review(&mut tracks, &targets, 1.0);
+        assert!(tracks.iter().all(|track| track.owner == Some(1)));
+        // One of many moves with the other target, in its box.
+        let mut tracks =
+            [0, 1, 2, 3].map(|k| track([50.0, 50.0], if k == 0 { [-3.0, 0.0] } else { [3.0, 0.0] }, 0.9, Some(1)));
+        review(&mut tracks, &targets, 1.0);
+        assert_eq!(tracks.map(|track| track.owner), [None, Some(1), Some(1), Some(1)]);
+    }
+
+    #[test]
+    fn doubtful_tracks_lose_their_label_while_the_colours_are_unlike() {
+        for (unlike, owner) in [(false, Some(1)), (true, None)] {
+            let targets = [Labelled { is_unlike: unlike, ..target(1, 50.0, [3.0, 0.0]) }];
+            let mut tracks =
+                [0, 1, 2, 3].map(|k| track([50.0, 50.0], [3.0, 0.0], if k == 0 { 0.1 } else { 0.9 }, Some(1)));
+            review(&mut tracks, &targets, 1.0);
+            assert_eq!(tracks.map(|track| track.owner), [owner, Some(1), Some(1), Some(1)]);
+        }
+    }
+}

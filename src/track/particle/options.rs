@@ -1,0 +1,284 @@
+//! Options of the particle tracker, and the lengths that go with the size of the picture.
+
+use crate::error::{Error, Result};
+use crate::filter::particle::Resampling;
+use crate::parallel::Threads;
+use crate::segment::SegmentOptions;
+
+/// Rows of the pictures that the lengths below are given for; others multiply them by rows / 480.
+const REFERENCE_ROWS: f64 = 480.0;
+/// Colour distance at which the segmentation lets regions grow, grey levels.
+const SEGMENT_SCALE: f64 = 150.0;
+/// Smoothing before the segmentation, px.
+const SEGMENT_SIGMA: f64 = 0.8;
+/// Smallest region in a picture of 480 rows, px^2.
+const SEGMENT_AREA: f64 = 120.0;
+/// Smallest number of particles that a weighted covariance of six components makes sense for.
+const MIN_PARTICLES: usize = 8;
+
+/// Which evidence weighs the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ParticleMode {
+    /// Corner tracks on a target must move with it; hidden targets are recognised; particles ride on the background's affine motion.
+    #[default]
+    Improved,
+    /// The published method: a foreground map from a mixture over the flow of corners and a graph segmentation.
+    Paper,
+}
+
+impl ParticleMode {
+    /// Every mode.
+    pub const ALL: [Self; 2] = [Self::Improved, Self::Paper];
+
+    /// The word used on the command line and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Improved => "improved",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+/// How a corner's flow becomes a probability of not being background.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ForegroundModel {
+    /// 1 - N(f) / max N of the background's Gaussian.
+    #[default]
+    Ratio,
+    /// 1 - responsibility of the background's component.
+    Posterior,
+    /// 1 - N(f), clipped to 0..1: as printed, although a density is no probability.
+    Literal,
+    /// 1 - probability of following the background's affine motion.
+    Affine,
+}
+
+impl ForegroundModel {
+    /// Every model.
+    pub const ALL: [Self; 4] = [Self::Ratio, Self::Posterior, Self::Literal, Self::Affine];
+
+    /// The word used in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ratio => "ratio",
+            Self::Posterior => "posterior",
+            Self::Literal => "literal",
+            Self::Affine => "affine",
+        }
+    }
+}
+
+/// The factors of a particle's likelihood, each of which can be left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Likelihoods {
+    /// Histograms of hue and saturation in bands.
+    pub colour: bool,
+    /// Near the constant-velocity prediction.
+    pub velocity: bool,
+    /// Away from the predictions of near targets.
+    pub distance: bool,
+    /// Corner tracks in the box move with the particle.
+    pub tracks: bool,
+    /// The foreground map at the centre.
+    pub foreground: bool,
+}
+
+impl Likelihoods {
+    /// Names of the factors, in the order of the fields.
+    pub const NAMES: [&'static str; 5] = ["colour", "velocity", "distance", "tracks", "foreground"];
+
+    /// The factors that a mode uses unless told otherwise.
+    pub fn of(mode: ParticleMode) -> Self {
+        let improved = mode == ParticleMode::Improved;
+        Self { colour: true, velocity: true, distance: !improved, tracks: improved, foreground: !improved }
+    }
+
+    /// The factors with these names.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `likelihoods` for a name that is not known.
+    pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self> {
+        let mut on = [false; Self::NAMES.len()];
+        for name in names {
+            let known = Self::NAMES.iter().position(|known| *known == name.as_ref());
+            let at = known.ok_or_else(|| {
+                Error::argument("likelihoods", format!("names among {}", Self::NAMES.join(", ")), name.as_ref())
+            })?;
+            on[at] = true;
+        }
+        let [colour, velocity, distance, tracks, foreground] = on;
+        Ok(Self { colour, velocity, distance, tracks, foreground })
+    }
+}
+
+/// Options of [`ParticleTracker`](super::ParticleTracker).
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParticleOptions {
+    /// Which evidence weighs the particles; default: improved.
+    pub mode: ParticleMode,
+    /// Particles of a target; default 1000.
+    pub n_particles: usize,
+    /// Particles of a target while another one is near; default 2000.
+    pub n_near: usize,
+    /// Factor of all lengths; default `None`: rows / 480.
+    pub scale: Option<f64>,
+    /// Factors of the likelihood; default `None`: those of the mode.
+    pub likelihoods: Option<Likelihoods>,
+    /// How particles are drawn; default multinomial.
+    pub resampling: Resampling,
+    /// Particles are drawn when the effective sample size is below this share of them; default 1: in every frame.
+    pub ess_threshold: f64,
+    /// What makes a corner foreground (paper mode); default: the ratio.
+    pub foreground: ForegroundModel,
+    /// Scale of the segmentation, grey levels; default 150.
+    pub segment_scale: f64,
+    /// Smoothing before the segmentation, px; default 0.8.
+    pub segment_sigma: f64,
+    /// Smallest region, px^2; default `None`: 120 times the square of the scale.
+    pub segment_min_size: Option<usize>,
+    /// Seed of all random numbers; default 0.
+    pub seed: u64,
+    /// Number of threads.
+    pub threads: Threads,
+}
+
+impl Default for ParticleOptions {
+    fn default() -> Self {
+        Self {
+            mode: ParticleMode::Improved,
+            n_particles: 1000,
+            n_near: 2000,
+            scale: None,
+            likelihoods: None,
+            resampling: Resampling::Multinomial,
+            ess_threshold: 1.0,
+            foreground: ForegroundModel::Ratio,
+            segment_scale: SEGMENT_SCALE,
+            segment_sigma: SEGMENT_SIGMA,
+            segment_min_size: None,
+            seed: 0,
+            threads: Threads::default(),
+        }
+    }
+}
+
+impl ParticleOptions {
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        for (name, count) in [("n_particles", self.n_particles), ("n_near", self.n_near)] {
+            if count < MIN_PARTICLES {
+                return Err(Error::argument(name, format!("at least {MIN_PARTICLES} particles"), count));
+            }
+        }
+        if let Some(scale) = self.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
+            return Err(Error::argument("scale", "a positive number", scale));
+        }
+        if !(0.0..=1.0).contains(&self.ess_threshold) {
+            return Err(Error::argument("ess_threshold", "a share from 0 to 1", self.ess_threshold));
+        }
+        self.segmentation(1.0).check()?;
+        self.threads.check().map(|_| ())
+    }
+
+    /// Factors of the likelihood in use.
+    pub fn factors(&self) -> Likelihoods {
+        self.likelihoods.unwrap_or_else(|| Likelihoods::of(self.mode))
+    }
+
+    /// Factor of all lengths for a picture of this many rows.
+    pub fn length_scale(&self, rows: usize) -> f64 {
+        self.scale.unwrap_or(rows as f64 / REFERENCE_ROWS)
+    }
+
+    /// Options of the segmentation at a length scale.
+    pub(super) fn segmentation(&self, scale: f64) -> SegmentOptions {
+        let min_size = self.segment_min_size.unwrap_or((SEGMENT_AREA * scale * scale).round() as usize);
+        SegmentOptions { scale: self.segment_scale, sigma: self.segment_sigma, min_size }
+    }
+}
+
+/// Standard deviations of the position within which targets are near each other, along each axis (equation (7) of the paper).
+const NEAR: f64 = 6.0;
+
+/// Noise of the transition and the start, in a picture of 480 rows: lengths in px, times in frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    /// Of the position, px.
+    pub position: f64,
+    /// Of the velocity, px/frame.
+    pub velocity: f64,
+    /// Of the logarithm of the size, common to both sides.
+    pub size: f64,
+    /// Of the logarithm of the aspect; `None`: the sides are independent.
+    pub aspect: Option<f64>,
+}
+
+impl Noise {
+    /// That of a mode at a length scale.
+    pub fn of(mode: ParticleMode, scale: f64) -> Self {
+        match mode {
+            ParticleMode::Paper => Self { position: 6.5 * scale, velocity: 0.2 * scale, size: 0.01, aspect: None },
+            ParticleMode::Improved => {
+                Self { position: 4.0 * scale, velocity: 0.35 * scale, size: 0.01, aspect: Some(0.003) }
+            }
+        }
+    }
+}
+
+impl Noise {
+    /// All of it multiplied by a factor.
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            position: factor * self.position,
+            velocity: factor * self.velocity,
+            size: factor * self.size,
+            aspect: self.aspect.map(|aspect| factor * aspect),
+        }
+    }
+}
+
+/// Distance up to which targets are near each other, and parts of the foreground belong to a target, px.
+pub(super) fn near_radius(scale: f64) -> f64 {
+    NEAR * std::f64::consts::SQRT_2 * Noise::of(ParticleMode::Paper, scale).position
+}
+
+/// Weight of the colour similarity in the log-likelihood, no unit.
+pub(super) fn colour_gain(mode: ParticleMode) -> f64 {
+    match mode {
+        ParticleMode::Paper => 12.0,
+        ParticleMode::Improved => 15.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_out_of_range_are_named() {
+        let defaults = ParticleOptions::default;
+        for (name, options) in [
+            ("n_particles", ParticleOptions { n_particles: 0, ..defaults() }),
+            ("n_near", ParticleOptions { n_near: 7, ..defaults() }),
+            ("scale", ParticleOptions { scale: Some(f64::NAN), ..defaults() }),
+            ("ess_threshold", ParticleOptions { ess_threshold: 1.5, ..defaults() }),
+            ("scale", ParticleOptions { segment_scale: -1.0, ..defaults() }),
+        ] {
+            let message = options.check().unwrap_err().to_string();
+            assert!(message.starts_with(&format!("{name}: expected ")), "{message}");
+        }
+        assert!(defaults().check().is_ok());
+    }
+
+    #[test]
+    fn factors_have_names() {
+        assert_eq!(
+            Likelihoods::from_names(&["colour", "velocity", "tracks"]).unwrap(),
+            Likelihoods::of(ParticleMode::Improved)
+        );
+        assert!(Likelihoods::from_names(&["color"]).unwrap_err().to_string().starts_with("likelihoods: "));
+    }
+}

@@ -1,0 +1,113 @@
+//! A target that was hidden for some frames takes over tracks that move together and belong to nobody.
+
+use super::corners::Track;
+use super::geometry::{covered_share, distance, holds};
+use super::labels::median_residual;
+use super::target::{Moment, Target};
+
+/// Frames that a target must have been hidden for.
+const HIDDEN_FRAMES: usize = 4;
+/// Probability of not being background of a track that can be taken over.
+const MIN_FOREGROUND: f64 = 0.7;
+/// Growth of the reach across in each hidden frame, px at 480 rows.
+const REACH_GROWTH: f64 = 2.0;
+/// Largest reach across over the width, and the reach up and down over the height; half a box is added to both.
+const REACH: [f64; 2] = [2.5, 0.4];
+/// Greatest difference of motion in a group, px/frame at 480 rows.
+const TOGETHER: f64 = 2.4;
+/// Smallest group, and its share of the usual number of tracks.
+const MIN_GROUP: (f64, f64) = (6.0, 0.3);
+/// Centres that are tried about a group, to each side, and how far apart the outermost are, over width and height.
+const TRIALS: (i32, [f64; 2]) = (2, [0.4, 0.2]);
+/// Share of the usual similarity that the best centre must have.
+const MIN_SIMILARITY: f64 = 0.75;
+/// A group belongs rather to another target within this of it, over width and height.
+const OTHER_REACH: [f64; 2] = [1.0, 0.6];
+
+/// Where a hidden target was found again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Recovery {
+    pub place: [f64; 2],
+    /// Velocity relative to the background, px/frame.
+    pub velocity: [f64; 2],
+}
+
+/// Looks for the target in the densest group of tracks without an owner.
+pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Option<Recovery> {
+    let seeing = &moment.seeing[own];
+    if seeing.hidden < HIDDEN_FRAMES || !moment.factors.tracks || !moment.factors.colour {
+        return None;
+    }
+    // Two hidden targets in one place cannot be told apart.
+    let twin = |l: &super::seeing::Seeing| {
+        l.id != seeing.id && !l.is_out && l.hidden > 0 && covered_share(seeing.bounds, l.bounds) > 0.0
+    };
+    if moment.seeing.iter().any(twin) {
+        return None;
+    }
+    let group = densest_group(&free_tracks(own, moment), seeing.bounds, moment.scale);
+    if (group.len() as f64) < MIN_GROUP.0.max(MIN_GROUP.1 * target.presence.tracks) {
+        return None;
+    }
+    let velocity = median_residual(group.iter().copied())?;
+    let middle = [0, 1].map(|i| group.iter().map(|track| track.position[i]).sum::<f64>() / group.len() as f64);
+    if belongs_to_other(middle, velocity, own, moment) {
+        return None;
+    }
+    let [_, _, w, h] = seeing.bounds;
+    let (steps, range) = TRIALS;
+    let mut best: Option<(f64, [f64; 2])> = None;
+    for j in -steps..=steps {
+        for i in -steps..=steps {
+            let offset = |k: i32, share: f64, side: f64| f64::from(k) / f64::from(steps) * share * side;
+            let place = [middle[0] + offset(i, range[0], w), middle[1] + offset(j, range[1], h)];
+            let similarity = target.appearance.similarity(moment.bins, [place[0], place[1], w, h]);
+            if best.is_none_or(|(most, _)| similarity > most) {
+                best = Some((similarity, place));
+            }
+        }
+    }
+    let (similarity, place) = best?;
+    let usual = target.presence.similarity?;
+    (similarity >= MIN_SIMILARITY * usual).then_some(Recovery { place, velocity })
+}
+
+/// Tracks without an owner within reach of a hidden target, outside the boxes of those that are seen.
+fn free_tracks<'a>(own: usize, moment: &'a Moment<'_>) -> Vec<&'a Track> {
+    let seeing = &moment.seeing[own];
+    let [x, y, w, h] = seeing.bounds;
+    let grown = w + REACH_GROWTH * moment.scale * seeing.hidden as f64;
+    let reach = [grown.min(REACH[0] * w) + 0.5 * w, (REACH[1] + 0.5) * h];
+    let is_free = |track: &&Track| {
+        track.owner.is_none()
+            && track.residual.is_some()
+            && track.foreground > MIN_FOREGROUND
+            && (track.position[0] - x).abs() <= reach[0]
+            && (track.position[1] - y).abs() <= reach[1]
+            && !moment
+                .seeing
+                .iter()
+                .any(|l| l.id != seeing.id && !l.is_out && l.hidden == 0 && holds(l.bounds, track.position, 1.0, 0.0))
+    };
+    moment.tracks.iter().filter(is_free).collect()
+}
+
+/// The most tracks that lie within half a box of one of them and move with it.
+fn densest_group<'a>(tracks: &[&'a Track], [_, _, w, h]: [f64; 4], scale: f64) -> Vec<&'a Track> {
+    let together = |a: &Track, b: &Track| {
+        let (Some(p), Some(q)) = (a.residual, b.residual) else { return false };
+        holds([a.position[0], a.position[1], w, h], b.position, 1.0, 0.0) && distance(p, q) < TOGETHER * scale
+    };
+    let group = |middle: &&Track| tracks.iter().copied().filter(|track| together(middle, track)).collect::<Vec<_>>();
+    tracks.iter().map(group).fold(Vec::new(), |best, group| if group.len() > best.len() { group } else { best })
+}
+
+/// Whether a group lies near another target whose usual velocity it fits better.
+fn belongs_to_other(middle: [f64; 2], velocity: [f64; 2], own: usize, moment: &Moment<'_>) -> bool {
+    let seeing = &moment.seeing[own];
+    moment.seeing.iter().filter(|l| l.id != seeing.id && !l.is_out).any(|other| {
+        let more = REACH_GROWTH * moment.scale * other.hidden as f64;
+        let near = (0..2).all(|i| (middle[i] - other.place[i]).abs() < OTHER_REACH[i] * other.bounds[2 + i] + more);
+        near && distance(velocity, other.usual_velocity) < distance(velocity, seeing.usual_velocity)
+    })
+}

@@ -1,0 +1,129 @@
+//! From what the tracker holds to what it reports.
+
+use super::appearance::CentredBox;
+use super::camera::CameraMotion;
+use super::seeing::Seeing;
+use super::step::{CornerTrack, ParticleStep, ParticleTarget};
+use super::target::Target;
+use super::tracker::ParticleTracker;
+use crate::types::{TargetBox, TrackState, TrackStatus};
+
+/// The step at the tracker's frame. `seen`: whether the frame cut the scene; `None` if nothing was looked for, as in the first frame.
+pub(super) fn report(
+    tracker: &ParticleTracker,
+    camera: &CameraMotion,
+    seeing: &[Seeing],
+    seen: Option<bool>,
+) -> ParticleStep {
+    let count = tracker.targets.len();
+    let mut near = vec![false; count * count];
+    for (own, seeing) in seeing.iter().enumerate() {
+        for &other in &seeing.near {
+            near[own * count + other] = true;
+        }
+    }
+    let target = |(own, target): (usize, &Target)| {
+        let n_tracks = tracker.corners.tracks.iter().filter(|track| track.owner == Some(target.id)).count();
+        let (status, reason) = status_of(target, seeing.get(own), seen, tracker.frame);
+        let before = tracker.step.targets.iter().find(|before| before.id == target.id);
+        ParticleTarget {
+            id: target.id,
+            state: state_of(target, tracker.frame, camera, (status, reason), before),
+            size: [target.estimate[4], target.estimate[5]],
+            covariance: target.cloud.covariance(&target.cloud.mean()),
+            effective_sample_size: target.effective_sample_size,
+            similarity: target.similarity,
+            n_tracks,
+            degenerate: target.degenerate,
+        }
+    };
+    let tracks = if seen.is_some() { tracker.corners.tracks.iter().filter_map(corner).collect() } else { Vec::new() };
+    ParticleStep {
+        frame: tracker.frame,
+        targets: tracker.targets.iter().enumerate().map(target).collect(),
+        near,
+        camera: camera.to_affine(),
+        tracks,
+    }
+}
+
+fn corner(track: &super::corners::Track) -> Option<CornerTrack> {
+    Some(CornerTrack {
+        id: track.id,
+        position: track.position,
+        residual: track.residual?,
+        foreground: track.foreground,
+        owner: track.owner,
+    })
+}
+
+/// Status and its reason.
+fn status_of(
+    target: &Target,
+    seeing: Option<&Seeing>,
+    seen: Option<bool>,
+    frame: usize,
+) -> (TrackStatus, &'static str) {
+    let presence = &target.presence;
+    let is_covered = seeing.is_some_and(|seeing| !seeing.near.is_empty() && seeing.is_covered);
+    if target.is_out {
+        (TrackStatus::Out, "the centre has left the picture")
+    } else if presence.is_lost() {
+        (TrackStatus::Lost, "hidden for more than 30 frames")
+    } else if seen.is_none() && frame > 0 && !target.is_new {
+        (TrackStatus::Coasting, "the frame shows nothing")
+    } else if seen == Some(true) {
+        (TrackStatus::Coasting, "the scene was cut")
+    } else if presence.is_hidden() {
+        let reason = if is_covered { "hidden by another target" } else { "hidden: few of its tracks, colours unlike" };
+        (TrackStatus::Coasting, reason)
+    } else if is_covered {
+        (TrackStatus::Occluded, "another target covers half of it")
+    } else if presence.is_low {
+        (TrackStatus::Occluded, "colours unlike those it usually has")
+    } else if target.degenerate {
+        (TrackStatus::Tracking, "no particle had a weight: the estimate is the prediction")
+    } else {
+        (TrackStatus::Tracking, "")
+    }
+}
+
+/// The state that files and overlays are written from.
+fn state_of(
+    target: &Target,
+    frame: usize,
+    camera: &CameraMotion,
+    (status, reason): (TrackStatus, &'static str),
+    before: Option<&ParticleTarget>,
+) -> TrackState {
+    let [x, y, w, h]: CentredBox = target.bounds();
+    let [u, v] = target.velocity();
+    let moved = camera.at([x, y]);
+    let covariance = target.cloud.covariance(&target.cloud.mean());
+    let unknown = f64::NAN;
+    let axis = |i: usize| {
+        let (pp, pv, vv) = (covariance[i][i], covariance[i][i + 2], covariance[i + 2][i + 2]);
+        [[pp, pv, unknown], [pv, vv, unknown], [unknown; 3]]
+    };
+    let was_gone = before.is_some_and(|before| matches!(before.state.status, TrackStatus::Lost | TrackStatus::Out));
+    let usual = target.presence.similarity.unwrap_or(target.similarity);
+    TrackState {
+        frame,
+        status,
+        reason,
+        reacquired: was_gone && status.is_measured(),
+        velocity: [u + moved[0], v + moved[1]],
+        acceleration: [unknown; 2],
+        scene_velocity: [u, v],
+        camera_motion: moved,
+        covariance: [axis(0), axis(1)],
+        displacement: before.map_or([unknown; 2], |b| [x - b.state.position[0], y - b.state.position[1]]),
+        scale: (w * h / (target.first_size[0] * target.first_size[1])).sqrt(),
+        rotation: unknown,
+        rotation_observable: false,
+        visibility: if usual > 0.0 { (target.similarity / usual).min(1.0) } else { 0.0 },
+        gain: unknown,
+        flow_count: 0,
+        ..TrackState::at([x, y], TargetBox::about([x, y], w, h))
+    }
+}

@@ -1,0 +1,150 @@
+//! Before a frame is weighed: where each target should be, which are near each other, and which are hidden.
+
+use super::appearance::CentredBox;
+use super::camera::CameraMotion;
+use super::corners::Track;
+use super::geometry::{covered_share, distance, holds};
+use super::labels::{Labelled, review};
+use super::options::{ParticleMode, ParticleOptions, near_radius};
+use super::presence::COVER;
+use super::target::Target;
+
+/// Targets are near each other, too, if their boxes shrunk to this overlap.
+const NEAR_BOXES: f64 = 0.9;
+/// Share of the box that tracks which make a target seen again lie in, to each side of its place.
+const RETURN_BOX: f64 = 1.2;
+/// Probability of not being background of such a track.
+const RETURN_FOREGROUND: f64 = 0.7;
+/// Greatest difference of its motion, px/frame at 480 rows.
+const RETURN_DIFFERENCE: f64 = 2.4;
+
+/// How one target should be seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seeing {
+    pub id: u64,
+    /// Predicted centre, px.
+    pub place: [f64; 2],
+    /// Predicted box.
+    pub bounds: CentredBox,
+    /// Velocity relative to the background, px/frame, and the usual one.
+    pub velocity: [f64; 2],
+    pub usual_velocity: [f64; 2],
+    /// Frames since it became hidden.
+    pub hidden: usize,
+    /// Whether it left the picture.
+    pub is_out: bool,
+    /// Which others are near.
+    pub near: Vec<usize>,
+    /// Greatest likeness of a near one's reference, 0 to 1.
+    pub likeness: f64,
+    /// Whether another predicted box covers half of its own.
+    pub is_covered: bool,
+    /// Whether it becomes hidden in this frame while its colours are unlike.
+    pub entered_low: bool,
+    /// Labelled tracks.
+    pub labelled: usize,
+}
+
+/// Looks at all targets. Labels of tracks are reviewed, and hidden targets recognised, in improved mode.
+pub(super) fn look(
+    targets: &mut [Target],
+    tracks: &mut [Track],
+    camera: &CameraMotion,
+    (options, scale): (&ParticleOptions, f64),
+) -> Vec<Seeing> {
+    let mut seeing: Vec<Seeing> = targets.iter().map(|target| predicted(target, camera)).collect();
+    find_near(&mut seeing, targets, options, scale);
+    if !options.factors().tracks {
+        return seeing;
+    }
+    let labelled: Vec<Labelled> = targets
+        .iter()
+        .zip(&seeing)
+        .filter(|(target, _)| !target.is_out)
+        .map(|(target, seeing)| Labelled {
+            id: target.id,
+            bounds: seeing.bounds,
+            velocity: seeing.velocity,
+            is_hidden: target.presence.is_hidden(),
+            is_unlike: target.presence.is_low,
+        })
+        .collect();
+    review(tracks, &labelled, scale);
+    for own in 0..targets.len() {
+        let target = &mut targets[own];
+        let count = tracks.iter().filter(|track| track.owner == Some(target.id)).count();
+        seeing[own].labelled = count;
+        if target.is_out {
+            continue;
+        }
+        let returning = returning_tracks(tracks, &seeing, own, scale);
+        let entered = target.presence.decide(count, seeing[own].is_covered, returning);
+        seeing[own].entered_low = entered && target.presence.is_low;
+        seeing[own].hidden = target.presence.hidden;
+    }
+    seeing
+}
+
+/// Where a target should be.
+fn predicted(target: &Target, camera: &CameraMotion) -> Seeing {
+    let (place, velocity) = (target.place(), target.velocity());
+    let c = camera.at(place);
+    let place = [0, 1].map(|i| place[i] + c[i] + velocity[i]);
+    let growth = camera.growth();
+    Seeing {
+        id: target.id,
+        place,
+        bounds: [place[0], place[1], target.estimate[4] * growth, target.estimate[5] * growth],
+        velocity,
+        usual_velocity: target.presence.velocity,
+        hidden: target.presence.hidden,
+        is_out: target.is_out,
+        near: Vec::new(),
+        likeness: 0.0,
+        is_covered: false,
+        entered_low: false,
+        labelled: 0,
+    }
+}
+
+/// Whether two predicted boxes overlap once they are shrunk.
+fn boxes_touch(a: CentredBox, b: CentredBox) -> bool {
+    (0..2).all(|i| (a[i] - b[i]).abs() < 0.5 * NEAR_BOXES * (a[2 + i] + b[2 + i]))
+}
+
+fn find_near(seeing: &mut [Seeing], targets: &[Target], options: &ParticleOptions, scale: f64) {
+    let radius = near_radius(scale);
+    for own in 0..seeing.len() {
+        for other in 0..seeing.len() {
+            let (a, b) = (&seeing[own], &seeing[other]);
+            if own == other || a.is_out || b.is_out {
+                continue;
+            }
+            let touch = options.mode == ParticleMode::Improved && boxes_touch(a.bounds, b.bounds);
+            let covered = covered_share(a.bounds, b.bounds) >= COVER;
+            if distance(a.place, b.place) <= radius || touch {
+                let likeness = targets[own].appearance.likeness(&targets[other].appearance);
+                let own = &mut seeing[own];
+                own.near.push(other);
+                own.likeness = own.likeness.max(likeness.min(1.0));
+            }
+            seeing[own].is_covered |= covered;
+        }
+    }
+}
+
+/// How many tracks at a target's place, outside the others' boxes, move as it does.
+fn returning_tracks(tracks: &[Track], seeing: &[Seeing], own: usize, scale: f64) -> usize {
+    let target = &seeing[own];
+    let outside = |track: &&Track| {
+        !seeing.iter().any(|l| l.id != target.id && !l.is_out && holds(l.bounds, track.position, 1.0, 0.0))
+    };
+    let moves_alike =
+        |track: &&Track| track.residual.is_some_and(|r| distance(r, target.velocity) < RETURN_DIFFERENCE * scale);
+    tracks
+        .iter()
+        .filter(|track| track.foreground > RETURN_FOREGROUND && holds(target.bounds, track.position, RETURN_BOX, 0.0))
+        .filter(outside)
+        .filter(moves_alike)
+        .count()
+}

@@ -1,0 +1,349 @@
+//! The tracker: targets, corners and the last frame.
+
+use super::appearance::{CentredBox, visible_share};
+use super::camera::{CameraMotion, fit_background};
+use super::corners::Corners;
+use super::foreground::{ForegroundMap, background_flow};
+use super::geometry::centred;
+use super::labels::{Labelled, assign};
+use super::options::{ForegroundModel, ParticleMode, ParticleOptions};
+use super::report::report;
+use super::seeing::{Seeing, look};
+use super::step::ParticleStep;
+use super::target::{Moment, Target};
+use super::view::{View, level_gain};
+use crate::error::{Error, Result};
+use crate::flow::points::PointPyramid;
+use crate::math::random::CounterRng;
+use crate::segment::{Labels, felzenszwalb};
+use crate::types::{AnyColourFrame, Frame, TargetBox};
+use rayon::prelude::*;
+
+/// Smallest side of the pictures that are tracked in, px.
+const MIN_SIDE: usize = 8;
+/// The stream of random numbers of the background's motion: no target's number.
+const CAMERA_STREAM: u64 = u64::MAX;
+
+/// Follows several targets in colour frames by a particle filter each.
+///
+/// A target's particles hold centre, velocity and size. Its likelihood is a product of banded colour histograms, nearness to
+/// the constant-velocity prediction and, in improved mode, corner tracks that must move with the target; in paper mode the
+/// distance from other targets and a map of what is not background (K. Takechi, S. Fukui, Y. Iwahori, "Robust tracking by a
+/// particle filter with a probabilistic background model").
+///
+/// Deterministic: the same frames, boxes and seed give the same results, bit for bit, on any number of threads.
+#[derive(Debug, Clone)]
+pub struct ParticleTracker {
+    pub(super) options: ParticleOptions,
+    pub(super) size: (usize, usize),
+    pub(super) dtype: &'static str,
+    /// What samples are multiplied by to be grey levels.
+    pub(super) gain: f64,
+    /// Factor of all lengths.
+    pub(super) scale: f64,
+    pub(super) frame: usize,
+    pub(super) targets: Vec<Target>,
+    pub(super) corners: Corners,
+    /// Brightness of the last frame that showed something.
+    pub(super) pyramid: PointPyramid,
+    /// Colour bins of the last frame that showed something.
+    pub(super) bins: Frame<u8>,
+    /// The last frame, as it came.
+    pub(super) last: AnyColourFrame,
+    pub(super) step: ParticleStep,
+    pub(super) next_id: u64,
+}
+
+impl ParticleTracker {
+    /// Begins with a frame and the boxes of its targets, each with its number; there may be none yet.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `frame` for a picture with a side below 8 px, `boxes` for a box that is not finite, has no area or lies outside
+    /// the picture, `id` for a number given twice, or an option.
+    pub fn new(frame: &AnyColourFrame, targets: &[(u64, TargetBox)], options: &ParticleOptions) -> Result<Self> {
+        options.check()?;
+        let size = frame.size();
+        if size.0.min(size.1) < MIN_SIDE {
+            let expected = format!("a picture of at least {MIN_SIDE} x {MIN_SIDE} px");
+            return Err(Error::argument("frame", expected, format!("{} x {} px", size.0, size.1)));
+        }
+        let gain = level_gain(frame);
+        let scale = options.length_scale(size.1);
+        let (view, pyramid, corners) = options.threads.install(|| {
+            let view = View::new(frame, gain, options.mode == ParticleMode::Improved);
+            let mut corners = Corners::new(scale);
+            corners.top_up(&view.grey)?;
+            let pyramid = Corners::pyramid(view.grey.clone());
+            Ok::<_, Error>((view, pyramid, corners))
+        })?;
+        let step = ParticleStep {
+            frame: 0,
+            targets: vec![],
+            near: vec![],
+            camera: CameraMotion::NONE.to_affine(),
+            tracks: vec![],
+        };
+        let mut tracker = Self {
+            options: options.clone(),
+            size,
+            dtype: frame.dtype(),
+            gain,
+            scale,
+            frame: 0,
+            targets: Vec::new(),
+            corners,
+            pyramid,
+            bins: view.bins,
+            last: frame.clone(),
+            step,
+            next_id: 0,
+        };
+        for (id, bounds) in targets {
+            tracker.add(Some(*id), *bounds)?;
+        }
+        Ok(tracker)
+    }
+
+    /// Adds a target at the last frame; without a number it gets the next one. Returns its number.
+    ///
+    /// A target that left the picture may be added again under its number.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `box` or `id`, as [`ParticleTracker::new`].
+    pub fn add(&mut self, id: Option<u64>, bounds: TargetBox) -> Result<u64> {
+        let bounds = self.check_box(bounds)?;
+        let id = id.unwrap_or(self.next_id);
+        if let Some(known) = self.targets.iter().position(|target| target.id == id) {
+            if !self.targets[known].is_out {
+                return Err(Error::argument("id", "a number that is not in use", id));
+            }
+            self.targets.remove(known);
+        }
+        let target = Target::new(id, bounds, (&self.bins, self.frame), &self.options);
+        let at = self.targets.partition_point(|other| other.id < id);
+        self.targets.insert(at, target);
+        self.next_id = self.next_id.max(id.saturating_add(1));
+        self.step = report(self, &CameraMotion::NONE, &[], None);
+        Ok(id)
+    }
+
+    /// Removes a target.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `id` for a number that is not in use.
+    pub fn remove(&mut self, id: u64) -> Result<()> {
+        let Some(at) = self.targets.iter().position(|target| target.id == id) else {
+            let known: Vec<String> = self.targets.iter().map(|target| target.id.to_string()).collect();
+            return Err(Error::argument("id", format!("one of the numbers in use ({})", known.join(", ")), id));
+        };
+        self.targets.remove(at);
+        self.step.targets.remove(at);
+        let keep = |i: usize, k: usize| i / k != at && i % k != at;
+        let count = self.targets.len() + 1;
+        self.step.near = self.step.near.iter().enumerate().filter(|(i, _)| keep(*i, count)).map(|(_, n)| *n).collect();
+        for track in &mut self.corners.tracks {
+            track.owner = track.owner.filter(|owner| *owner != id);
+        }
+        Ok(())
+    }
+
+    /// The targets in the next frame.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `frame` for another size or sample type than the first frame's.
+    pub fn update(&mut self, frame: &AnyColourFrame) -> Result<&ParticleStep> {
+        self.update_with_camera(frame, None)
+    }
+
+    /// As [`ParticleTracker::update`], with the background's motion since the frame before where it is known: `(x', y') = A (x, y, 1)`, px.
+    ///
+    /// # Errors
+    /// As [`ParticleTracker::update`]; [`Error::Argument`] named `camera` for numbers that are not finite.
+    pub fn update_with_camera(
+        &mut self,
+        frame: &AnyColourFrame,
+        camera: Option<[[f64; 3]; 2]>,
+    ) -> Result<&ParticleStep> {
+        if (frame.size(), frame.dtype()) != (self.size, self.dtype) {
+            let words = |size: (usize, usize), dtype| format!("{} x {} px of {dtype}", size.0, size.1);
+            let expected = format!("a frame like the first one, {}", words(self.size, self.dtype));
+            return Err(Error::argument("frame", expected, words(frame.size(), frame.dtype())));
+        }
+        if let Some(camera) = camera.filter(|camera| !camera.as_flattened().iter().all(|value| value.is_finite())) {
+            let got = crate::error::numbers(camera.as_flattened());
+            return Err(Error::argument("camera", "an affine map (2, 3) of finite numbers", got));
+        }
+        let threads = self.options.threads;
+        threads.install(|| self.advance(frame, camera.map(CameraMotion::from_affine)))?;
+        Ok(&self.step)
+    }
+
+    /// The targets at the last frame.
+    pub fn step(&self) -> &ParticleStep {
+        &self.step
+    }
+
+    /// The options that the tracker was made with.
+    pub fn options(&self) -> &ParticleOptions {
+        &self.options
+    }
+
+    /// Particles of a target, N x 6 (centre x, y, velocity u, v, width, height), and their weights.
+    pub fn particles(&self, id: u64) -> Option<(&[[f64; 6]], &[f64])> {
+        let target = self.targets.iter().find(|target| target.id == id)?;
+        Some((&target.cloud.particles, &target.cloud.weights))
+    }
+
+    /// Segments of the last frame.
+    ///
+    /// # Errors
+    /// As [`felzenszwalb`].
+    pub fn segments(&self) -> Result<Labels> {
+        self.options.threads.install(|| self.segment(&self.last))
+    }
+
+    /// Foreground of the last frame, 0 to 1: density of the corners that are not background, averaged over segments,
+    /// over its maximum; all zero where there are no such corners.
+    ///
+    /// # Errors
+    /// As [`felzenszwalb`].
+    pub fn foreground(&self) -> Result<Frame<f32>> {
+        self.options.threads.install(|| {
+            let map = ForegroundMap::new(&self.corners.tracks, self.segment(&self.last)?, self.scale, &self.options)?;
+            Ok(map.picture())
+        })
+    }
+
+    fn segment(&self, frame: &AnyColourFrame) -> Result<Labels> {
+        felzenszwalb(&frame.scaled(self.gain), &self.options.segmentation(self.scale))
+    }
+
+    fn check_box(&self, bounds: TargetBox) -> Result<CentredBox> {
+        let TargetBox { x, y, width, height } = bounds;
+        let finite = [x, y, width, height].iter().all(|value| value.is_finite());
+        let inside = finite && width > 0.0 && height > 0.0 && visible_share(centred(bounds), self.size) > 0.0;
+        if inside {
+            return Ok(centred(bounds));
+        }
+        let (w, h) = self.size;
+        let expected = format!("left, top, width and height of a box with an area inside the {w} x {h} picture");
+        Err(Error::argument("box", expected, crate::error::numbers(&[x, y, width, height])))
+    }
+
+    /// One frame.
+    fn advance(&mut self, frame: &AnyColourFrame, known: Option<CameraMotion>) -> Result<()> {
+        let view = View::new(frame, self.gain, self.options.mode == ParticleMode::Improved);
+        if view.is_empty() {
+            self.frame += 1;
+            self.coast();
+            return Ok(());
+        }
+        let pyramid = Corners::pyramid(view.grey.clone());
+        let was_cut = self.corners.follow(&self.pyramid, &pyramid)?;
+        let camera = self.measure_background(known)?;
+        let map = self.foreground_map(&view)?;
+        self.frame += 1;
+        if was_cut {
+            self.corners.tracks.iter_mut().for_each(|track| track.owner = None);
+        }
+        let seeing = look(&mut self.targets, &mut self.corners.tracks, &camera, (&self.options, self.scale));
+        if was_cut {
+            self.targets
+                .iter_mut()
+                .filter(|target| !target.presence.is_hidden())
+                .for_each(|target| target.presence.hide());
+        }
+        let moment = Moment {
+            options: &self.options,
+            factors: self.options.factors(),
+            scale: self.scale,
+            frame: self.frame,
+            bins: &view.bins,
+            camera,
+            tracks: &self.corners.tracks,
+            foreground: map.as_ref(),
+            seeing: &seeing,
+        };
+        let active = self.targets.par_iter_mut().enumerate().filter(|(_, target)| !target.is_out);
+        active.for_each(|(own, target)| target.advance(own, &moment));
+        self.learn(&seeing, &camera, was_cut);
+        self.step = report(self, &camera, &seeing, Some(was_cut));
+        self.corners.top_up(&view.grey)?;
+        self.pyramid = pyramid;
+        self.bins = view.bins;
+        self.last = frame.clone();
+        Ok(())
+    }
+
+    /// Motion of the background; sets each track's residual motion and its probability of not being background.
+    fn measure_background(&mut self, known: Option<CameraMotion>) -> Result<CameraMotion> {
+        let points: Vec<[f64; 2]> = self.corners.tracks.iter().map(super::corners::Track::previous).collect();
+        let flow: Vec<[f64; 2]> = self.corners.tracks.iter().map(|track| track.flow).collect();
+        let by_mixture = self.options.mode == ParticleMode::Paper && self.options.foreground != ForegroundModel::Affine;
+        let (camera, foreground, relative) = if by_mixture && known.is_none() {
+            let background = background_flow(&flow, &self.options)?;
+            let relative = CameraMotion { shift: background.flow, ..CameraMotion::NONE };
+            (CameraMotion::NONE, background.foreground, relative)
+        } else {
+            let rng = CounterRng::new(self.options.seed).stream(CAMERA_STREAM).stream(self.frame as u64);
+            let background = fit_background(&points, &flow, known, &rng);
+            let foreground = background.probability.iter().map(|q| 1.0 - q).collect();
+            let rides = self.options.mode == ParticleMode::Improved || known.is_some();
+            (if rides { background.motion } else { CameraMotion::NONE }, foreground, background.motion)
+        };
+        for ((track, point), foreground) in self.corners.tracks.iter_mut().zip(points).zip(foreground) {
+            let c = relative.at(point);
+            track.residual = Some([0, 1].map(|i| track.flow[i] - c[i]));
+            track.foreground = foreground;
+        }
+        Ok(camera)
+    }
+
+    /// The foreground map, where it is a factor of the likelihood.
+    fn foreground_map(&self, view: &View) -> Result<Option<ForegroundMap>> {
+        if !self.options.factors().foreground || self.targets.is_empty() {
+            return Ok(None);
+        }
+        let labels = felzenszwalb(&view.colour, &self.options.segmentation(self.scale))?;
+        ForegroundMap::new(&self.corners.tracks, labels, self.scale, &self.options).map(Some)
+    }
+
+    /// The frame shows nothing: targets move on, nothing is learned.
+    fn coast(&mut self) {
+        for target in self.targets.iter_mut().filter(|target| !target.is_out) {
+            target.coast(&self.options, self.scale, self.frame);
+            target.is_out = !super::likelihood::is_inside(target.place(), self.size);
+        }
+        self.step = report(self, &CameraMotion::NONE, &[], None);
+    }
+
+    /// What the frame teaches: usual values, labels of tracks, who has left.
+    fn learn(&mut self, seeing: &[Seeing], camera: &CameraMotion, was_cut: bool) {
+        for (target, seeing) in self.targets.iter_mut().zip(seeing).filter(|(target, _)| !target.is_out) {
+            if self.options.factors().colour {
+                target.presence.judge(target.similarity);
+            }
+            let is_alone = seeing.near.is_empty() && !target.presence.is_hidden() && !was_cut;
+            if !(is_alone && target.presence.learn(target.similarity, seeing.labelled, &target.estimate)) {
+                target.presence.clear_place = target.presence.moved_on(camera);
+            }
+            target.is_out = !super::likelihood::is_inside(target.place(), self.size);
+        }
+        if !self.options.factors().tracks || was_cut {
+            return;
+        }
+        let labelled: Vec<Labelled> = self
+            .targets
+            .iter()
+            .filter(|target| !target.is_out)
+            .map(|target| Labelled {
+                id: target.id,
+                bounds: target.bounds(),
+                velocity: target.velocity(),
+                is_hidden: target.presence.is_hidden(),
+                is_unlike: target.presence.is_low,
+            })
+            .collect();
+        assign(&mut self.corners.tracks, &labelled, self.scale);
+    }
+}
