@@ -1,10 +1,12 @@
-//! Jets and instantaneous flow, 640x480, f32, one thread, at each instruction set of this processor.
+//! Jets, instantaneous flow, corners and flow at points, 640x480, f32, one thread, at each instruction set of this processor.
 //!
 //! The frames are a noise texture in affine motion with noise and rounding, as a camera would deliver it.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use jacoflow::flow::instantaneous::InstantaneousOptions;
+use jacoflow::flow::points::{PointFlowOptions, PointPyramid, track_points};
 use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::image::{CORNER_WINDOW, CornerOptions, corner_score_into, select_corners};
 use jacoflow::jet::{JetStencil, Neighbourhood, TimeScheme};
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
@@ -81,6 +83,30 @@ fn instantaneous(c: &mut Criterion) {
     group.finish();
 }
 
+fn points(c: &mut Criterion) {
+    let [before, after] = [0, 1].map(|t| frames().swap_remove(t));
+    let mut group = c.benchmark_group("points_640x480_f32");
+    let mut score = Frame::default();
+    for level in Level::available() {
+        group.bench_function(BenchmarkId::new("corner_score", level.name()), |b| {
+            b.iter(|| corner_score_into(level, black_box(&before), CORNER_WINDOW, &mut score).expect("a window"));
+        });
+    }
+    let options = CornerOptions { max_count: 1600, ..CornerOptions::default() };
+    let corners = select_corners(&score, &[], &options);
+    group.bench_function("select_corners", |b| b.iter(|| select_corners(black_box(&score), &[], &options)));
+    let [before, after] = [before, after].map(|frame| PointPyramid::new(frame, 3));
+    group.throughput(Throughput::Elements(corners.len() as u64));
+    for (window, level) in [11, 19].into_iter().flat_map(|w| Level::available().into_iter().map(move |l| (w, l))) {
+        let options = PointFlowOptions { window, simd: Some(level), ..PointFlowOptions::default() };
+        let run = || track_points(black_box(&before), &after, &corners, None, &options).expect("valid options");
+        group.bench_function(BenchmarkId::new(format!("track_points_{window}x{window}"), level.name()), |b| {
+            one_thread().install(|| b.iter(run));
+        });
+    }
+    group.finish();
+}
+
 fn quick() -> Criterion {
     Criterion::default()
         .sample_size(30)
@@ -88,5 +114,5 @@ fn quick() -> Criterion {
         .measurement_time(Duration::from_secs(2))
 }
 
-criterion_group!(name = layers; config = quick(); targets = jets, instantaneous);
+criterion_group!(name = layers; config = quick(); targets = jets, instantaneous, points);
 criterion_main!(layers);

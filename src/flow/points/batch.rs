@@ -47,7 +47,8 @@ impl PointFlow {
 ///
 /// Parallel over points; identical for any number of threads.
 ///
-/// # Errors [`Error::Argument`] for frames of different size, as many guesses as points not given, or an
+/// # Errors
+/// [`Error::Argument`] for frames of different size, as many guesses as points not given, or an
 /// option out of its range.
 pub fn track_points(
     before: &PointPyramid,

@@ -102,10 +102,14 @@ impl Window {
         for x in (0..self.stride).step_by(V::LANES) {
             let inside = zero.lt(V::load(&self.inside[x..]));
             for row in 0..self.side {
-                let at = |dx: usize, dy: usize| V::load(&self.patch[(row + dy) * self.patch_stride + x + dx..]);
-                let gx = V::select(inside, (at(2, 1) - at(0, 1)) * half, zero);
-                let gy = V::select(inside, (at(1, 2) - at(1, 0)) * half, zero);
-                let centre = at(1, 1);
+                let above = &self.patch[row * self.patch_stride + x..];
+                let level = &above[self.patch_stride..];
+                let below = &level[self.patch_stride..];
+                let along = V::load(&level[2..]) - V::load(level);
+                let down = V::load(&below[1..]) - V::load(&above[1..]);
+                let gx = V::select(inside, along * half, zero);
+                let gy = V::select(inside, down * half, zero);
+                let centre = V::load(&level[1..]);
                 let out = row * self.stride + x;
                 centre.store(&mut self.brightness[out..]);
                 gx.store(&mut self.slope_x[out..]);
@@ -114,7 +118,7 @@ impl Window {
             }
         }
         let area = self.area();
-        Tensor([xx, xy, yy].map(|sum| total(sum) / area))
+        Tensor([total(xx) / area, total(xy) / area, total(yy) / area])
     }
 
     /// The samples of the window and of 1 px around it.
@@ -163,7 +167,7 @@ impl Window {
             }
         }
         let area = self.area();
-        [sum_x, sum_y].map(|sum| total(sum) / area)
+        [total(sum_x) / area, total(sum_y) / area]
     }
 
     /// Mean absolute difference from the window around `centre` of the second frame, grey levels.

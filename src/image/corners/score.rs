@@ -96,14 +96,18 @@ impl Band<'_> {
             cover!(width, V, |x, N| {
                 let mut sums = [[V::zero(); N]; 3];
                 for at in 0..side {
-                    for (sum, row) in sums.iter_mut().zip(under(at)) {
-                        let values = load::<V, N>(&row[x..]);
+                    let rows = under(at);
+                    for k in 0..3 {
+                        let values = load::<V, N>(&rows[k][x..]);
                         for i in 0..N {
-                            sum[i] = sum[i] + values[i];
+                            sums[k][i] = sums[k][i] + values[i];
                         }
                     }
                 }
-                let score: [V; N] = std::array::from_fn(|i| smaller_eigenvalue(sums.map(|sum| sum[i])) * mean);
+                let mut score = [V::zero(); N];
+                for i in 0..N {
+                    score[i] = smaller_eigenvalue([sums[0][i], sums[1][i], sums[2][i]]) * mean;
+                }
                 store(&score, &mut out[x..]);
             });
         }
@@ -147,9 +151,12 @@ impl Slopes {
         cover!(width, V, |x, N| {
             let (a, m) = (load::<V, N>(&above[x..]), load::<V, N>(&middle[x..]));
             let b = load::<V, N>(&below[x..]);
-            let smooth: [V; N] = std::array::from_fn(|i| m[i].mul_add(V::constant(2.0), a[i] + b[i]));
-            // Zero times the middle: a bad sample there must not be overlooked.
-            let difference: [V; N] = std::array::from_fn(|i| m[i].mul_add(V::zero(), b[i] - a[i]));
+            let (mut smooth, mut difference) = ([V::zero(); N], [V::zero(); N]);
+            for i in 0..N {
+                smooth[i] = m[i].mul_add(V::constant(2.0), a[i] + b[i]);
+                // Zero times the middle: a bad sample there must not be overlooked.
+                difference[i] = m[i].mul_add(V::zero(), b[i] - a[i]);
+            }
             store(&smooth, &mut self.smooth[x + 1..]);
             store(&difference, &mut self.difference[x + 1..]);
         });
@@ -161,12 +168,15 @@ impl Slopes {
             let (before, here) = (load::<V, N>(&self.difference[x..]), load::<V, N>(&self.difference[x + 1..]));
             let after = load::<V, N>(&self.difference[x + 2..]);
             let eighth = V::constant(0.125);
-            let gx: [V; N] = std::array::from_fn(|i| (right[i] - left[i]) * eighth);
-            let gy: [V; N] = std::array::from_fn(|i| here[i].mul_add(V::constant(2.0), before[i] + after[i]) * eighth);
-            let product = |f: &[V; N], g: &[V; N]| -> [V; N] { std::array::from_fn(|i| f[i] * g[i]) };
-            store(&product(&gx, &gx), &mut xx[radius + x..]);
-            store(&product(&gx, &gy), &mut xy[radius + x..]);
-            store(&product(&gy, &gy), &mut yy[radius + x..]);
+            let mut products = [[V::zero(); N]; 3];
+            for i in 0..N {
+                let gx = (right[i] - left[i]) * eighth;
+                let gy = here[i].mul_add(V::constant(2.0), before[i] + after[i]) * eighth;
+                (products[0][i], products[1][i], products[2][i]) = (gx * gx, gx * gy, gy * gy);
+            }
+            store(&products[0], &mut xx[radius + x..]);
+            store(&products[1], &mut xy[radius + x..]);
+            store(&products[2], &mut yy[radius + x..]);
         });
         for (products, out) in self.products.iter_mut().zip(out) {
             replicate(products, radius);

@@ -1,5 +1,6 @@
 //! The choice of corners: best first, at a distance from each other and from points that are there already.
 
+use crate::error::{Error, Result};
 use crate::types::Frame;
 
 /// Options of [`select_corners`].
@@ -9,7 +10,7 @@ pub struct CornerOptions {
     pub max_count: usize,
     /// Minimum score, as a share of the best score in the frame, 0 to 1. Default 0.005.
     pub quality: f64,
-    /// Minimum distance between corners, and from existing points, px. Default 6.
+    /// Minimum distance between corners, and from existing points, px, finite. Default 6.
     pub min_distance: f64,
     /// Pixels at each side of the frame where no corner is taken. Default 1.
     pub margin: usize,
@@ -18,6 +19,22 @@ pub struct CornerOptions {
 impl Default for CornerOptions {
     fn default() -> Self {
         Self { max_count: 500, quality: 0.005, min_distance: 6.0, margin: 1 }
+    }
+}
+
+impl CornerOptions {
+    /// Rejects values outside the ranges above.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn check(&self) -> Result<()> {
+        if !(0.0..=1.0).contains(&self.quality) {
+            return Err(Error::argument("quality", "a number from 0 to 1", self.quality));
+        }
+        if !(self.min_distance >= 0.0 && self.min_distance.is_finite()) {
+            return Err(Error::argument("min_distance", "a finite number >= 0", self.min_distance));
+        }
+        Ok(())
     }
 }
 
@@ -83,8 +100,8 @@ impl Candidate {
     }
 }
 
-/// Values looked at together while searching for large ones.
-const STRIP: usize = 64;
+/// Values looked at together.
+const STRIP: usize = 16;
 
 /// The larger of two; `best` where the other is NaN.
 fn larger(best: f32, value: f32) -> f32 {
@@ -107,27 +124,29 @@ fn best_score(score: &Frame<f32>) -> f32 {
 fn candidates(score: &Frame<f32>, options: &CornerOptions) -> Vec<Candidate> {
     let (width, height) = score.size();
     let threshold = (f64::from(best_score(score)) * options.quality) as f32;
-    let columns = options.margin..width - options.margin;
     let mut found = Vec::new();
+    // The largest of each column of three rows, with a column that exceeds nothing at either end.
+    let mut columns = vec![0.0f32; width + 2];
+    let mut is_maximum = vec![0u8; width];
     for y in options.margin..height - options.margin {
-        let row = score.row(y);
-        let neighbours =
-            [y.checked_sub(1).map(|y| score.row(y)), Some(row), (y + 1 < height).then(|| score.row(y + 1))];
-        for start in columns.clone().step_by(STRIP) {
-            let strip = start..(start + STRIP).min(columns.end);
-            // Most of a frame is below the threshold.
-            if row[strip.clone()].iter().fold(0.0, |best, &value| larger(best, value)) < threshold {
-                continue;
-            }
-            for x in strip {
-                let value = row[x];
-                if value > 0.0 && value >= threshold {
-                    let around = x.saturating_sub(1)..(x + 2).min(width);
-                    let exceeded =
-                        neighbours.iter().flatten().any(|row| row[around.clone()].iter().any(|&v| v > value));
-                    if !exceeded {
-                        found.push(Candidate { score: value, index: (y * width + x) as u32 });
-                    }
+        let (above, row) = (score.row(y.saturating_sub(1)), score.row(y));
+        let below = score.row((y + 1).min(height - 1));
+        for (x, largest) in columns[1..=width].iter_mut().enumerate() {
+            *largest = larger(larger(larger(0.0, above[x]), row[x]), below[x]);
+        }
+        let (left, middle, right) = (&columns[..width], &columns[1..=width], &columns[2..]);
+        for (x, is_maximum) in is_maximum.iter_mut().enumerate() {
+            let value = row[x];
+            let is_large = (value > 0.0) & (value >= threshold);
+            *is_maximum = u8::from(is_large & (value >= left[x]) & (value >= middle[x]) & (value >= right[x]));
+        }
+        is_maximum[..options.margin].fill(0);
+        is_maximum[width - options.margin..].fill(0);
+        for (strip, flags) in is_maximum.chunks(STRIP).enumerate() {
+            // Few pixels are maxima: strips without any are passed over whole.
+            if flags.iter().fold(0, |any, flag| any | flag) != 0 {
+                for x in (strip * STRIP..).take(flags.len()).filter(|&x| is_maximum[x] != 0) {
+                    found.push(Candidate { score: row[x], index: (y * width + x) as u32 });
                 }
             }
         }
