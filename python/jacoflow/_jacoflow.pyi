@@ -53,6 +53,8 @@ __all__ = [
     "_local_flow",
     "_mean_flow",
     "_mixture_densities",
+    "_mixture_dirichlet_densities",
+    "_mixture_dirichlet_fit",
     "_mixture_fit",
     "_mixture_partial_fit",
     "_motion3d_beside",
@@ -966,6 +968,14 @@ def _mean_flow(flow: NDArray[np.float64], accepted: NDArray[np.bool_], eps: floa
 def _detect_moving_target(
     first: NDArray[Any], second: NDArray[Any], center: list[float] | None
 ) -> tuple[list[float], list[float]] | None: ...
+def _mixture_dirichlet_fit(
+    points: NDArray[np.float64], weights: NDArray[np.float64] | None, parameters: dict[str, Any], responsibilities: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    """Dirichlet-process mixture of points (N, D) with weights (N,), from responsibilities (N, K) or seeds, as a dictionary of its attributes."""
+def _mixture_dirichlet_densities(
+    points: NDArray[np.float64], components: dict[str, Any], threads: int | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Log densities (N,) of points (N, D) under a mixture that `_mixture_dirichlet_fit` returned, and responsibilities (N, K)."""
 def _mixture_fit(
     points: NDArray[np.float64],
     weights: NDArray[np.float64] | None,

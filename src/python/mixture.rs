@@ -13,12 +13,15 @@ use pyo3::types::{PyDict, PyDictMethods};
 type Array = (Vec<usize>, Vec<f64>);
 
 /// An entry of a dictionary that the Python class made.
-fn entry<'py, T: for<'a> FromPyObject<'a, 'py, Error = PyErr>>(from: &Bound<'py, PyDict>, name: &str) -> PyResult<T> {
+pub(super) fn entry<'py, T: for<'a> FromPyObject<'a, 'py, Error = PyErr>>(
+    from: &Bound<'py, PyDict>,
+    name: &str,
+) -> PyResult<T> {
     from.as_any().get_item(name)?.extract()
 }
 
 /// An array of a dictionary.
-fn numbers(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<Vec<f64>> {
+pub(super) fn numbers(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<Vec<f64>> {
     Ok(arrays::doubles(name, &from.as_any().get_item(name)?)?.1)
 }
 
@@ -29,22 +32,38 @@ fn optional(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<Option<Arr
 }
 
 /// A count: an integer, positive; which ones are too small the core says.
-fn count(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<usize> {
+pub(super) fn count(from: &Bound<'_, PyDict>, name: &'static str) -> PyResult<usize> {
     let value: super::options::Integer = entry(from, name)?;
     usize::try_from(value.0).map_err(|_| Error::argument(name, "a positive integer", value.0).into())
 }
 
-/// The core's options from the parameters of the Python class.
-fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptions> {
-    let covariance_prior = match optional(from, "covariance_prior")? {
-        None => CovariancePrior::Data,
-        Some((shape, values)) if shape.is_empty() => CovariancePrior::Isotropic(values[0]),
-        Some((shape, values)) if shape == [dimensions, dimensions] => CovariancePrior::Full(values),
+/// The prior of covariances: nothing, a number or a matrix.
+pub(super) fn covariance_prior(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<CovariancePrior> {
+    match optional(from, "covariance_prior")? {
+        None => Ok(CovariancePrior::Data),
+        Some((shape, values)) if shape.is_empty() => Ok(CovariancePrior::Isotropic(values[0])),
+        Some((shape, values)) if shape == [dimensions, dimensions] => Ok(CovariancePrior::Full(values)),
         Some((shape, _)) => {
             let expected = format!("a number or a matrix ({dimensions}, {dimensions})");
-            return Err(Error::argument("covariance_prior", expected, format!("shape {shape:?}")).into());
+            Err(Error::argument("covariance_prior", expected, format!("shape {shape:?}")).into())
         }
+    }
+}
+
+/// First responsibilities (N, K), if given.
+pub(super) fn shares(given: Option<&Bound<'_, PyAny>>, components: usize) -> PyResult<Option<Vec<f64>>> {
+    let Some((shape, shares)) = given.map(|shares| arrays::doubles("resp", shares)).transpose()? else {
+        return Ok(None);
     };
+    if shape.len() != 2 || shape[1] != components {
+        let expected = format!("responsibilities (N, {components})");
+        return Err(Error::argument("resp", expected, format!("shape {shape:?}")).into());
+    }
+    Ok(Some(shares))
+}
+
+/// The core's options from the parameters of the Python class.
+fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptions> {
     let seeding = match entry::<String>(from, "init")?.as_str() {
         "kmeans++" => Seeding::KMeans,
         "random" => Seeding::Random,
@@ -56,7 +75,7 @@ fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptio
         mean_precision_prior: entry(from, "mean_precision_prior")?,
         mean_prior: optional(from, "mean_prior")?.map(|(_, values)| values),
         degrees_of_freedom_prior: entry(from, "degrees_of_freedom_prior")?,
-        covariance_prior,
+        covariance_prior: covariance_prior(from, dimensions)?,
         max_iter: count(from, "max_iter")?,
         tol: entry(from, "tol")?,
         n_init: count(from, "n_init")?,
@@ -68,14 +87,14 @@ fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptio
 }
 
 /// Points (N, D) and their weights (N) as they came.
-struct Sample {
-    dimensions: usize,
+pub(super) struct Sample {
+    pub dimensions: usize,
     values: Vec<f64>,
     weights: Option<Vec<f64>>,
 }
 
 impl Sample {
-    fn new(x: &Bound<'_, PyAny>, weights: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    pub fn new(x: &Bound<'_, PyAny>, weights: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let (shape, values) = arrays::doubles("X", x)?;
         let [_, dimensions] = shape[..] else {
             return Err(Error::argument("X", "points (N, D)", format!("shape {shape:?}")).into());
@@ -87,7 +106,7 @@ impl Sample {
         Ok(Self { dimensions, values, weights: weights.map(|(_, values)| values) })
     }
 
-    fn points(&self) -> Points<'_> {
+    pub fn points(&self) -> Points<'_> {
         Points { dimensions: self.dimensions, values: &self.values, weights: self.weights.as_deref() }
     }
 }
@@ -167,15 +186,11 @@ pub fn mixture_fit<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let sample = Sample::new(points, weights)?;
     let options = options(parameters, sample.dimensions)?;
-    let shares = responsibilities.map(|shares| arrays::doubles("resp", shares)).transpose()?;
-    if let Some((shape, _)) = shares.as_ref().filter(|(shape, _)| shape.len() != 2 || shape[1] != options.components) {
-        let expected = format!("responsibilities (N, {})", options.components);
-        return Err(Error::argument("resp", expected, format!("shape {shape:?}")).into());
-    }
+    let shares = shares(responsibilities, options.components)?;
     let components = start.map(posterior).transpose()?;
     let result = py.detach(|| {
         let start = match (&shares, &components) {
-            (Some((_, shares)), _) => Start::Responsibilities(shares),
+            (Some(shares), _) => Start::Responsibilities(shares),
             (None, Some(components)) => Start::Components(components),
             (None, None) => Start::Seeds,
         };

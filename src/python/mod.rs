@@ -5,6 +5,7 @@
 
 mod arrays;
 mod command;
+mod dirichlet_mixture;
 mod errors;
 mod estimate;
 mod field;
@@ -32,6 +33,8 @@ use pyo3::prelude::*;
 mod _jacoflow {
     #[pymodule_export]
     use super::command::run_command_line;
+    #[pymodule_export]
+    use super::dirichlet_mixture::{mixture_dirichlet_densities, mixture_dirichlet_fit};
     #[pymodule_export]
     use super::errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError};
     #[pymodule_export]

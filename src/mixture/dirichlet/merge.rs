@@ -14,6 +14,9 @@ const TRIALS: usize = 3;
 /// Least gain of F, responsibilities held, with which a pair is tried: expectation-maximization may make up for the rest.
 const MIN_GAIN: f64 = -20.0;
 
+/// Smallest responsibility that counts for entropy: quotients by smaller ones overflow, and their entropy is below rounding.
+const MIN_SHARE: f64 = 1e-280;
+
 /// A pair of components.
 type Pair = (usize, usize);
 
@@ -105,6 +108,19 @@ fn shares_of(problem: &Problem, run: &Run) -> Vec<Vec<f64>> {
 /// `sum_n w_n [(a + b) ln (a + b) - a ln a - b ln b]` of the responsibilities of a pair, never negative.
 fn entropy_lost(weights: &[f64], shares: &[Vec<f64>], (i, j): Pair) -> f64 {
     let points = weights.iter().zip(shares[i].iter().zip(&shares[j]));
-    let shared = points.filter(|(w, (a, b))| **w > 0.0 && **a > 0.0 && **b > 0.0);
+    let shared = points.filter(|(w, (a, b))| **w > 0.0 && a.min(**b) > MIN_SHARE);
     shared.map(|(w, (a, b))| w * (a * ((a + b) / a).ln() + b * ((a + b) / b).ln())).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smallest_responsibilities_lose_no_entropy() {
+        let smallest = f64::from_bits(1);
+        let shares = [vec![1.0, 0.5, smallest], vec![smallest, 0.5, 0.0]];
+        let lost = entropy_lost(&[1.0, 2.0, 1.0], &shares, (0, 1));
+        assert!((lost - 2.0 * std::f64::consts::LN_2).abs() < 1e-15, "{lost}");
+    }
 }

@@ -209,6 +209,17 @@ fn gains_of_pairs_are_differences_of_the_score() {
 }
 
 #[test]
+fn merging_puts_one_gaussian_together() {
+    for seed in 0..10 {
+        let rng = CounterRng::new(seed);
+        let x: Vec<f64> = (0..800).map(|i| rng.normal(i)).collect();
+        let points = Points { dimensions: 2, values: &x, weights: None };
+        let mixture = fit_dirichlet(&points, &DirichletOptions { seed, ..DirichletOptions::default() }).unwrap();
+        assert_near(&mixture.counts[..2], &[400.0, 0.0], 1e-9);
+    }
+}
+
+#[test]
 fn degenerate_points_are_legal() {
     let line: Vec<f64> = (0..40).flat_map(|n| [f64::from(n), 2.0 * f64::from(n)]).collect();
     let cases: [(&[f64], usize); 5] =

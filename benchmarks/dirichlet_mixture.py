@@ -1,0 +1,142 @@
+"""Dirichlet-process mixtures on random data with known clusters, beside scikit-learn's, in one process.
+
+    python benchmarks/dirichlet_mixture.py [--seeds 10] [--rounds 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import timing
+from jacoflow.mixture import DirichletProcessGaussianMixture
+
+Array = NDArray[np.float64]
+Row = dict[str, object]
+COMPONENTS = 12
+"""Largest number of components of every method."""
+ACTIVE_SHARE = 0.005
+"""Weight above which a component counts."""
+CORRELATION = 0.8
+"""Largest correlation of the axes of a blob, no unit."""
+SPACING = 6.0
+"""Distance between the centres of neighbouring blobs, standard deviations."""
+
+
+def flow(rng: np.random.Generator) -> tuple[Array, NDArray[np.int64]]:
+    """Flow vectors (440, 2) of a background, two moving objects and outliers, and their classes."""
+    parts = [
+        rng.normal((1.5, -0.6), 0.12, (350, 2)), rng.normal((3.0, -0.5), (0.4, 0.3), (40, 2)),
+        rng.normal((-1.0, -0.5), (0.4, 0.3), (35, 2)), rng.uniform(-6, 6, (15, 2)),
+    ]  # fmt: skip
+    return np.concatenate(parts), np.repeat(np.arange(4), [len(part) for part in parts])
+
+
+def blobs(rng: np.random.Generator) -> tuple[Array, NDArray[np.int64]]:
+    """Five correlated clusters of 60 to 200 points, one in the middle and four around it, and their classes."""
+    centres = SPACING * np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]])
+    parts = []
+    for centre in centres:
+        correlation = rng.uniform(-CORRELATION, CORRELATION)
+        parts.append(rng.multivariate_normal(centre, [[1, correlation], [correlation, 1]], rng.integers(60, 201)))
+    return np.concatenate(parts), np.repeat(np.arange(5), [len(part) for part in parts])
+
+
+def one(rng: np.random.Generator) -> tuple[Array, NDArray[np.int64]]:
+    """400 points of one Gaussian, and their class."""
+    return rng.normal(size=(400, 2)), np.zeros(400, np.int64)
+
+
+def small(rng: np.random.Generator) -> tuple[Array, NDArray[np.int64]]:
+    """25 and 15 points at a distance of 7.3 standard deviations, and their classes."""
+    labels = np.repeat([0, 1], [25, 15])
+    return rng.normal(size=(40, 2)) + np.outer(labels, [7.3, 0.0]), labels
+
+
+DATA: dict[str, Callable[[np.random.Generator], tuple[Array, NDArray[np.int64]]]] = {"flow": flow, "blobs": blobs, "one": one, "small": small}
+"""Random data by name."""
+
+
+def methods(seed: int) -> dict[str, Any]:
+    """Mixtures by name, not yet fitted."""
+    ours = {"n_components": COMPONENTS, "random_state": seed, "threads": 1}
+    out: dict[str, Any] = {
+        "MAP-EM": DirichletProcessGaussianMixture(merge=False, **ours),
+        "MAP-EM, merging": DirichletProcessGaussianMixture(**ours),
+        "variational": DirichletProcessGaussianMixture(inference="vb", merge=False, **ours),
+        "variational, merging": DirichletProcessGaussianMixture(inference="vb", **ours),
+    }
+    try:
+        from sklearn.mixture import BayesianGaussianMixture
+    except ImportError:
+        return out
+    out["scikit-learn"] = BayesianGaussianMixture(
+        n_components=COMPONENTS, weight_concentration_prior_type="dirichlet_process", weight_concentration_prior=1.0, random_state=seed
+    )
+    return out
+
+
+def adjusted_rand(first: NDArray[np.int64], second: NDArray[np.int64]) -> float:
+    """Adjusted Rand index of two divisions (N,) of the same points (L. Hubert and P. Arabie, "Comparing partitions", 1985)."""
+
+    def pairs(counts: Array) -> float:
+        return float((counts * (counts - 1) / 2).sum())
+
+    table = np.zeros((first.max() + 1, second.max() + 1))
+    np.add.at(table, (first, second), 1)
+    both, rows, columns, total = pairs(table), pairs(table.sum(1)), pairs(table.sum(0)), len(first) * (len(first) - 1) / 2
+    expected, largest = rows * columns / total, (rows + columns) / 2
+    return 1.0 if largest == expected else (both - expected) / (largest - expected)
+
+
+def quiet(mixture: Any, points: Array) -> Any:
+    """Fits a mixture; scikit-learn's warnings of missing convergence are not shown."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return mixture.fit(points)
+
+
+def scores(data: str, method: str, seed: int) -> tuple[int, float, float]:
+    """Number of components above `ACTIVE_SHARE`, largest weight and adjusted Rand index of one fit."""
+    points, labels = DATA[data](np.random.default_rng(seed))
+    mixture = quiet(methods(seed)[method], points)
+    return int((mixture.weights_ > ACTIVE_SHARE).sum()), float(mixture.weights_.max()), adjusted_rand(labels, mixture.predict(points))
+
+
+def table(seeds: int = 10, rounds: int = 3) -> list[Row]:
+    """One row for each kind of data and method: means over the seeds, and milliseconds of a fit of seed 0 on one thread."""
+    rows: list[Row] = []
+    for data, draw in DATA.items():
+        points, _ = draw(np.random.default_rng(0))
+        times = timing.race({name: lambda m=mixture: quiet(m, points) for name, mixture in methods(0).items()}, rounds)
+        reference = times["scikit-learn"].busiest if "scikit-learn" in times else float("nan")
+        for name, time in times.items():
+            counts, weights, rands = zip(*(scores(data, name, seed) for seed in range(seeds)), strict=True)
+            rows.append(
+                {
+                    "data": data, "method": name, "components": f"{np.median(counts):g} ({min(counts)}-{max(counts)})",
+                    "largest_weight": f"{np.mean(weights):.3f}", "adjusted_rand": f"{np.mean(rands):.3f}",
+                    "milliseconds": f"{1000 * time.busiest:.2f}", "scikit-learn_over_it": f"{reference / time.busiest:.1f}",
+                }
+            )  # fmt: skip
+    return rows
+
+
+def main() -> None:
+    """Prints the table."""
+    import compare
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=10, help="number of random data sets of each kind")
+    parser.add_argument("--rounds", type=int, default=3, help="runs of each fit, taken in turns; the best counts")
+    arguments = parser.parse_args()
+    print("\n".join(compare.table_lines(table(arguments.seeds, arguments.rounds))))
+
+
+if __name__ == "__main__":
+    main()
