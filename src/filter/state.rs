@@ -248,7 +248,8 @@ pub(super) fn expect(name: &'static str, values: &[f64], lengths: &[usize]) -> R
     if lengths.contains(&values.len()) {
         return Ok(());
     }
-    let allowed: Vec<_> = lengths.iter().map(ToString::to_string).collect();
+    let mut allowed: Vec<_> = lengths.iter().map(ToString::to_string).collect();
+    allowed.dedup();
     Err(Error::argument(name, format!("{} values", allowed.join(" or ")), format!("{} values", values.len())))
 }
 

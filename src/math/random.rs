@@ -7,7 +7,8 @@ pub struct CounterRng {
     key: u64,
 }
 
-/// The finaliser of `SplitMix64` (G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", 2014).
+/// The finaliser of `SplitMix64` (G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number
+/// generators", 2014).
 #[inline]
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -55,7 +56,8 @@ impl CounterRng {
 
     /// Fills `out` with standard normals: the pairs from index `first` on, one after another.
     ///
-    /// A pair costs about as much as one [`Self::normal`]. Of an odd number the last pair's second is left out.
+    /// A pair costs about as much as one [`Self::normal`]. Of an odd number the last pair's second is left
+    /// out.
     #[inline]
     pub fn fill_normal(&self, first: u64, out: &mut [f64]) {
         for (index, out) in (first..).zip(out.chunks_mut(2)) {

@@ -1,7 +1,7 @@
 //! Resampling (selection): particles are copied in proportion to their weights.
 //!
-//! Schemes: R. Douc, O. Cappé, E. Moulines, "Comparison of resampling schemes for particle filtering", 2005. In each the expected number of
-//! copies of particle i is `count w_i`; they differ in its variance.
+//! Schemes: R. Douc, O. Cappé, E. Moulines, "Comparison of resampling schemes for particle filtering", 2005.
+//! In each the expected number of copies of particle i is `count w_i`; they differ in its variance.
 
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
@@ -14,10 +14,12 @@ pub enum Resampling {
     Multinomial,
     /// One position in each of `count` equal intervals, each with its own uniform number.
     Stratified,
-    /// Positions `(i + u) / count` with one uniform number for all: copies differ from `count w` by less than 1.
+    /// Positions `(i + u) / count` with one uniform number for all: copies differ from `count w` by less than
+    /// 1.
     #[default]
     Systematic,
-    /// `floor(count w)` copies of each, the rest by independent draws from the remainders (J. S. Liu and R. Chen 1998).
+    /// `floor(count w)` copies of each, the rest by independent draws from the remainders (J. S. Liu and R.
+    /// Chen 1998).
     Residual,
 }
 
@@ -56,11 +58,13 @@ impl Resampling {
     }
 }
 
-/// `count` indices of particles, into `out`, by `scheme` and the numbers `uniform(0), uniform(1), ...` in [0, 1].
+/// `count` indices of particles, into `out`, by `scheme` and the numbers `uniform(0), uniform(1), ...` in [0,
+/// 1].
 ///
-/// `weights` are linear and need not be normalised. A position t in [0, 1] selects the first particle with a weight above zero whose
-/// cumulative weight is at least t times the sum. Indices ascend, except that multinomial draws keep the order of their numbers, as do
-/// those at the end of residual resampling. A weight that is negative or NaN counts as zero. `out` stays empty if no weight is positive.
+/// `weights` are linear and need not be normalised. A position t in [0, 1] selects the first particle with a
+/// weight above zero whose cumulative weight is at least t times the sum. Indices ascend, except that
+/// multinomial draws keep the order of their numbers, as do those at the end of residual resampling. A weight
+/// that is negative or NaN counts as zero. `out` stays empty if no weight is positive.
 pub fn resample_indices(
     scheme: Resampling,
     weights: &[f64],

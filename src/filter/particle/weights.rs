@@ -1,9 +1,11 @@
 //! Weights of particles: normalisation in logarithms and the effective sample size.
 
-/// Normalises log weights so that their exponentials sum to 1, by log-sum-exp; returns the logarithm of the sum before.
+/// Normalises log weights so that their exponentials sum to 1, by log-sum-exp; returns the logarithm of the
+/// sum before.
 ///
-/// NaN counts as `-inf`, a weight of zero. With `w_i L_i` given, `w` normalised, the result is the log evidence `log sum_i w_i L_i`.
-/// `None`, and nothing is changed, if no weight is above zero or if one is `+inf`: these cannot be normalised.
+/// NaN counts as `-inf`, a weight of zero. With `w_i L_i` given, `w` normalised, the result is the log
+/// evidence `log sum_i w_i L_i`. `None`, and nothing is changed, if no weight is above zero or if one is
+/// `+inf`: these cannot be normalised.
 pub fn normalise_log_weights(log_weights: &mut [f64]) -> Option<f64> {
     let largest = log_weights.iter().fold(f64::NEG_INFINITY, |most, &value| most.max(value));
     if !largest.is_finite() {
@@ -23,9 +25,11 @@ pub fn linear_weights(log_weights: &[f64], out: &mut Vec<f64>) {
     out.extend(log_weights.iter().map(|value| value.exp()));
 }
 
-/// Effective sample size `(sum w)^2 / sum w^2` of linear weights, from 1 to their number; `1 / sum w^2` where they are normalised.
+/// Effective sample size `(sum w)^2 / sum w^2` of linear weights, from 1 to their number; `1 / sum w^2` where
+/// they are normalised.
 ///
-/// Source: A. Kong, J. S. Liu, W. H. Wong, "Sequential imputations and Bayesian missing data problems", 1994. 0 if every weight is 0.
+/// Source: A. Kong, J. S. Liu, W. H. Wong, "Sequential imputations and Bayesian missing data problems", 1994.
+/// 0 if every weight is 0.
 pub fn effective_sample_size(weights: &[f64]) -> f64 {
     effective(weights.iter().copied())
 }
