@@ -26,9 +26,12 @@ __all__ = [
     "GaussianFilter",
     "KalmanFilter",
     "MerweScaledSigmaPoints",
+    "ParticleFilter",
     "UnscentedKalmanFilter",
+    "resample",
     "_restore_extended",
     "_restore_kalman",
+    "_restore_particle",
     "_restore_unscented",
     "FlowFilter",
     "_restore_filter",
@@ -746,6 +749,163 @@ class MerweScaledSigmaPoints:
     def __hash__(self, /) -> int: ...
     def __getnewargs__(self, /) -> tuple[int, float, float, float]: ...
 
+_Particles: TypeAlias = Callable[[NDArray[np.float64]], ArrayLike]
+_Resampling: TypeAlias = Literal["systematic", "stratified", "residual", "multinomial"]
+
+@final
+class ParticleFilter:
+    """Particle filter: the posterior as N weighted samples, for any transition and any likelihood.
+
+    `dim_x` = n components, `n_particles` = N; `batch` = B runs B independent filters, every array then having
+    a leading axis (B, ...). A cycle is `predict`, `update`, `resample`. Weights are kept as logarithms.
+    Random numbers are addressed by (`random_state`, id, step, particle, component): results do not depend on
+    `threads`, and a filter of the batch is the same alone, given its number in `ids` (B,) (default 0 .. B -
+    1). Particles are zero at first: use `sample_gaussian` or set `x`. Units are the state's own.
+    Source: N. Gordon, D. Salmond, A. Smith, "Novel approach to nonlinear/non-Gaussian Bayesian state
+    estimation", 1993.
+    """
+    def __new__(
+        cls,
+        dim_x: int,
+        n_particles: int,
+        *,
+        batch: int | None = None,
+        random_state: int | None = None,
+        ids: Sequence[int] | None = None,
+        threads: int | None = None,
+    ) -> ParticleFilter: ...
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Particles, array (N, n) or (B, N, n), in the state's units; may be replaced or changed in place."""
+    @x.setter
+    def x(self, value: ArrayLike, /) -> None: ...
+    @property
+    def log_weights(self) -> NDArray[np.float64]:
+        """Logarithms of the normalised weights, read-only array (N,) or (B, N), no unit. Normalised when set;
+        NaN counts as -inf.
+        """
+    @log_weights.setter
+    def log_weights(self, value: ArrayLike, /) -> None: ...
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weights, which sum to 1, array (N,) or (B, N), no unit."""
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Weighted mean, array (n,) or (B, n), in the state's units."""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Weighted covariance sum w (x - mean)(x - mean)^T, array (n, n) or (B, n, n), in the state's units
+        squared.
+        """
+    @property
+    def P(self) -> NDArray[np.float64]:
+        """filterpy's name of `covariance`, array (n, n) or (B, n, n), in the state's units squared."""
+    @property
+    def map(self) -> NDArray[np.float64]:
+        """The particle with the largest weight, array (n,) or (B, n), in the state's units.
+
+        Read it before `resample`: afterwards all weights are equal, and it is the first particle.
+        """
+    @property
+    def effective_sample_size(self) -> NDArray[np.float64]:
+        """Effective sample size 1 / sum w^2 (Kong, Liu and Wong 1994), array () or (B,), a number of particles
+        from 1 to N, no unit.
+        """
+    @property
+    def log_evidence(self) -> NDArray[np.float64]:
+        """Logarithm of the last measurement's likelihood, log sum w_i L_i, array () or (B,), no unit; -inf if
+        the update was refused.
+        """
+    @property
+    def log_evidence_sum(self) -> NDArray[np.float64]:
+        """Sum of `log_evidence` over the accepted updates, array () or (B,), no unit."""
+    @property
+    def degenerate(self) -> NDArray[np.int64]:
+        """Number of updates refused because no particle had a likelihood above zero, array () or (B,) (a count,
+        no unit).
+        """
+    @property
+    def ids(self) -> NDArray[np.uint64]:
+        """Numbers by which the random numbers of each filter are addressed, array () or (B,), no unit."""
+    @property
+    def step(self) -> int:
+        """Number of predictions so far (a count, no unit)."""
+    @property
+    def dim_x(self) -> int:
+        """Components n of the state (a count, no unit)."""
+    @property
+    def n_particles(self) -> int:
+        """Number N of particles of each filter (a count, no unit)."""
+    @property
+    def batch(self) -> int | None:
+        """Number B of independent filters, or None where arrays have no leading axis (a count, no unit)."""
+    def quantile(self, /, q: ArrayLike) -> NDArray[np.float64]:
+        """Marginal quantiles of every component at `q` in [0, 1]: array (n,) or (B, n), with the axis of `q`
+        first if it is (k,), in the state's units.
+
+        The smallest value at which the cumulative weight is at least q, numpy's method "inverted_cdf".
+        """
+    def sample_gaussian(self, /, mean: ArrayLike, covariance: ArrayLike) -> None:
+        """Replaces the particles by samples of the Gaussian with `mean` (n,) or (B, n) and `covariance` (n, n)
+        or (B, n, n), in the state's units, and makes the weights equal. A number for `covariance` means that
+        multiple of the identity.
+        """
+    def predict(
+        self, /, transition: _Particles | None = None, *, F: ArrayLike | None = None, Q: ArrayLike | None = None
+    ) -> None:
+        """Moves every particle: x <- transition(x) + w or, without `transition`, x <- F x + w, w ~ N(0, Q).
+
+        `transition` maps all particles (N, n) or (B, N, n) to as many, in the state's units. `F` (default:
+        identity) and `Q` are (n, n) or (B, n, n); a number means that multiple of the identity. Without `Q`
+        no noise is added: the transition must be random itself, e.g. by `standard_normal()`. ValueError for
+        results that are not finite. On exceptions the filter is as before.
+        """
+    def standard_normal(self, /) -> NDArray[np.float64]:
+        """The standard normals of which the next prediction's noise is made, array (N, n) or (B, N, n), no unit."""
+    def update(self, /, log_likelihood: _Particles | ArrayLike) -> None:
+        """Multiplies the weights by the measurement's likelihood.
+
+        `log_likelihood` maps all particles (N, n) or (B, N, n) to logarithms (N,) or (B, N), no unit, or is
+        that array. NaN counts as -inf. A filter whose particles all have a likelihood of zero refuses the
+        update: weights stay and `degenerate` counts it. ValueError for +inf. On exceptions the filter is as
+        before.
+        """
+    def resample(
+        self,
+        /,
+        scheme: _Resampling = "systematic",
+        *,
+        threshold: float | None = None,
+        n_particles: int | None = None,
+    ) -> NDArray[np.bool_]:
+        """Copies particles in proportion to their weights, which are equal afterwards; returns whether, array ()
+        or (B,) of bool, no unit.
+
+        `scheme` is "systematic", "stratified", "residual" or "multinomial" (Douc, Cappe and Moulines 2005).
+        With a `threshold` in [0, 1] only filters whose effective sample size is below `threshold` N are
+        resampled. `n_particles` changes N, then in all filters.
+        """
+    def __reduce__(self, /) -> tuple[Any, ...]: ...
+
+def resample(
+    weights: ArrayLike,
+    n: int | None = None,
+    scheme: _Resampling = "systematic",
+    *,
+    uniforms: ArrayLike | None = None,
+    random_state: int | None = None,
+) -> NDArray[np.int64]:
+    """Indices (n,) of particles selected in proportion to `weights` (N,), which are not negative and need not
+    sum to 1, no unit.
+
+    `n` defaults to N. `scheme` is "systematic", "stratified", "residual" or "multinomial". A position t in
+    [0, 1] selects the first particle with a weight above zero whose cumulative weight is at least t times the
+    sum: (i + u) / n for i = 0 .. n - 1 with one u (systematic) or one each (stratified). Residual takes
+    floor(n w) copies of each first. `uniforms`, numbers in [0, 1], are used in their order; without them
+    those of `random_state` are. ValueError for other weights, or too few uniforms.
+    Source: R. Douc, O. Cappe, E. Moulines, "Comparison of resampling schemes for particle filtering", 2005.
+    """
+
 @final
 class UnscentedKalmanFilter(GaussianFilter):
     """Unscented Kalman filter x' = f(x) + w, z = h(x) + v (Julier and Uhlmann 1997, van der Merwe 2004).
@@ -1046,6 +1206,7 @@ def _restore_estimator(options: dict[str, Any], memory: dict[str, Any]) -> FlowE
 def _restore_extended(state: dict[str, Any]) -> ExtendedKalmanFilter: ...
 def _restore_field(state: dict[str, Any]) -> FlowField: ...
 def _restore_filter(options: dict[str, Any], state: tuple[bytes, str] | None) -> FlowFilter: ...
+def _restore_particle(state: dict[str, Any]) -> ParticleFilter: ...
 def _restore_kalman(state: dict[str, Any]) -> KalmanFilter: ...
 def _restore_unscented(state: dict[str, Any]) -> UnscentedKalmanFilter: ...
 def _run_command_line(arguments: list[str]) -> int: ...

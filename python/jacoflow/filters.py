@@ -1,4 +1,4 @@
-"""Kalman filters that know nothing of images: linear, extended and unscented, over a batch of independent states.
+"""Filters that know nothing of images: linear, extended and unscented Kalman filters and a particle filter, over a batch of states.
 
 Names follow filterpy: `x`, `P`, `Q`, `R`, `predict`, `update`. With `batch=B` every array has a leading axis (B, ...), and one call of a vectorised
 callback serves every state and every sigma point. Units are those of the state and the measurement.
@@ -13,6 +13,18 @@ callback serves every state and every sigma point. Units are those of the state 
 ...     f.update(z)
 >>> f.x.shape
 (2,)
+
+A particle filter takes any transition and any likelihood:
+
+>>> from jacoflow.filters import ParticleFilter
+>>> p = ParticleFilter(1, 1000, random_state=1)
+>>> p.sample_gaussian([0.0], 4.0)
+>>> for z in (1.0, 1.2, 1.1):
+...     p.predict(Q=0.1)
+...     p.update(lambda x: -0.5 * (x[:, 0] - z) ** 2 / 0.2)
+...     _ = p.resample("systematic", threshold=0.5)
+>>> bool(abs(p.mean[0] - 1.1) < 0.1)
+True
 """
 
 from ._jacoflow import (
@@ -20,7 +32,9 @@ from ._jacoflow import (
     GaussianFilter,
     KalmanFilter,
     MerweScaledSigmaPoints,
+    ParticleFilter,
     UnscentedKalmanFilter,
+    resample,
 )
 
 __all__ = [
@@ -28,5 +42,7 @@ __all__ = [
     "GaussianFilter",
     "KalmanFilter",
     "MerweScaledSigmaPoints",
+    "ParticleFilter",
     "UnscentedKalmanFilter",
+    "resample",
 ]

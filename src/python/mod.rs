@@ -43,8 +43,8 @@ mod _jacoflow {
     use super::field::{FlowField, quantities, restore_field, status_names};
     #[pymodule_export]
     use super::filters::{
-        ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter,
-        restore_extended, restore_kalman, restore_unscented,
+        ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, ParticleFilter,
+        UnscentedKalmanFilter, resample, restore_extended, restore_kalman, restore_particle, restore_unscented,
     };
 
     #[pymodule_export]

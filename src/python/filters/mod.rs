@@ -4,11 +4,13 @@ mod callback;
 mod extended;
 mod gaussian;
 mod kalman;
+mod particle;
 mod sigma_points;
 mod unscented;
 
 pub use extended::{ExtendedKalmanFilter, restore_extended};
 pub use gaussian::GaussianFilter;
 pub use kalman::{KalmanFilter, restore_kalman};
+pub use particle::{ParticleFilter, resample, restore_particle};
 pub use sigma_points::MerweScaledSigmaPoints;
 pub use unscented::{UnscentedKalmanFilter, restore_unscented};
