@@ -50,7 +50,7 @@ impl PointFlowOptions {
         if self.levels == 0 {
             return Err(Error::argument("levels", "an integer >= 1", 0));
         }
-        if self.window % 2 == 0 || !(3..=MAX_WINDOW).contains(&self.window) {
+        if self.window.is_multiple_of(2) || !(3..=MAX_WINDOW).contains(&self.window) {
             return Err(Error::argument("window", format!("an odd integer from 3 to {MAX_WINDOW}"), self.window));
         }
         if self.max_steps == 0 {

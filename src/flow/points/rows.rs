@@ -42,7 +42,7 @@ impl<'a> Rows<'a> {
     /// v(x))`.
     #[inline(always)]
     pub fn between<V: Lanes<Scalar = f32>>(&self, row: usize, x: usize, fraction: V) -> V {
-        let values = &self.values[row * self.stride + x..][..V::LANES + 1];
+        let values = &self.values[row * self.stride + x..][..=V::LANES];
         let (here, next) = (V::load(values), V::load(&values[1..]));
         (next - here).mul_add(fraction, here)
     }

@@ -35,7 +35,7 @@ pub fn corner_score(frame: &Frame<f32>, window: usize) -> Result<Frame<f32>> {
 /// # Errors
 /// As [`corner_score`].
 pub fn corner_score_into(level: Level, frame: &Frame<f32>, window: usize, score: &mut Frame<f32>) -> Result<()> {
-    if window % 2 == 0 || window > MAX_WINDOW {
+    if window.is_multiple_of(2) || window > MAX_WINDOW {
         return Err(Error::argument("window", format!("an odd integer from 1 to {MAX_WINDOW}"), window));
     }
     let (width, height) = frame.size();

@@ -49,7 +49,9 @@ pub fn select_corners(score: &Frame<f32>, existing: &[[f64; 2]], options: &Corne
         return Vec::new();
     }
     let mut grid = CellGrid::new(score.size(), options.min_distance);
-    existing.iter().for_each(|&point| grid.insert(point));
+    for &point in existing {
+        grid.insert(point);
+    }
     let mut candidates = candidates(score, options);
     candidates.retain(|c| grid.is_free(c.position(width)));
     // Only the best can be chosen, and mostly far fewer than there are: they are sorted as needed.
@@ -90,11 +92,12 @@ struct Candidate {
 
 impl Candidate {
     /// Best first, then in row-major order.
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "what sorting asks for")]
     fn order(a: &Self, b: &Self) -> std::cmp::Ordering {
         b.score.total_cmp(&a.score).then(a.index.cmp(&b.index))
     }
 
-    fn position(&self, width: usize) -> [f64; 2] {
+    fn position(self, width: usize) -> [f64; 2] {
         let index = self.index as usize;
         [(index % width) as f64, (index / width) as f64]
     }
@@ -124,6 +127,8 @@ fn best_score(score: &Frame<f32>) -> f32 {
 fn candidates(score: &Frame<f32>, options: &CornerOptions) -> Vec<Candidate> {
     let (width, height) = score.size();
     let threshold = (f64::from(best_score(score)) * options.quality) as f32;
+    // Nothing without structure.
+    let threshold = threshold.max(f32::MIN_POSITIVE);
     let mut found = Vec::new();
     // The largest of each column of three rows, with a column that exceeds nothing at either end.
     let mut columns = vec![0.0f32; width + 2];
@@ -136,9 +141,8 @@ fn candidates(score: &Frame<f32>, options: &CornerOptions) -> Vec<Candidate> {
         }
         let (left, middle, right) = (&columns[..width], &columns[1..=width], &columns[2..]);
         for (x, is_maximum) in is_maximum.iter_mut().enumerate() {
-            let value = row[x];
-            let is_large = (value > 0.0) & (value >= threshold);
-            *is_maximum = u8::from(is_large & (value >= left[x]) & (value >= middle[x]) & (value >= right[x]));
+            let limit = larger(larger(larger(threshold, left[x]), middle[x]), right[x]);
+            *is_maximum = u8::from(row[x] >= limit);
         }
         is_maximum[..options.margin].fill(0);
         is_maximum[width - options.margin..].fill(0);
