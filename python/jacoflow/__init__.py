@@ -14,7 +14,7 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
-from . import filters, io, motion3d, plot, scenes, stereo, track, video
+from . import filters, io, motion3d, plot, scenes, segment, stereo, track, video
 from ._jacoflow import (
     FlowEstimator,
     FlowField,
@@ -60,6 +60,7 @@ __all__ = [
     "quantise",
     "quantities",
     "scenes",
+    "segment",
     "smooth",
     "stereo",
     "track",

@@ -72,6 +72,8 @@ __all__ = [
     "_motion3d_sideways",
     "_motion3d_sideways_bound",
     "_observability",
+    "_felzenszwalb",
+    "_region_means",
     "_edge_disparity",
     "_edge_pixels",
     "_estimate_row_offset",
@@ -1186,6 +1188,8 @@ def _observability(
     colour: _Colour | None = None,
     threads: int | None = None,
 ) -> dict[str, NDArray[Any]]: ...
+def _felzenszwalb(image: ArrayLike, scale: float, sigma: float, min_size: int, threads: int | None) -> NDArray[np.int32]: ...
+def _region_means(labels: NDArray[np.int64], values: ArrayLike) -> NDArray[np.float64]: ...
 def _edge_disparity(
     left: ArrayLike, right: ArrayLike, options: dict[str, Any]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], tuple[float, bool]]: ...

@@ -21,6 +21,7 @@ mod observability;
 mod options;
 mod progress;
 mod scenes;
+mod segment;
 mod spare;
 mod stereo;
 mod stereo_track;
@@ -69,6 +70,8 @@ mod _jacoflow {
     use super::observability::{classify, observability};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
+    #[pymodule_export]
+    use super::segment::{segment_felzenszwalb, segment_region_means};
     #[pymodule_export]
     use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity};
     #[pymodule_export]

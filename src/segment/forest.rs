@@ -60,7 +60,8 @@ impl<T: EdgeWeight> Forest<T> {
         a as usize
     }
 
-    /// Merges along sorted edges while the edge is within both regions' thresholds; returns the edges between regions that stayed apart when they came.
+    /// Merges along sorted edges while the edge is within both regions' thresholds; returns the edges between
+    /// regions that stayed apart when they came.
     pub(super) fn merge_similar(&mut self, edges: &[Edge<T::Key>]) -> Vec<u32> {
         let infinite = T::from_f64(f64::INFINITY).key();
         let (finite, without_weight) = edges.split_at(edges.partition_point(|edge| edge.key < infinite));

@@ -38,8 +38,9 @@ impl Labels {
 
 /// Mean of each region, per channel: `count * channels` numbers, region by region.
 ///
-/// `labels`: region of every pixel, each 0 to `count - 1`. `values`: `channels` numbers a pixel, interleaved. NaN is left out of the mean, channel by
-/// channel; a region without a number gets NaN. Sums are taken in double precision, in the order of the pixels.
+/// `labels`: region of every pixel, each 0 to `count - 1`. `values`: `channels` numbers a pixel, interleaved.
+/// NaN is left out of the mean, channel by channel; a region without a number gets NaN. Sums are taken in
+/// double precision, in the order of the pixels.
 ///
 /// # Errors
 /// [`Error::Argument`] unless `values` holds `channels` numbers a label, and each label is within range.

@@ -72,7 +72,8 @@ fn tiles_give_the_published_regions() {
     }
 }
 
-/// The definition, word by word: a list of edges, sorted by the standard library, and a label for every pixel.
+/// The definition, word by word: a list of edges, sorted by the standard library, and a label for every
+/// pixel.
 fn oracle(levels: &Frame<Vec<f64>>, scale: f64, min_size: usize) -> Vec<usize> {
     let (width, height) = levels.size();
     let mut edges = Vec::new();
