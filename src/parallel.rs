@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use std::ffi::OsString;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::atomic::{AtomicPtr, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
@@ -68,10 +69,11 @@ fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
 }
 
 /// The shared pool of `count` threads; made on first use and kept.
+///
+/// Nothing here may use rayon's global pool: it cannot be made anew in a forked process.
 fn pool(count: usize) -> Arc<rayon::ThreadPool> {
-    type Pools = Mutex<Vec<(usize, Arc<rayon::ThreadPool>)>>;
-    static POOLS: OnceLock<Pools> = OnceLock::new();
-    let mut pools = POOLS.get_or_init(Pools::default).lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    static POOLS: PerProcess<Mutex<Vec<(usize, Arc<rayon::ThreadPool>)>>> = PerProcess::new();
+    let mut pools = POOLS.get().lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if let Some((_, pool)) = pools.iter().find(|(n, _)| *n == count) {
         return Arc::clone(pool);
     }
@@ -85,9 +87,52 @@ fn pool(count: usize) -> Arc<rayon::ThreadPool> {
     pool
 }
 
+/// A static value that a forked process makes anew instead of inheriting it.
+///
+/// Of all threads only the one that called `fork` lives on in the child. A pool there has no threads, and a lock that another thread
+/// held is never released. So the parent's value is left alone, never locked and never dropped, at the price of its memory.
+pub(crate) struct PerProcess<T>(AtomicPtr<Owned<T>>);
+
+struct Owned<T> {
+    process: u32,
+    value: T,
+}
+
+impl<T: Default + Send + Sync> PerProcess<T> {
+    /// For a static: the value itself is made on first use.
+    pub const fn new() -> Self {
+        Self(AtomicPtr::new(std::ptr::null_mut()))
+    }
+
+    /// This process's value.
+    pub fn get(&'static self) -> &'static T {
+        let process = std::process::id();
+        let known = self.0.load(Ordering::Acquire);
+        // SAFETY: null, or leaked below and never freed; its fields are not written to again.
+        let own = unsafe { known.as_ref() }.filter(|owned| owned.process == process);
+        // No lock: nobody would be left to release it.
+        &own.unwrap_or_else(|| self.begin(known, process)).value
+    }
+
+    #[cold]
+    fn begin(&'static self, known: *mut Owned<T>, process: u32) -> &'static Owned<T> {
+        let fresh = Box::into_raw(Box::new(Owned { process, value: T::default() }));
+        match self.0.compare_exchange(known, fresh, Ordering::AcqRel, Ordering::Acquire) {
+            // SAFETY: made above, and leaked by being stored.
+            Ok(_) => unsafe { &*fresh },
+            Err(quicker) => {
+                // SAFETY: made above, and seen by nobody else.
+                drop(unsafe { Box::from_raw(fresh) });
+                // SAFETY: another thread of this process stored it, and it is never freed.
+                unsafe { &*quicker }
+            }
+        }
+    }
+}
+
 /// Calls `work(band, rows, band_slice)` for every band of [`BAND_ROWS`] rows of a row-major buffer with `row_len` values a row.
 ///
-/// Call it inside [`Threads::install`].
+/// Call it inside [`Threads::install`]; outside, small buffers are worked on by the caller and others by as many threads as by default.
 pub fn for_each_band<T: Send>(
     buffer: &mut [T],
     row_len: usize,
@@ -113,11 +158,13 @@ pub(crate) fn for_each_band_of<T: Send>(
         let start = band * band_rows;
         work(band, start..(start + band_rows).min(rows), slice);
     };
-    if buffer.len() <= SMALL && rayon::current_thread_index().is_none() {
+    let outside = rayon::current_thread_index().is_none();
+    if outside && buffer.len() <= SMALL {
         buffer.chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
-    } else {
-        buffer.par_chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
+        return;
     }
+    let bands = buffer.par_chunks_mut(band_rows * row_len).enumerate();
+    if outside { Threads::default().install(|| bands.for_each(one_band)) } else { bands.for_each(one_band) }
 }
 
 /// Told how far long work has come; may stop it.
@@ -160,6 +207,36 @@ mod tests {
             });
             assert!(buffer.iter().all(|&v| v == 1));
         }
+    }
+
+    #[test]
+    fn large_buffers_outside_every_pool_stay_out_of_the_global_one() {
+        let mut named = vec![false; 2 * SMALL];
+        let own = |name: &str| name.starts_with("jacoflow-");
+        for_each_band(&mut named, SMALL / 16, |_, _, band| band.fill(std::thread::current().name().is_some_and(own)));
+        assert!(named.iter().all(|&named| named));
+    }
+
+    #[test]
+    fn a_value_of_a_process_is_one_for_all_its_threads() {
+        static VALUE: PerProcess<Mutex<usize>> = PerProcess::new();
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| *VALUE.get().lock().unwrap() += 1);
+            }
+        });
+        assert_eq!(*VALUE.get().lock().unwrap(), 8);
+    }
+
+    #[test]
+    fn a_value_of_another_process_is_left_alone() {
+        static VALUE: PerProcess<Mutex<usize>> = PerProcess::new();
+        let parents = Box::new(Owned { process: std::process::id().wrapping_add(1), value: Mutex::new(3) });
+        VALUE.0.store(Box::into_raw(parents), Ordering::Release);
+        // SAFETY: stored above and never freed.
+        let held = unsafe { &*VALUE.0.load(Ordering::Acquire) }.value.lock().unwrap();
+        assert_eq!(*VALUE.get().lock().unwrap(), 0);
+        assert_eq!(*held, 3);
     }
 
     #[test]

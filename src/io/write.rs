@@ -1,6 +1,7 @@
 //! Files that appear whole or not at all.
 
 use crate::error::{Error, Result};
+use crate::parallel::PerProcess;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -56,11 +57,11 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Names of the temporary files and folders that this process has now.
-static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Names of the temporary files and folders that this process has now; those of the process it was forked from are not its to remove.
+static TEMPORARIES: PerProcess<Mutex<Vec<PathBuf>>> = PerProcess::new();
 
 fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
-    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+    TEMPORARIES.get().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes every temporary file and folder of this process, for whoever ends it without unwinding (a second Ctrl-C).

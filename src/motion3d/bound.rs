@@ -8,6 +8,7 @@ use super::observations::Observations;
 use super::options::{Flow, Noise, Placement};
 use super::result::nested;
 use crate::error::{Error, Result, numbers};
+use crate::parallel::Threads;
 use nalgebra::{Matrix2x3, SMatrix, Vector2};
 
 /// Least number of points for a motion.
@@ -48,6 +49,15 @@ impl MotionBound {
 /// # Errors
 /// [`Error::Argument`] for lengths that differ, fewer than 5 finite points, covariances or depths, noise that is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the motion.
 pub fn motion_bound(
+    points: &Flow<'_>,
+    noise: &Noise<'_>,
+    motion: &Motion,
+    inverse_depth: &[f64],
+) -> Result<MotionBound> {
+    Threads::default().install(|| of_known_depths(points, noise, motion, inverse_depth))
+}
+
+fn of_known_depths(
     points: &Flow<'_>,
     noise: &Noise<'_>,
     motion: &Motion,

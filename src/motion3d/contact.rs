@@ -11,6 +11,7 @@ use super::options::Placement;
 use super::turned::{HalfTurn, HalfWay};
 use crate::error::Result;
 use crate::math::Real;
+use crate::parallel::Threads;
 use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
@@ -150,7 +151,8 @@ pub fn contact_map<T: Real>(
         }
         rates.own(&row, half_way)
     };
-    let values: Vec<[f64; 3]> = (0..field.width * field.height).into_par_iter().map(at).collect();
+    let sites = 0..field.width * field.height;
+    let values: Vec<[f64; 3]> = Threads::default().install(|| sites.into_par_iter().map(at).collect());
     let plane = |k: usize| values.iter().map(|value| value[k]).collect();
     Ok(ContactMap {
         width: field.width,

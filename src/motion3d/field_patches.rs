@@ -7,6 +7,7 @@ use super::patches::AffinePatches;
 use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::parallel::Threads;
 use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, Sites, Status};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
@@ -63,7 +64,8 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     }
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.sites(field, region);
-    let fitted: Vec<_> = sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect();
+    let fitted: Vec<_> = Threads::default()
+        .install(|| sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect());
     let mut out = FieldPatches { common: CommonErrors::of_field(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));

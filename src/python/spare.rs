@@ -3,6 +3,7 @@
 //! A sequence asks for the same few large buffers again and again. Fresh ones cost a page fault every 4 KiB and have to be initialised, on the calling
 //! thread, which together can take as long as a per-pixel estimate. At most [`LIMIT`] bytes are kept, the newest.
 
+use crate::parallel::PerProcess;
 use std::any::Any;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -13,15 +14,16 @@ const LIMIT: usize = 64 << 20;
 const LEAST: usize = 64 << 10;
 
 /// Buffers with their size in bytes, oldest first.
+#[derive(Default)]
 struct Shelf {
     bytes: usize,
     buffers: VecDeque<(usize, Box<dyn Any + Send>)>,
 }
 
-static SHELF: Mutex<Shelf> = Mutex::new(Shelf { bytes: 0, buffers: VecDeque::new() });
+static SHELF: PerProcess<Mutex<Shelf>> = PerProcess::new();
 
 fn shelf() -> MutexGuard<'static, Shelf> {
-    SHELF.lock().unwrap_or_else(PoisonError::into_inner)
+    SHELF.get().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A buffer of exactly `len` values, whatever they are, if there is one.

@@ -4,6 +4,7 @@ use super::couple::CoupleScratch;
 use super::data::Pool;
 use super::grid::Planes;
 use super::levels::Pyramid;
+use crate::parallel::PerProcess;
 use crate::simd::SimdReal;
 use std::any::Any;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -107,7 +108,7 @@ fn give_back() {
 const LIMIT: usize = 64 << 20;
 
 /// The workspace of the estimator that was dropped last.
-static LAST: Mutex<Option<Box<dyn Any + Send>>> = Mutex::new(None);
+static LAST: PerProcess<Mutex<Option<Box<dyn Any + Send>>>> = PerProcess::new();
 
 /// An estimator's workspaces: as many as it has had calls at a time.
 #[derive(Debug, Default)]
@@ -119,7 +120,7 @@ impl Memory {
     /// A workspace, used before if possible.
     pub fn take<T: SimdReal>(&self) -> Box<Workspace<T>> {
         let own = lock(&self.free).pop();
-        let any = own.or_else(|| lock(&LAST).take());
+        let any = own.or_else(|| lock(LAST.get()).take());
         any.and_then(|any| any.downcast().ok()).unwrap_or_default()
     }
 
@@ -135,7 +136,7 @@ impl Drop for Memory {
         let bytes = any.downcast_ref::<Workspace<f32>>().map(Workspace::bytes);
         let bytes = bytes.or_else(|| any.downcast_ref::<Workspace<f64>>().map(Workspace::bytes));
         if bytes.is_some_and(|bytes| bytes <= LIMIT) {
-            *lock(&LAST) = Some(any);
+            *lock(LAST.get()) = Some(any);
         }
     }
 }

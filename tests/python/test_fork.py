@@ -1,0 +1,246 @@
+"""A process that was forked, or begun in another way, computes as its parent does: nothing waits for threads or locks that stayed behind."""
+
+import hashlib
+import multiprocessing
+import os
+import select
+import signal
+import sys
+import threading
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import METHODS
+
+import jacoflow
+from jacoflow import mixture, motion3d, scenes, stereo, track
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import motion3d_scenes
+import stereo_scenes
+
+PATIENCE = 100.0
+"""Seconds after which a child that has not answered is ended: a test that fails must end, too."""
+
+needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
+
+
+def quietly(begin):
+    """What `begin()` returns. Python warns of a fork beside threads; here that is the point."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return begin()
+
+
+def digest(*arrays):
+    """A fingerprint of every bit."""
+    return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
+
+
+def in_child(work):
+    """What `work()`, a few bytes, is in a forked child."""
+    reader, writer = os.pipe()
+    child = quietly(os.fork)
+    if child == 0:
+        code = 1
+        try:
+            os.write(writer, work())
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            # Without the clean-up that is the parent's.
+            os._exit(code)
+    os.close(writer)
+    answered = bool(select.select([reader], [], [], PATIENCE)[0])
+    answer = os.read(reader, 1 << 12) if answered else b""
+    os.close(reader)
+    if not answered:
+        os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    assert answered, "the child does not answer"
+    assert status == 0
+    return answer
+
+
+def film(count=3):
+    """Frames so large that their work is split between threads."""
+    return scenes.Scene("affine", width=320, height=240, seed=4).frames(count)
+
+
+def field(method="instantaneous", **options):
+    return jacoflow.estimate(film(), method=method, **options)
+
+
+def results(threads):
+    """A fingerprint of what takes little time."""
+    found = field(threads=threads)
+    return digest(jacoflow.smooth(film()[0], 1.5, threads=threads), found.flow, found.jacobian)
+
+
+@needs_fork
+@pytest.mark.parametrize("threads", [1, 2, None])
+def test_a_forked_child_goes_on(threads):
+    before = results(threads)
+    assert in_child(lambda: results(threads)) == before
+    # Nor does it do the parent any harm.
+    assert results(threads) == before
+
+
+@needs_fork
+def test_a_child_of_a_child_goes_on_whether_or_not_its_parent_computed():
+    before = results(2)
+    assert in_child(lambda: in_child(lambda: results(2))) == before
+    assert in_child(lambda: results(2) + in_child(lambda: results(2))) == 2 * before
+
+
+@needs_fork
+def test_a_fork_amid_the_work_of_another_thread():
+    before, stop, wrong = results(2), threading.Event(), []
+
+    def work():
+        while not stop.is_set():
+            if results(2) != before:
+                wrong.append("busy")
+
+    def fork():
+        wrong.extend("child" for _ in range(8) if in_child(lambda: results(2)) != before)
+
+    busy, forking = threading.Thread(target=work), threading.Thread(target=fork)
+    try:
+        busy.start()
+        forking.start()
+        forking.join()
+    finally:
+        stop.set()
+        busy.join()
+    assert not wrong
+
+
+@needs_fork
+def test_an_estimator_is_carried_on_in_a_child():
+    frames = film(6)
+    for make in (lambda: jacoflow.FlowEstimator(method="windowed"), jacoflow.FlowFilter):
+        estimator = make()
+        for frame in frames[:4]:
+            estimator.push(frame)
+
+        def rest(estimator=estimator):
+            return digest(*(estimator.push(frame).flow for frame in frames[4:]))
+
+        assert in_child(rest) == rest()
+
+
+def tracked():
+    found = track.track(film(8), (100, 80, 60, 50))
+    return found.box, found.displacement
+
+
+def stereo_tracked():
+    tracker = track.StereoTracker(disparity_range=(-20, 12))
+    for step in stereo_scenes.small().film()[:3]:
+        tracker.update(step.left, step.right)
+    return (np.frombuffer(tracker.graph.to_json().encode(), np.uint8),)
+
+
+def matched(method):
+    step = stereo_scenes.small().film()[0]
+    found = stereo.edge_disparity(step.left, step.right, disparity_range=(-20, 12), row_range=(-2, 2), method=method)
+    return found.disparity, found.values
+
+
+def row_offset():
+    step = stereo_scenes.small().film()[0]
+    return (np.array(stereo.estimate_row_offset(step.left, step.right, disparity_range=(-20, 12))),)
+
+
+def moved(robust):
+    scene = motion3d_scenes.differential("smooth", "oblique", 3000, 0.01, 0)
+    found = motion3d.estimate_motion(scene.points, scene.flow, sigma=scene.sigma, robust=robust)
+    return found.translation, found.rotation, found.inv_depth
+
+
+def bound():
+    scene = motion3d_scenes.differential("smooth", "oblique", 3000, 0.01, 0)
+    return (motion3d.motion_bound(scene.points, scene.u, scene.w, scene.depths, sigma=scene.sigma).crlb,)
+
+
+def moved_before_a_field(patches):
+    camera = np.array([[300.0, 0, 160], [0, 300, 120], [0, 0, 1]])
+    windowed = field("windowed")[0]
+    found, points = motion3d.estimate_field_motion(windowed, camera, patches=patches)
+    return found.rotation, points, *motion3d.time_to_contact_map(windowed, found, camera)
+
+
+def mixed():
+    points = np.random.default_rng(1).normal(size=(20000, 3)) + np.arange(20000)[:, None] % 3 * 5
+    fitted = mixture.VariationalGaussianMixture(4, max_iter=20, random_state=1).fit(points)
+    return fitted.means_, fitted.score_samples(points)
+
+
+def derived():
+    windowed = field("windowed")[0]
+    values = [windowed.value(name) for name in ("divergence", "shear_magnitude", "rotation_centre_x")]
+    return *values, windowed.std("divergence"), windowed.advect([[50.0, 60.0]])
+
+
+def scene(carrier):
+    made = scenes.Scene("vortex", carrier=carrier, width=320, height=240)
+    return made.frame(1.0), made.truth(1.0).flow
+
+
+def observable():
+    found = jacoflow.observability(film())
+    return (found.condition, found.condition_number)
+
+
+CALLS = {
+    **{method: lambda method=method: (field(method).flow,) for method in METHODS},
+    "smoothed": lambda: (field("windowed", smooth=1.0).flow,),
+    "derived": derived,
+    "observability": observable,
+    **{f"scene {name}": lambda name=name: scene(name) for name in ("noise", "particles")},
+    "track": tracked,
+    **{f"stereo {method}": lambda method=method: matched(method) for method in ("classes", "sgm")},
+    "row offset": row_offset,
+    "edge pixels": lambda: stereo.edge_pixels(film()[0]),
+    "stereo tracker": stereo_tracked,
+    **{f"motion3d {robust}": lambda robust=robust: moved(robust) for robust in (True, False)},
+    **{f"motion3d field {patches}": lambda patches=patches: moved_before_a_field(patches) for patches in (None, 24)},
+    "motion3d bound": bound,
+    "mixture": mixed,
+}
+"""What computes, with so much to do that threads share it: none may use threads that a child cannot have anew."""
+
+
+@needs_fork
+@pytest.mark.parametrize("name", CALLS)
+def test_everything_that_computes_does_so_in_a_child(name):
+    before = digest(*CALLS[name]())
+    assert in_child(lambda: digest(*CALLS[name]())) == before
+
+
+def report(connection, threads):
+    """In another process: sends its results."""
+    connection.send(results(threads))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_processes_of_multiprocessing_compute_the_same(method, threads):
+    before = results(threads)
+    context = multiprocessing.get_context(method)
+    mine, theirs = context.Pipe()
+    process = context.Process(target=report, args=(theirs, threads), daemon=True)
+    quietly(process.start)
+    try:
+        assert mine.poll(PATIENCE), "the process does not answer"
+        assert mine.recv() == before
+        process.join(PATIENCE)
+        assert process.exitcode == 0
+    finally:
+        process.kill()
+        process.join()
