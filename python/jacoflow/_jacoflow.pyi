@@ -35,6 +35,8 @@ __all__ = [
     "_restore_unscented",
     "FlowFilter",
     "_restore_filter",
+    "corners",
+    "point_flow",
     "luminance",
     "quantise",
     "smooth",
@@ -606,6 +608,60 @@ def luminance(frame: _Frame) -> NDArray[Any]:
     """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green, blue; alpha is left out.
 
     Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is copied.
+    """
+
+def corners(
+    frame: _Frame,
+    *,
+    max_count: int = 500,
+    quality: float = 0.005,
+    min_distance: float = 6.0,
+    window: int = 3,
+    existing: ArrayLike | None = None,
+    threads: int | None = None,
+) -> NDArray[np.float64]:
+    """Corners of `frame` (H, W): pixels whose surroundings change brightness along both axes (J. Shi, C. Tomasi,
+    "Good features to track", 1994).
+
+    The score is the smaller eigenvalue of the mean of (Ix^2, Ix Iy; Ix Iy, Iy^2) over `window` x `window` px
+    (odd). A corner scores at least `quality` (0 to 1) times the best of the frame and no less than its 8
+    neighbours, and is at least `min_distance` px away from every better corner and from every point of
+    `existing` (N, 2). At most `max_count` corners, `existing` not counted.
+
+    Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN.
+    ValueError for a number out of its range and for a colour frame.
+    """
+
+def point_flow(
+    before: _Frame,
+    after: _Frame,
+    points: ArrayLike,
+    *,
+    guesses: ArrayLike | None = None,
+    levels: int = 3,
+    window: int = 19,
+    max_steps: int = 30,
+    min_step: float = 0.02,
+    forward_backward: float | None = 0.7,
+    min_eigenvalue: float | None = None,
+    threads: int | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+    """Flow at `points` (N, 2), positions (x, y) px, from frame `before` (H, W) to frame `after` (H, W), by
+    gradient steps on a pyramid.
+
+    B. Lucas, T. Kanade, 1981; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade feature tracker",
+    2000: the translation that minimises the squared differences in a window of `window` x `window` px (odd),
+    on `levels` levels (1: full size alone), at most `max_steps` steps a level, ended by one shorter than
+    `min_step` px. `guesses` (N, 2): expected flow, default zero.
+
+    `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
+    point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or
+    when the smaller eigenvalue of the window's mean structure tensor is below `min_eigenvalue` (levels/px)^2;
+    None: 0.1 where the first frame spans 255 levels, scaled by the square of its span.
+
+    Returns flow (u, v) px/frame, float64 (N, 2); ok, bool (N,); error, the distance between forward and back,
+    px, float64 (N,). ValueError for a number out of its range, for frames of different shape and for colour
+    frames.
     """
 
 @disjoint_base

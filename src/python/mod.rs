@@ -19,6 +19,7 @@ mod mixture;
 mod motion3d;
 mod observability;
 mod options;
+mod points;
 mod progress;
 mod scenes;
 mod segment;
@@ -68,6 +69,8 @@ mod _jacoflow {
     };
     #[pymodule_export]
     use super::observability::{classify, observability};
+    #[pymodule_export]
+    use super::points::{corners, point_flow};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
     #[pymodule_export]
