@@ -2,8 +2,12 @@
 //!
 //! Throughput is in pixel-steps: one prediction and one update of one pixel. The frames are 640 x 128, so that the states of a single-precision run (30 MB)
 //! do not fit into a cache, as those of a full frame would not.
+//!
+//! Then the parts of a particle filter's cycle, in particles; `python benchmarks/particle_filter.py` times it beside NumPy and filterpy.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use jacoflow::filter::particle::{ParticleFilter, Resampling};
+use jacoflow::math::random::CounterRng;
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};
@@ -65,5 +69,37 @@ fn filter(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, filter);
+/// Particles of the parts of a cycle.
+const PARTICLES: usize = 20_000;
+
+fn particles(criterion: &mut Criterion) {
+    let mut filter = ParticleFilter::new(1, PARTICLES, 2, 0).expect("valid sizes");
+    filter.threads = Threads::new(Some(1)).expect("a positive number");
+    filter.sample_gaussian(&[0.0; 2], &[4.0, 0.0, 0.0, 4.0]).expect("a covariance");
+    let mut group = criterion.benchmark_group("particle");
+    group.throughput(Throughput::Elements(PARTICLES as u64));
+    group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
+    let (transition, noise) = ([0.9, 0.1, 0.0, 0.9], [0.05, 0.0, 0.0, 0.02]);
+    group.bench_function("predict_linear", |bencher| {
+        bencher.iter(|| filter.predict_linear(&transition, &noise).expect("finite particles"));
+    });
+    group.bench_function("update", |bencher| {
+        bencher.iter(|| {
+            filter.update(|x, out| {
+                x.chunks_exact(2).zip(out).for_each(|(x, out)| *out = -0.5 * (x[0] - 0.3).powi(2));
+                Ok(())
+            })
+        });
+    });
+    let weights: Vec<f64> = (0..PARTICLES as u64).map(|i| CounterRng::new(1).uniform(i).powi(3)).collect();
+    let mut indices = Vec::new();
+    for scheme in Resampling::ALL {
+        group.bench_function(scheme.name(), |bencher| {
+            bencher.iter(|| scheme.indices(&weights, PARTICLES, &CounterRng::new(2), black_box(&mut indices)));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, filter, particles);
 criterion_main!(benches);

@@ -170,6 +170,7 @@ def public_objects(texture):
         sigma,
         jacoflow.filters.KalmanFilter(2, 1),
         jacoflow.filters.ExtendedKalmanFilter(2, 1, batch=3),
+        jacoflow.filters.ParticleFilter(2, 30, batch=3, random_state=5),
         jacoflow.filters.UnscentedKalmanFilter(2, 1, 0.1, first, double, sigma),
         jacoflow.FormatError("x"),
         jacoflow.FlowFilter(profile="measured", points=[[10, 10]]),

@@ -76,6 +76,22 @@ def test_filters() -> None:
     assert_type(ukf.x, NDArray[np.float64])
 
 
+def test_particle_filter() -> None:
+    def speed(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return -np.square(x[..., 1])
+
+    made = filters.ParticleFilter(2, 40, batch=3, random_state=1, ids=[4, 5, 6])
+    made.sample_gaussian([0.0, 0.0], 1.0)
+    made.predict(F=np.eye(2), Q=0.1)
+    made.predict(lambda x: 0.9 * x)
+    made.update(speed)
+    made.update(np.zeros((3, 40)))
+    assert_type(made.resample("residual", threshold=0.5, n_particles=20), NDArray[np.bool_])
+    assert_type(made.log_weights, NDArray[np.float64])
+    assert_type(made.quantile([0.1, 0.9]), NDArray[np.float64])
+    assert_type(filters.resample([0.5, 0.5], 4, "stratified", uniforms=np.full(4, 0.5)), NDArray[np.int64])
+
+
 def test_observability() -> None:
     found = jacoflow.observability(frames()[:3])
     assert_type(found.observable, NDArray[np.bool_])
