@@ -146,9 +146,14 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
 
         return tracking.sections(quick, data)
     if name == "mixture":
+        import dirichlet_mixture
         import mixture
 
-        return {"Weighted mixtures, a round": mixture.table(rounds)}
+        return {
+            "Weighted mixtures, a round": mixture.table(rounds),
+            "Dirichlet-process mixtures: components (range), largest weight, adjusted Rand index": dirichlet_mixture.outcomes(3 if quick else 10),
+            "Dirichlet-process mixtures: milliseconds of a fit on one thread (scikit-learn's time over it)": dirichlet_mixture.times(rounds),
+        }
     if name == "stereo":
         import stereo
 

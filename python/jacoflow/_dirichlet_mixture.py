@@ -14,13 +14,15 @@ __all__ = ["DirichletProcessGaussianMixture"]
 
 
 class DirichletProcessGaussianMixture(PointMixture):
-    """A Dirichlet-process mixture of Gaussians in D dimensions, fitted to weighted points; the number of components is found.
+    """A Dirichlet-process mixture of Gaussians in D dimensions, fitted to weighted points; the number of
+    components is found.
 
-    `v_k ~ Beta(1, alpha)`, `pi_k = v_k prod_(j<k) (1 - v_j)`, `(mu_k, Sigma_k) ~ NIW(m0, kappa0, nu0, Psi0)` with `m0` the
-    weighted mean and `Psi0 = S0 + floor I`, truncated at K components (T. Ferguson, "A Bayesian analysis of some nonparametric
-    problems", 1973; J. Sethuraman, "A constructive definition of Dirichlet priors", 1994). A weight is a number of observations:
-    a weight of 3 is the point three times. Starts are weighted k-means++ seeds on standardised axes. The result is the same for
-    any number of threads and, except for rounding, any order of the points. Equations: `docs/dirichlet_mixture.md`.
+    `v_k ~ Beta(1, alpha)`, `pi_k = v_k prod_(j<k) (1 - v_j)`, `(mu_k, Sigma_k) ~ NIW(m0, kappa0, nu0, Psi0)`
+    with `m0` the weighted mean and `Psi0 = S0 + floor I`, truncated at K components (T. Ferguson, "A Bayesian
+    analysis of some nonparametric problems", 1973; J. Sethuraman, "A constructive definition of Dirichlet
+    priors", 1994). A weight is a number of observations: a weight of 3 is the point three times. Starts are
+    weighted k-means++ seeds on standardised axes. The result is the same for any number of threads and,
+    except for rounding, any order of the points. Equations: `docs/dirichlet_mixture.md`.
 
     Parameters
     ----------
@@ -31,8 +33,8 @@ class DirichletProcessGaussianMixture(PointMixture):
     inference : "map" or "vb"
         Expectation-maximization to the mode of the posterior, or variational Bayes.
     merge : bool
-        Whether pairs of components are pooled while that raises F. Without it "map" does not empty components: a large
-        Gaussian stays divided among several.
+        Whether pairs of components are pooled while that raises F. Without it "map" does not empty
+        components: a large Gaussian stays divided among several.
     mean_precision : float
         `kappa0`, the number of points that the prior of a mean is worth, from 1e-100 to 1e100, no unit.
     degrees_of_freedom : float
@@ -46,7 +48,8 @@ class DirichletProcessGaussianMixture(PointMixture):
     max_iter : int
         Largest number of rounds from a start, and after each pooled pair.
     tol : float or None
-        Rounds end when the mean log-likelihood of the points changes by less; None: exactly `max_iter` rounds.
+        Rounds end when the mean log-likelihood of the points changes by less; None: exactly `max_iter`
+        rounds.
     random_state : int, numpy.random.RandomState, numpy.random.Generator or None
         Seed; None: numpy's global one.
     threads : int or None
@@ -74,8 +77,8 @@ class DirichletProcessGaussianMixture(PointMixture):
     Raises
     ------
     ValueError
-        For parameters out of range, points that are not finite or beyond 1e140, weights that are negative, not finite, all zero
-        or so large that sums of squares overflow; each message names the argument.
+        For parameters out of range, points that are not finite or beyond 1e140, weights that are negative,
+        not finite, all zero or so large that sums of squares overflow; each message names the argument.
 
     Examples
     --------
@@ -139,9 +142,11 @@ class DirichletProcessGaussianMixture(PointMixture):
         y : ignored
             Only there for pipelines, as scikit-learn's conventions want it before the weights (no unit).
         sample_weight : array (N,)
-            Number of observations that each point stands for, not negative; default 1. Points of weight 0 are ignored.
+            Number of observations that each point stands for, not negative; default 1. Points of weight 0 are
+            ignored.
         resp : array (N, n_components)
-            First responsibilities, rows that sum to 1, in place of k-means++ seeds; `n_init` is not used then.
+            First responsibilities, rows that sum to 1, in place of k-means++ seeds; `n_init` is not used
+            then.
         """
         _warn_of(y, sample_weight)
         points, weights = self._points(X, fitting=True), _weights(sample_weight)
@@ -155,7 +160,8 @@ class DirichletProcessGaussianMixture(PointMixture):
         return self
 
     def score_samples(self, X: ArrayLike) -> Array:
-        """Log density (N,) of the mixture at points (N, D), natural logarithm; of "vb" the sum of the expected densities' logarithms, which is less."""
+        """Log density (N,) of the mixture at points (N, D), natural logarithm; of "vb" the sum of the
+        expected densities' logarithms, which is less."""
         return super().score_samples(X)
 
     def _log_densities(self, points: Array) -> tuple[Array, Array]:

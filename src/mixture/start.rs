@@ -17,7 +17,8 @@ pub(super) fn from_labels(points: &Points, centre: &[f64], components: usize, la
 /// What an E step with these responsibilities would have left.
 ///
 /// # Errors
-/// [`Error::Argument`] named `resp` for shares that are not (N, K), not finite, negative, or of rows that do not sum to 1.
+/// [`Error::Argument`] named `resp` for shares that are not (N, K), not finite, negative, or of rows that do
+/// not sum to 1.
 pub(super) fn from_shares(points: &Points, centre: &[f64], components: usize, shares: &[f64]) -> Result<Expected> {
     if shares.len() != points.count() * components {
         let expected = format!("responsibilities ({}, {components})", points.count());

@@ -1,4 +1,5 @@
-//! Dirichlet-process mixtures for Python; the class that a user meets is `jacoflow.mixture.DirichletProcessGaussianMixture`.
+//! Dirichlet-process mixtures for Python; the class that a user meets is
+//! `jacoflow.mixture.DirichletProcessGaussianMixture`.
 
 use super::arrays;
 use super::mixture::{Sample, count, covariance_prior, entry, numbers, shares};

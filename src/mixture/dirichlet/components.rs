@@ -13,7 +13,8 @@ use std::f64::consts::LN_2;
 /// What the E step evaluates: `rho_k(x) = exp(log_factor_k) N(x; mean_k, covariance_k)`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Components {
-    /// `ln pi_k` (K), and with [`Inference::Vb`] what expectation adds to it. Negative infinity: no share of any point.
+    /// `ln pi_k` (K), and with [`Inference::Vb`] what expectation adds to it. Negative infinity: no share of
+    /// any point.
     pub log_factors: Vec<f64>,
     /// (K, D).
     pub means: Vec<f64>,
@@ -35,7 +36,9 @@ impl Components {
                 Inference::Map => nu + d as f64 + 2.0,
                 Inference::Vb => nu,
             };
-            matrix.iter_mut().for_each(|value| *value /= over);
+            for value in matrix.iter_mut() {
+                *value /= over;
+            }
             if options.inference == Inference::Vb {
                 log_factors[k] += expectation(d, nu, posterior.mean_precision[k]);
             }

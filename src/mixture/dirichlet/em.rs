@@ -37,7 +37,8 @@ pub(super) struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) naming an option, the points (`X`) or their weights (`sample_weight`).
+    /// [`Error::Argument`](crate::Error::Argument) naming an option, the points (`X`) or their weights
+    /// (`sample_weight`).
     pub fn new(points: &Points, options: &'a DirichletOptions) -> Result<Self> {
         options.check()?;
         points.check()?;
@@ -96,7 +97,8 @@ fn spread(expected: Expected, used: &[usize], components: usize) -> Expected {
 
 /// `sum_n w_n ln sum_k rho_nk` of an E step from the sums that it leaves.
 ///
-/// `sum_n w_n sum_k r_nk ln rho_nk` less the negative entropy of r; the former is known from the moments, as `ln rho` is quadratic.
+/// `sum_n w_n sum_k r_nk ln rho_nk` less the negative entropy of r; the former is known from the moments, as
+/// `ln rho` is quadratic.
 fn log_likelihood(densities: &Densities, expected: &Expected) -> f64 {
     let (d, moments) = (densities.dimensions, &expected.moments);
     let mut sum = -expected.negentropy;

@@ -14,13 +14,14 @@ use crate::mixture::start::{from_labels, from_shares};
 
 /// Fits a Dirichlet-process mixture of Gaussians to weighted points.
 ///
-/// A weight is a number of observations: 3 is the point three times. From each start expectation-maximization runs until the mean
-/// log-likelihood stands; then pairs of components are pooled while that raises the score F. Of `n_init` starts the one with the
-/// largest F is kept. Computed in `f64`. The result does not depend on the number of threads, nor on the order of the points
-/// except for rounding.
+/// A weight is a number of observations: 3 is the point three times. From each start expectation-maximization
+/// runs until the mean log-likelihood stands; then pairs of components are pooled while that raises the score
+/// F. Of `n_init` starts the one with the largest F is kept. Computed in `f64`. The result does not depend on
+/// the number of threads, nor on the order of the points except for rounding.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::Error::Argument) naming an option, the points (`X`) or their weights (`sample_weight`).
+/// [`Error::Argument`](crate::Error::Argument) naming an option, the points (`X`) or their weights
+/// (`sample_weight`).
 pub fn fit_dirichlet(points: &Points, options: &DirichletOptions) -> Result<DirichletMixture> {
     let problem = Problem::new(points, options)?;
     options.threads.install(|| {
@@ -43,8 +44,8 @@ pub fn fit_dirichlet(points: &Points, options: &DirichletOptions) -> Result<Diri
 /// As [`fit_dirichlet`], from responsibilities (N, K), row-major, in place of seeds; `n_init` is not used.
 ///
 /// # Errors
-/// As [`fit_dirichlet`], and named `resp` for responsibilities of another shape, negative, not finite, or of rows that do not sum
-/// to 1.
+/// As [`fit_dirichlet`], and named `resp` for responsibilities of another shape, negative, not finite, or of
+/// rows that do not sum to 1.
 pub fn fit_dirichlet_from(points: &Points, options: &DirichletOptions, shares: &[f64]) -> Result<DirichletMixture> {
     let problem = Problem::new(points, options)?;
     let start = from_shares(points, &problem.planes.centre, options.n_components, shares)?;

@@ -1,7 +1,8 @@
 //! Pooling of pairs of components while that raises the score.
 //!
-//! The mode of the sticks cannot empty a component, so a large Gaussian stays divided among several. The idea of N. Ueda,
-//! R. Nakano, Z. Ghahramani and G. Hinton, "SMEM algorithm for mixture models" (2000), with F as the judge.
+//! The mode of the sticks cannot empty a component, so a large Gaussian stays divided among several. The idea
+//! of N. Ueda, R. Nakano, Z. Ghahramani and G. Hinton, "SMEM algorithm for mixture models" (2000), with F as
+//! the judge.
 
 use super::em::{Problem, Run};
 use crate::error::Result;
@@ -11,10 +12,12 @@ use crate::mixture::moments::Moments;
 const MIN_COUNT: f64 = 1e-3;
 /// Number of pairs that are tried before it ends.
 const TRIALS: usize = 3;
-/// Least gain of F, responsibilities held, with which a pair is tried: expectation-maximization may make up for the rest.
+/// Least gain of F, responsibilities held, with which a pair is tried: expectation-maximization may make up
+/// for the rest.
 const MIN_GAIN: f64 = -20.0;
 
-/// Smallest responsibility that counts for entropy: quotients by smaller ones overflow, and their entropy is below rounding.
+/// Smallest responsibility that counts for entropy: quotients by smaller ones overflow, and their entropy is
+/// below rounding.
 const MIN_SHARE: f64 = 1e-280;
 
 /// A pair of components.

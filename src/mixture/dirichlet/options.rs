@@ -38,7 +38,8 @@ pub struct DirichletOptions {
     pub mean_precision: f64,
     /// `nu0`, above D - 1 (`None`: D + 2).
     pub degrees_of_freedom: Option<f64>,
-    /// `S0`, squared units of the points. [`CovariancePrior::Data`] (default): their covariance over `K^(2/D)`.
+    /// `S0`, squared units of the points. [`CovariancePrior::Data`] (default): their covariance over
+    /// `K^(2/D)`.
     pub covariance_prior: CovariancePrior,
     /// Variance added to the diagonals of `S0` and of the covariances, squared units of the points (1e-6).
     pub covariance_floor: f64,
@@ -46,7 +47,8 @@ pub struct DirichletOptions {
     pub n_init: usize,
     /// Largest number of rounds from each start, and after each pooled pair (100).
     pub max_iter: usize,
-    /// Rounds end when the mean log-likelihood of the points changes by less (1e-4). `None`: always `max_iter` rounds.
+    /// Rounds end when the mean log-likelihood of the points changes by less (1e-4). `None`: always
+    /// `max_iter` rounds.
     pub tol: Option<f64>,
     /// Seed of the starts (0).
     pub seed: u64,

@@ -15,7 +15,8 @@ pub struct DirichletMixture {
     /// Proportions `pi_k` (K), which sum to 1.
     pub weights: Vec<f64>,
     /// Logarithm of the factor before each Gaussian in the E step (K): `ln pi_k`, or of variational Bayes
-    /// `E ln pi_k + 1/2 sum_i psi((nu_k + 1 - i) / 2) + D/2 ln (2 / nu_k) - D / (2 kappa_k)`. Negative infinity: an empty component.
+    /// `E ln pi_k + 1/2 sum_(i=1..D) psi((nu_k + 1 - i) / 2) + D/2 ln (2 / nu_k) - D / (2 kappa_k)`.
+    /// Negative infinity: an empty component.
     pub log_factors: Vec<f64>,
     /// `mu_k` (K, D), in units of the points.
     pub means: Vec<f64>,
@@ -43,9 +44,9 @@ impl DirichletMixture {
         self.counts.iter().filter(|count| **count > ACTIVE_SHARE * total).count()
     }
 
-    /// `ln sum_k rho_nk` of points (N), natural logarithm, and the responsibilities (N, K), row-major, whose rows sum to 1. With
-    /// `rho_nk = exp(log_factor_k) N(x_n; mu_k, Sigma_k)` the former is the log density of the mixture or, of variational Bayes,
-    /// a lower bound of it.
+    /// `ln sum_k rho_nk` of points (N), natural logarithm, and the responsibilities (N, K), row-major, whose
+    /// rows sum to 1. With `rho_nk = exp(log_factor_k) N(x_n; mu_k, Sigma_k)` the former is the log density
+    /// of the mixture or, of variational Bayes, a lower bound of it.
     ///
     /// # Errors
     /// [`Error::Argument`] for points (`X`) that are not finite or of another dimension.

@@ -30,8 +30,8 @@ impl Scorer {
         &self.prior
     }
 
-    /// `F(r) = sum_k ln m_k + sticks - sum_n w_n sum_k r_nk ln r_nk`, the last sum being `negentropy`. The evidence `m_k` of
-    /// the points of one Gaussian is exact. Components in any order.
+    /// `F(r) = sum_k ln m_k + sticks - sum_n w_n sum_k r_nk ln r_nk`, the last sum being `negentropy`. The
+    /// evidence `m_k` of the points of one Gaussian is exact. Components in any order.
     ///
     /// # Errors
     /// [`Error::Numerical`](crate::Error::Numerical) for a scatter without a factor.

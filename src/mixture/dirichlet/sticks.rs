@@ -1,7 +1,7 @@
 //! Proportions by stick breaking: `pi_k = v_k prod_(j<k) (1 - v_j)`, `v_k ~ Beta(1, alpha)`.
 //!
-//! J. Sethuraman, "A constructive definition of Dirichlet priors" (1994). Components are in the order of decreasing weight;
-//! `T_k = sum_(j>k) N_j` is the weight behind component k.
+//! J. Sethuraman, "A constructive definition of Dirichlet priors" (1994). Components are in the order of
+//! decreasing weight; `T_k = sum_(j>k) N_j` is the weight behind component k.
 
 use super::options::Inference;
 use crate::math::special::{digamma, ln_gamma};

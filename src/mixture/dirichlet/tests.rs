@@ -169,7 +169,8 @@ fn merging_only_raises_the_score_and_more_starts_do() {
     }
 }
 
-/// What pooling does to F when the responsibilities are held, from the definition: the oracle of the sums behind it.
+/// What pooling does to F when the responsibilities are held, from the definition: the oracle of the sums
+/// behind it.
 #[test]
 fn gains_of_pairs_are_differences_of_the_score() {
     let (x, w) = clusters(200, 2, 3, 2);
@@ -229,9 +230,9 @@ fn degenerate_points_are_legal() {
             for (values, dimensions) in cases {
                 for n_components in [1, 12] {
                     let options = DirichletOptions {
-                        inference,
-                        weight_concentration,
                         n_components,
+                        weight_concentration,
+                        inference,
                         ..DirichletOptions::default()
                     };
                     let points = Points { dimensions, values, weights: None };
