@@ -1,6 +1,6 @@
 """Frames in, frames and flow out.
 
-Frames are arrays (H, W) in the file's dtype and grey levels; flow is (H, W, 2) in px/frame. Every file is written under a temporary name and renamed when it is
+Frames are arrays (H, W), or (H, W, 3) in colour, in the file's dtype and levels; flow is (H, W, 2) in px/frame. Every file is written under a temporary name and renamed when it is
 whole. Files that cannot be opened raise OSError, damaged ones `jacoflow.FormatError`, each with the path.
 """
 
@@ -46,13 +46,23 @@ _Path = str | os.PathLike[str]
 
 
 def frames(
-    source: _Path, *, colour: Literal["error", "luminance"] | None = None, first: int = 0, limit: int | None = None, step: int = 1
+    source: _Path,
+    *,
+    colour: Literal["error", "luminance", "rgb"] | None = None,
+    grey: Literal["error", "repeat"] | None = None,
+    first: int = 0,
+    limit: int | None = None,
+    step: int = 1,
 ) -> FrameReader:
-    """Iterates over the frames (H, W) of a source, in their own dtype and grey levels; memory stays bounded whatever its length.
+    """Iterates over the frames of a source, in their own dtype and levels; memory stays bounded whatever its length.
 
-    `source`: a folder of PNG, TIFF, BMP, PGM and JPEG files (natural order), a pattern such as "frames/*.png", one image, a .txt list of images, a
-    .y4m file, "-" (Y4M on standard input), a .npy stack (T, H, W), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`).
-    Frames `first`, `first + step`, ... at most `limit` of them (counts, no unit). _Colour is refused unless `colour="luminance"`.
+    `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as "frames/*.png", one image, a .txt list of images, a
+    .y4m file, "-" (Y4M on standard input), a .npy stack (T, H, W) or (T, H, W, 3), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`).
+    Frames `first`, `first + step`, ... at most `limit` of them (counts, no unit).
+
+    Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they are arrays (H, W, 3) of red, green and blue;
+    grey is then refused with `FormatError` unless `grey="repeat"`, which takes its level for all three. Y4M is converted by ITU-R BT.601, limited range
+    unless its header says XCOLORRANGE=FULL.
 
     >>> import tempfile, numpy as np
     >>> from jacoflow import io
@@ -62,11 +72,11 @@ def frames(
     4
     [(8, 10), (8, 10)]
     """
-    return _open_frames(source, colour, first, limit, step)
+    return _open_frames(source, colour, grey, first, limit, step)
 
 
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
-    """Writes frames (H, W) of one size and dtype, in their grey levels; returns how many.
+    """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
     `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16). `frame_rate` in frames/s is noted where the format has
     room for it.
@@ -74,9 +84,14 @@ def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: flo
     return _write_frames(path, frames, frame_rate)
 
 
-def read_image(path: _Path, *, colour: Literal["error", "luminance"] | None = None) -> NDArray[Any]:
-    """Reads an image (PNG, TIFF, BMP, PGM, JPEG) as an array (H, W) of grey levels; colour is refused unless `colour="luminance"`."""
-    return _read_image(path, colour)
+def read_image(
+    path: _Path,
+    *,
+    colour: Literal["error", "luminance", "rgb"] | None = None,
+    grey: Literal["error", "repeat"] | None = None,
+) -> NDArray[Any]:
+    """Reads an image (PNG, TIFF, BMP, PGM, PPM, JPEG) as an array (H, W) of grey levels, or (H, W, 3) with `colour="rgb"`; `colour` and `grey` as in `frames`."""
+    return _read_image(path, colour, grey)
 
 
 def read_flo(path: _Path) -> NDArray[np.float32]:

@@ -37,12 +37,12 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bou
 }
 
 /// numpy's name of the array's element type.
-fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
+pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
     array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
 }
 
 /// The elements in row-major order, whatever the strides.
-fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
+pub fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
     let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
     if let Ok(slice) = typed.as_slice() {
         // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it lies.
@@ -53,7 +53,8 @@ fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> O
     Some(typed.as_array().iter().copied().collect())
 }
 
-fn wrong_dtype(argument: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
+/// The answer to an array of a type that frames may not have.
+pub fn wrong_dtype(argument: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
     PyTypeError::new_err(format!("{argument}: expected {ACCEPTED}, got {}", dtype_name(array)))
 }
 

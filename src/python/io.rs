@@ -1,135 +1,14 @@
-//! `jacoflow.io`: frames in, frames and flow out.
+//! `jacoflow.io`: flow and float maps in and out.
 
-use super::arrays::{self, ColourRule};
+use super::arrays;
 use super::field::{FlowField, Store};
-use super::options;
 use crate::error::Error;
 use crate::io::{
-    Colour, FieldFormat, FloatMap, FlowImage, FrameSource, NumberedFiles, OpenOptions, npz::NpzReader, open, open_sink,
-    read_flo, read_image, read_kitti, read_npz_from, read_pfm, write_flo, write_kitti, write_pfm,
+    FieldFormat, FloatMap, FlowImage, NumberedFiles, npz::NpzReader, read_flo, read_kitti, read_npz_from, read_pfm,
+    write_flo, write_kitti, write_pfm,
 };
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
-
-fn colour(rule: ColourRule) -> Colour {
-    match rule {
-        ColourRule::Refuse => Colour::Error,
-        ColourRule::Luminance => Colour::Luminance,
-    }
-}
-
-/// Reads frames (H, W) one by one from whatever `jacoflow.io.frames` was given; memory stays bounded. Samples keep the file's dtype and grey levels.
-#[pyclass(module = "jacoflow.io", frozen)]
-pub struct FrameReader {
-    spec: String,
-    colour: ColourRule,
-    options: OpenOptions,
-    place: Mutex<Place>,
-}
-
-struct Place {
-    source: Box<dyn FrameSource>,
-    delivered: usize,
-}
-
-#[pymethods]
-impl FrameReader {
-    fn __iter__(slf: Py<Self>) -> Py<Self> {
-        slf
-    }
-
-    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        py.check_signals()?;
-        let frame = py.detach(|| {
-            let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
-            let frame = place.source.next_frame()?;
-            place.delivered += usize::from(frame.is_some());
-            crate::Result::Ok(frame)
-        })?;
-        frame.map(|frame| arrays::from_any_frame(py, frame)).transpose()
-    }
-
-    /// Frames left (a count, no unit), where that is known without reading them, else 0.
-    fn __length_hint__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.len_hint().unwrap_or(0))
-    }
-
-    /// Frames per second, where the source says so, else None.
-    #[getter]
-    fn frame_rate(&self, py: Python<'_>) -> Option<f64> {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.frame_rate())
-    }
-
-    fn __repr__(&self) -> String {
-        format!("FrameReader({:?})", self.spec)
-    }
-
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Option<&str>, usize, Option<usize>, usize))> {
-        if self.spec == "-" {
-            return Err(PyTypeError::new_err("standard input cannot be pickled"));
-        }
-        let delivered = py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).delivered);
-        let OpenOptions { first, limit, step, .. } = self.options;
-        let rule = (self.colour == ColourRule::Luminance).then_some("luminance");
-        let limit = limit.map(|limit| limit.saturating_sub(delivered));
-        let reopen = py.import("jacoflow._jacoflow")?.getattr("_open_frames")?;
-        Ok((reopen, (self.spec.clone(), rule, first + delivered * step, limit, step)))
-    }
-}
-
-/// Opens a frame source.
-#[pyfunction(name = "_open_frames")]
-#[pyo3(signature = (spec, colour, first, limit, step))]
-pub fn open_frames(
-    py: Python<'_>,
-    spec: PathBuf,
-    colour: Option<&str>,
-    first: i64,
-    limit: Option<i64>,
-    step: i64,
-) -> PyResult<FrameReader> {
-    let not_negative = |name: &'static str, value: i64| {
-        usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))
-    };
-    let rule = ColourRule::parse(colour)?;
-    let mut options = OpenOptions::default();
-    options.colour = self::colour(rule);
-    options.first = not_negative("first", first)?;
-    options.limit = limit.map(|n| not_negative("limit", n)).transpose()?;
-    options.step = options::count("step", options::Integer(step))?;
-    let spec = spec.to_string_lossy().into_owned();
-    let source = py.detach(|| open(&spec, &options))?;
-    Ok(FrameReader { spec, colour: rule, options, place: Mutex::new(Place { source, delivered: 0 }) })
-}
-
-/// Writes frames to a sink.
-#[pyfunction(name = "_write_frames")]
-pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, frame_rate: f64) -> PyResult<usize> {
-    let spec = path.to_string_lossy().into_owned();
-    let mut sink = py.detach(|| open_sink(&spec, frame_rate))?;
-    let mut count = 0;
-    for item in frames.try_iter()? {
-        py.check_signals()?;
-        let frame = arrays::frame("frames", &item?, ColourRule::Refuse)?;
-        py.detach(|| sink.write(&frame))?;
-        count += 1;
-    }
-    py.detach(|| sink.finish())?;
-    Ok(count)
-}
-
-/// Reads an image file.
-#[pyfunction(name = "_read_image")]
-#[pyo3(signature = (path, colour))]
-pub fn read_one_image<'py>(py: Python<'py>, path: PathBuf, colour: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
-    let colour = self::colour(ColourRule::parse(colour)?);
-    arrays::from_any_frame(py, py.detach(|| read_image(&path, colour))?)
-}
 
 /// A flow array `(H, W, 2)` as a flow image.
 fn flow_image(flow: &Bound<'_, PyAny>) -> PyResult<FlowImage> {

@@ -95,3 +95,71 @@ def test_images(frames, tmp_path):
     io.write_frames(tmp_path / "folder", frames[:1])
     (path,) = (tmp_path / "folder").iterdir()
     assert_array_equal(io.read_image(path), frames[0])
+
+
+@pytest.fixture
+def colour_frames():
+    return np.random.default_rng(4).integers(0, 256, (4, 10, 12, 3)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("name", ["stack.npy", "clip.y4m", "folder"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_colour_round_trips(colour_frames, name, dtype, tmp_path):
+    frames = colour_frames.astype(dtype) * (257 if dtype == np.uint16 else 1)
+    assert io.write_frames(tmp_path / name, frames, frame_rate=50.0) == 4
+    back = np.array(list(io.frames(tmp_path / name, colour="rgb")))
+    assert back.dtype == dtype and back.shape == frames.shape
+    # Y4M rounds luma and chroma: at most (1 + 1.772) / 2 levels before the last rounding.
+    apart = np.abs(back.astype(int) - frames).max()
+    assert apart <= (1 if name.endswith("y4m") else 0)
+    part = list(io.frames(tmp_path / name, colour="rgb", first=1, step=2))
+    assert_array_equal(part, back[1::2])
+
+
+def test_colour_stacks_hold_floats_in_any_order(colour_frames, tmp_path):
+    values = np.asfortranarray(colour_frames / 255.0)
+    np.save(tmp_path / "stack.npy", values)
+    assert_array_equal(list(io.frames(tmp_path / "stack.npy", colour="rgb")), values)
+    io.write_frames(tmp_path / "again.npy", list(values))
+    assert_array_equal(np.load(tmp_path / "again.npy"), values)
+
+
+def test_colour_images(colour_frames, tmp_path):
+    io.write_frames(tmp_path / "folder", colour_frames[:1])
+    (path,) = (tmp_path / "folder").iterdir()
+    assert_array_equal(io.read_image(path, colour="rgb"), colour_frames[0])
+    assert_array_equal(io.read_image(path, colour="luminance"), jacoflow.luminance(colour_frames[0]))
+    with pytest.raises(jacoflow.FormatError, match="holds colour"):
+        io.read_image(path)
+
+
+def test_grey_says_that_colour_is_needed(frames, tmp_path):
+    io.write_frames(tmp_path / "folder", frames)
+    for name in ("stack.npy", "clip.y4m", "folder"):
+        io.write_frames(tmp_path / name, frames)
+        with pytest.raises(jacoflow.FormatError, match="colour is needed"):
+            next(io.frames(tmp_path / name, colour="rgb"))
+        repeated = list(io.frames(tmp_path / name, colour="rgb", grey="repeat"))
+        assert_array_equal(repeated, np.repeat(frames[..., None], 3, axis=3))
+
+
+def test_colour_readers_pickle_where_they_stand(frames, colour_frames, tmp_path):
+    io.write_frames(tmp_path / "colour", colour_frames)
+    reader = io.frames(tmp_path / "colour", colour="rgb")
+    next(reader)
+    assert_array_equal(list(pickle.loads(pickle.dumps(reader))), colour_frames[1:])
+    io.write_frames(tmp_path / "grey", frames)
+    reader = pickle.loads(pickle.dumps(io.frames(tmp_path / "grey", colour="rgb", grey="repeat")))
+    assert next(reader).shape == (*frames[0].shape, 3)
+
+
+def test_wrong_colour_arguments_are_named(frames, colour_frames, tmp_path):
+    io.write_frames(tmp_path / "folder", frames)
+    for options, name in [({"colour": "green"}, "colour"), ({"colour": "rgb", "grey": "no"}, "grey"), ({"grey": "repeat"}, "grey")]:
+        with pytest.raises(ValueError, match=f"^{name}: expected"):
+            io.frames(tmp_path / "folder", **options)
+    with pytest.raises(ValueError, match="frames: expected a colour frame .*colour is needed"):
+        io.write_frames(tmp_path / "mixed.npy", [colour_frames[0], frames[0]])
+    with pytest.raises(ValueError, match="frames: expected a grey frame"):
+        io.write_frames(tmp_path / "mixed.npy", [frames[0], colour_frames[0]])
+    assert not (tmp_path / "mixed.npy").exists()
