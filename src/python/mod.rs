@@ -4,6 +4,7 @@
 #![allow(clippy::type_complexity, reason = "what __reduce__ must return")]
 
 mod arrays;
+mod colour_arrays;
 mod command;
 mod dirichlet_mixture;
 mod errors;
@@ -11,6 +12,7 @@ mod estimate;
 mod field;
 mod filters;
 mod flow_filter;
+mod frames;
 mod gauss_markov;
 mod image;
 mod io;
@@ -56,9 +58,9 @@ mod _jacoflow {
     #[pymodule_export]
     use super::image::{luminance, quantise, smooth};
     #[pymodule_export]
-    use super::io::{
-        FrameReader, open_frames, read_float_map, read_flow, read_one_image, write_float_map, write_flow, write_frames,
-    };
+    use super::frames::{FrameReader, open_frames, read_one_image, write_frames};
+    #[pymodule_export]
+    use super::io::{read_float_map, read_flow, write_float_map, write_flow};
     #[pymodule_export]
     use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
