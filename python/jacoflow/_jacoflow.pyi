@@ -83,9 +83,11 @@ __all__ = [
     "_write_disparity",
     "Scene",
     "Sensor",
+    "TargetScene",
     "_scene_carriers",
     "_scene_names",
     "_scene_parameters",
+    "_target_scene_names",
     "__version__",
 ]
 
@@ -1074,6 +1076,60 @@ class Scene:
     def __getnewargs_ex__(self, /) -> tuple[tuple[str], dict[str, Any]]: ...
 
 @final
+class TargetScene:
+    """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with exact boxes.
+
+    `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and noise. `scale` multiplies all lengths; at 1 a
+    frame has 720 x 480 px. `noise` is the standard deviation of the white noise of each channel, grey levels. `frames` is their number, by default that
+    of the scene; zoom and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red is multiplied by 1 - r,
+    blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
+    """
+    def __new__(
+        cls,
+        name: str,
+        *,
+        seed: int = 0,
+        scale: float = 0.5,
+        noise: float = 2.5,
+        frames: int | None = None,
+        colour_cast: float = 0.0,
+    ) -> TargetScene: ...
+    @property
+    def name(self) -> str:
+        """Name of the scene (no unit)."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """Size (width, height) of the frames, px."""
+    @property
+    def n_targets(self) -> int:
+        """Number of targets K (no unit)."""
+    @property
+    def drawing_order(self) -> tuple[int, ...]:
+        """Indices of the targets from the farthest to the nearest, which hides the others (no unit)."""
+    def __len__(self, /) -> int:
+        """Number of frames T (no unit)."""
+    def frame(self, /, t: int, *, targets: Sequence[int] | None = None) -> NDArray[np.uint8]:
+        """Frame `t`: uint8 array (H, W, 3), red, green and blue.
+
+        With `targets`, indices, only those are drawn; world, post and noise are the same, so that the difference shows the pixels of the others.
+        """
+    def frames(self, /) -> NDArray[np.uint8]:
+        """All frames: uint8 array (T, H, W, 3), red, green and blue."""
+    def boxes(self, /) -> NDArray[np.float64]:
+        """Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px, whether the target is seen or not.
+
+        Pixel centres lie at integers; the centre is left + width / 2, top + height / 2. Arms, legs and a car on a slope reach a little over it.
+        """
+    def camera_motion(self, /) -> NDArray[np.float64]:
+        """Where the camera's motion takes the still world from each frame to the next: float64 array (T - 1, 2, 3).
+
+        What is at (x, y) px in frame t is at `motion[t] @ (x, y, 1)` px in frame t + 1.
+        """
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
+    def __getnewargs_ex__(self, /) -> tuple[tuple[str], dict[str, Any]]: ...
+
+@final
 class Sensor:
     """What a camera does to a frame: white noise, rounding, clipping.
 
@@ -1282,4 +1338,5 @@ def _run_command_line(arguments: list[str]) -> int: ...
 def _scene_carriers() -> dict[str, str]: ...
 def _scene_names() -> dict[str, str]: ...
 def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...
+def _target_scene_names() -> dict[str, str]: ...
 def _status_names() -> list[str]: ...

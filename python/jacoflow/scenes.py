@@ -6,11 +6,17 @@
 (3, 48, 64)
 >>> float(scene.truth(1.0).u_x[24, 32])
 0.01
+
+Colour scenes with several targets, for trackers:
+
+>>> crossing = scenes.TargetScene("people_handheld", scale=0.25, frames=5)
+>>> crossing.frames().shape, crossing.boxes().shape
+((5, 120, 180, 3), (5, 2, 4))
 """
 
-from ._jacoflow import Scene, Sensor, _scene_carriers, _scene_names, _scene_parameters
+from ._jacoflow import Scene, Sensor, TargetScene, _scene_carriers, _scene_names, _scene_parameters, _target_scene_names
 
-__all__ = ["Scene", "Sensor", "carriers", "names", "parameters"]
+__all__ = ["Scene", "Sensor", "TargetScene", "carriers", "names", "parameters", "target_scenes"]
 
 
 def names() -> dict[str, str]:
@@ -40,3 +46,12 @@ def parameters(name: str) -> dict[str, tuple[float | None, str]]:
     (0.3, 'flow along x at the centre, px/frame')
     """
     return _scene_parameters(name)
+
+
+def target_scenes() -> dict[str, str]:
+    """Names of the colour scenes of several targets, each with one line about it (no unit).
+
+    >>> list(target_scenes())[:3]
+    ['people_handheld', 'cars_handheld', 'people_static']
+    """
+    return _target_scene_names()

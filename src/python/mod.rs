@@ -28,6 +28,7 @@ mod segment;
 mod spare;
 mod stereo;
 mod stereo_track;
+mod target_scenes;
 mod track;
 
 use pyo3::prelude::*;
@@ -81,6 +82,8 @@ mod _jacoflow {
     use super::stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity};
     #[pymodule_export]
     use super::stereo_track::{PyStereoTracker, PyTrackGraph};
+    #[pymodule_export]
+    use super::target_scenes::{TargetScene, target_scene_names};
     #[pymodule_export]
     use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
 
