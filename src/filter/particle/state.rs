@@ -173,7 +173,7 @@ impl ParticleFilter {
         out: &mut [f64],
         work: impl Fn(Range<usize>, &mut [f64]) + Sync + Send,
     ) {
-        if out.len() <= SERIAL {
+        if out.len() <= SERIAL || self.threads.count() == 1 {
             work(0..out.len() / width, out);
         } else {
             self.threads.install(|| for_each_band_of(BAND, out, width, |_, rows, out| work(rows, out)));
