@@ -84,11 +84,34 @@ impl TrackTable {
         Ok(Self { table: TableWriter::create(path, &Self::columns())? })
     }
 
+    /// As [`TrackTable::create`], with further columns after the others.
+    ///
+    /// # Errors
+    /// As [`TableWriter::create`].
+    pub fn create_with(path: impl AsRef<Path>, further: &[&str]) -> Result<Self> {
+        let columns: Vec<String> = Self::columns().into_iter().chain(further.iter().map(ToString::to_string)).collect();
+        Ok(Self { table: TableWriter::create(path, &columns)? })
+    }
+
     /// Adds the row of target number `target` (from 1) at frame `frame` of the input, and its time, s, if that is known.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.
-    pub fn write(&mut self, target: usize, (frame, time): (usize, Option<f64>), state: &TrackState) -> Result<()> {
+    pub fn write(&mut self, target: usize, place: (usize, Option<f64>), state: &TrackState) -> Result<()> {
+        self.write_with(target, place, state, &[])
+    }
+
+    /// As [`TrackTable::write`], with a cell for each further column.
+    ///
+    /// # Errors
+    /// As [`TrackTable::write`].
+    pub fn write_with(
+        &mut self,
+        target: usize,
+        (frame, time): (usize, Option<f64>),
+        state: &TrackState,
+        further: &[String],
+    ) -> Result<()> {
         let mut cells = vec![
             target.to_string(),
             frame.to_string(),
@@ -115,6 +138,7 @@ impl TrackTable {
         cells.extend(state.line_of_sight.map(cell));
         cells.push(state.flow_count.to_string());
         cells.extend(state.covariance.iter().flat_map(|axis| ENTRIES.map(|(_, row, column)| cell(axis[row][column]))));
+        cells.extend_from_slice(further);
         self.table.row(&cells)
     }
 
@@ -227,6 +251,18 @@ mod tests {
         ] {
             assert_eq!(cell(name), value, "{name}");
         }
+    }
+
+    #[test]
+    fn further_columns_come_last() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("t.csv");
+        let mut table = TrackTable::create_with(&path, &["similarity"]).unwrap();
+        table.write_with(1, (0, None), &numbered(), &[cell(0.25)]).unwrap();
+        table.finish().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].ends_with(",cov_y_aa,similarity") && lines[1].ends_with(",205,0.25"), "{text}");
     }
 
     #[test]

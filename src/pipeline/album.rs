@@ -1,11 +1,12 @@
 //! Where drawn pictures go: numbered files in a folder, or a film.
 
 use crate::error::{Error, Result};
-use crate::image::picture::Picture;
+use crate::image::picture::{Picture, grey_picture};
 use crate::io::write::TemporaryFolder;
-use crate::io::{FilmWriter, NumberedFiles, write_picture};
+use crate::io::{FilmWriter, NumberedFiles, write_frame_png, write_picture};
 use crate::pipeline::output::{check_target, is_folder};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
+use crate::types::{AnyFrame, Frame};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -78,17 +79,33 @@ impl Album {
 
     /// Adds the picture of the frame `index`.
     pub fn add(&mut self, index: usize, picture: &Picture) -> Result<()> {
+        self.add_by(index, |file| write_picture(file, picture), |film| film.write(picture))
+    }
+
+    /// As [`Album::add`], of grey levels: files have one channel.
+    pub fn add_grey(&mut self, index: usize, levels: Frame<u8>) -> Result<()> {
+        let frame = AnyFrame::U8(levels);
+        self.add_by(index, |file| write_frame_png(file, &frame), |film| film.write(&grey_picture(&frame)))
+    }
+
+    fn add_by(
+        &mut self,
+        index: usize,
+        to_file: impl FnOnce(&Path) -> Result<()>,
+        to_film: impl FnOnce(&mut FilmWriter) -> Result<()>,
+    ) -> Result<()> {
         match &mut self.place {
             Place::Folder(files) => {
                 let file = files.path(index);
-                write_picture(&file, picture)?;
+                to_file(&file)?;
                 self.latest = Some(file);
             }
             Place::Replaced(new) => {
-                write_picture(new.files.path(index), picture)?;
+                to_file(&new.files.path(index))?;
                 self.latest = Some(new.in_place.path(index));
             }
-            Place::Film(_, writer) => writer.iter_mut().try_for_each(|film| film.write(picture))?,
+            Place::Film(_, Some(film)) => to_film(film)?,
+            Place::Film(_, None) => {}
         }
         self.written += 1;
         Ok(())
@@ -190,7 +207,6 @@ impl Replacement {
 mod tests {
     use super::*;
     use crate::image::picture::GreyRange;
-    use crate::types::{AnyFrame, Frame};
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = folder.read_dir().into_iter().flatten().flatten();

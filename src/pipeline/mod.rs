@@ -1,5 +1,5 @@
 //! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks; and, with trackers in their place, to
-//! tracks ([`TrackRun`]); and from pairs of views to tracks of everything that moves ([`StereoRun`]).
+//! tracks ([`TrackRun`], of colour frames [`ParticleRun`]); and from pairs of views to tracks of everything that moves ([`StereoRun`]).
 //!
 //! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`] frames wait behind the reader,
 //! and a stage keeps the few frames that it needs (figures 1 and 2 of WO2010/098160). Frames are read and decoded on a thread of their own
@@ -7,6 +7,7 @@
 
 mod album;
 mod output;
+mod particle;
 mod prefetch;
 mod run;
 mod sink;
@@ -16,6 +17,10 @@ mod text_format;
 mod track;
 
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_device, is_folder};
+pub use particle::{
+    BeginParticleSinks, ForegroundMaps, ParticleFrame, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink,
+    TargetStart,
+};
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{

@@ -20,7 +20,7 @@ pub use contact::{ContactMark, draw_contacts};
 pub use disparity::draw_disparity;
 pub use diverging::{SignedMap, symmetric_range};
 pub use grey::{GreyRange, grey_picture};
-pub use overlay::{PathPoint, TrackOverlay, status_colour};
+pub use overlay::{PathPoint, TrackColours, TrackOverlay, status_colour};
 pub use quiver::{Arrow, Quiver, arrows_on_grid};
 pub use wheel::{FlowColours, wheel_legend};
 

@@ -1,5 +1,6 @@
 //! Tracks drawn over a frame: box, path, centre with its error ellipse, window.
 
+use super::clusters::identity_colour;
 use super::digits::draw_number;
 use super::line::draw_stroke;
 use super::{Picture, Rgb};
@@ -17,6 +18,9 @@ const CROSS: f64 = 3.0;
 /// Longest side and length that are drawn, px: a target that ran away must not cost strokes without end.
 const LONGEST: f64 = 1e5;
 
+/// Colour of the window about the line of sight.
+const WINDOW: Rgb = [235, 235, 235];
+
 /// Colour of a target by how well it is in hand, told apart by people with any kind of colour vision: green tracking, orange occluded, blue coasting, grey out, red
 /// lost.
 ///
@@ -31,10 +35,22 @@ pub fn status_colour(status: TrackStatus) -> Rgb {
     }
 }
 
+/// What a target's colour says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TrackColours {
+    /// How well it is in hand, as [`status_colour`].
+    #[default]
+    Status,
+    /// Which one it is, as [`identity_colour`]. The box is dashed where the target was not measured, and left out once it is out of the picture or lost.
+    Target,
+}
+
 /// How a target is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackOverlay {
+    /// What colours say; default: the status.
+    pub colours: TrackColours,
     /// By how much the picture is larger than the frame ([`Picture::enlarged`]); default 1.
     pub enlargement: usize,
     /// Width of the strokes, px of the picture; default 1.3.
@@ -43,7 +59,7 @@ pub struct TrackOverlay {
 
 impl Default for TrackOverlay {
     fn default() -> Self {
-        Self { enlargement: 1, thickness: 1.3 }
+        Self { colours: TrackColours::Status, enlargement: 1, thickness: 1.3 }
     }
 }
 
@@ -55,13 +71,22 @@ impl TrackOverlay {
     /// centre as a cross, with the ellipse that holds the true centre with 95 % certainty if the covariance is right; the window about the line of sight, dashed; the
     /// number at the box. What is not finite is left out.
     pub fn draw(&self, picture: &mut Picture, target: usize, state: &TrackState, path: &[PathPoint]) {
-        let colour = status_colour(state.status);
+        let by_target = self.colours == TrackColours::Target;
+        let colour_of = |status| if by_target { identity_colour(target as u64) } else { status_colour(status) };
+        let colour = colour_of(state.status);
         for pair in path.windows(2) {
-            self.stroke(picture, pair[0].0, pair[1].0, status_colour(pair[1].1));
+            self.stroke(picture, pair[0].0, pair[1].0, colour_of(pair[1].1));
+        }
+        if by_target && matches!(state.status, TrackStatus::Out | TrackStatus::Lost) {
+            return;
         }
         self.draw_window(picture, state);
         let corners = box_corners(state);
-        self.polygon(picture, &corners, colour);
+        if by_target && !state.status.is_measured() {
+            self.dashed_polygon(picture, &corners, colour);
+        } else {
+            self.polygon(picture, &corners, colour);
+        }
         self.polygon(picture, &ellipse(state), colour);
         self.draw_cross(picture, state.position, colour);
         if let Some(label) = corners.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1])]) {
@@ -101,12 +126,16 @@ impl TrackOverlay {
             return;
         }
         let corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]];
+        self.dashed_polygon(picture, &corners, WINDOW);
+    }
+
+    fn dashed_polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb) {
         for (k, from) in corners.iter().enumerate() {
-            self.dashed(picture, *from, corners[(k + 1) % 4]);
+            self.dashed(picture, *from, corners[(k + 1) % corners.len()], colour);
         }
     }
 
-    fn dashed(&self, picture: &mut Picture, from: [f64; 2], to: [f64; 2]) {
+    fn dashed(&self, picture: &mut Picture, from: [f64; 2], to: [f64; 2], colour: Rgb) {
         // An odd number of equal parts, so that corners are inked.
         let parts = 2 * ((to[0] - from[0]).hypot(to[1] - from[1]) / 12.0).round() as usize + 1;
         let at = |k: usize| -> [f64; 2] {
@@ -114,7 +143,7 @@ impl TrackOverlay {
             std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
         };
         for k in (0..parts).step_by(2) {
-            self.stroke(picture, at(k), at(k + 1), [235, 235, 235]);
+            self.stroke(picture, at(k), at(k + 1), colour);
         }
     }
 }
@@ -199,6 +228,22 @@ mod tests {
         assert_eq!(picture.pixel(16, 5), [235; 3]);
         let dark = (15..46).filter(|x| picture.pixel(*x, 5) == GREY).count();
         assert!(dark >= 4, "the window is dashed");
+    }
+
+    #[test]
+    fn targets_may_have_colours_of_their_own() {
+        let overlay = TrackOverlay { colours: TrackColours::Target, ..TrackOverlay::default() };
+        let colour = identity_colour(1);
+        let on_left_side = |picture: &Picture| (15..26).filter(|y| picture.pixel(20, *y) == colour).count();
+        assert_eq!(on_left_side(&drawn(overlay, &state(), &[])), 11);
+        let hidden = TrackState { status: TrackStatus::Coasting, ..state() };
+        let dashes = on_left_side(&drawn(overlay, &hidden, &[]));
+        assert!((4..9).contains(&dashes), "{dashes}");
+        let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Lost)];
+        for status in [TrackStatus::Out, TrackStatus::Lost] {
+            let gone = drawn(overlay, &TrackState { status, ..state() }, &path);
+            assert_eq!((gone.pixel(10, 40), on_left_side(&gone)), (colour, 0));
+        }
     }
 
     #[test]

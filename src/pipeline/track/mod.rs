@@ -6,6 +6,7 @@ mod rows;
 mod tests;
 
 pub use overlay::{Overlays, PATH_LENGTH};
+pub(super) use rows::{Row, RowWriter};
 pub use rows::{TrackFormat, TrackRows};
 
 use super::prefetch::Prefetch;
@@ -66,6 +67,8 @@ pub type Begin<'a> = Box<dyn FnOnce(&Frame<f64>) -> Result<Begun> + 'a>;
 /// How one target fared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetSummary {
+    /// Its number, from 1 unless the input gives one.
+    pub number: u64,
     /// Frames with each status, in the order of [`TrackStatus::ALL`].
     pub counts: [usize; TrackStatus::ALL.len()],
     /// The target at the last frame.
@@ -137,10 +140,7 @@ impl TrackRun {
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending));
         }
-        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
-        self.summary.files = files.iter().map(|(number, _)| number).sum();
-        self.summary.latest_of_sinks = files.into_iter().map(|(_, latest)| latest).collect();
-        self.summary.latest = self.summary.latest_of_sinks.iter().rev().flatten().next().cloned();
+        self.summary.note_files(self.sinks.iter().map(|sink| sink.files()).collect());
         self.summary.seconds = start.elapsed().as_secs_f64();
         result
     }
@@ -193,13 +193,30 @@ impl TrackRun {
     }
 
     fn count(&mut self, states: &[TrackState]) {
-        let targets = &mut self.summary.targets;
-        targets
-            .extend(states[targets.len()..].iter().map(|state| TargetSummary { counts: [0; 5], last: state.clone() }));
-        for (target, state) in targets.iter_mut().zip(states) {
-            target.counts[state.status as usize] += 1;
-            target.last = state.clone();
+        for (number, state) in (1..).zip(states) {
+            self.summary.count(number, state);
         }
+    }
+}
+
+impl TrackSummary {
+    /// Notes target `number` at one more frame.
+    pub(in crate::pipeline) fn count(&mut self, number: u64, state: &TrackState) {
+        let at = self.targets.partition_point(|target| target.number < number);
+        if self.targets.get(at).is_none_or(|target| target.number != number) {
+            let counts = [0; TrackStatus::ALL.len()];
+            self.targets.insert(at, TargetSummary { number, counts, last: state.clone() });
+        }
+        let target = &mut self.targets[at];
+        target.counts[state.status as usize] += 1;
+        target.last = state.clone();
+    }
+
+    /// Notes what the sinks have in place at the end of a run.
+    pub(in crate::pipeline) fn note_files(&mut self, of_sinks: Vec<(usize, Option<PathBuf>)>) {
+        self.files = of_sinks.iter().map(|(number, _)| number).sum();
+        self.latest_of_sinks = of_sinks.into_iter().map(|(_, latest)| latest).collect();
+        self.latest = self.latest_of_sinks.iter().rev().flatten().next().cloned();
     }
 }
 

@@ -1,0 +1,51 @@
+//! Foreground maps as pictures.
+
+use super::{ParticleFrame, ParticleSink};
+use crate::error::Result;
+use crate::pipeline::album::Album;
+use crate::pipeline::sink::Ending;
+use std::path::{Path, PathBuf};
+
+/// First word of the files' names.
+const STEM: &str = "foreground";
+/// Name of the argument in errors.
+const ARGUMENT: &str = "foreground";
+
+/// Writes the foreground map of every frame, 0 (background) to 255, as 8-bit grey `foreground_000012.png`, numbered as in the input, each whole, or as one film.
+#[derive(Debug)]
+pub struct ForegroundMaps {
+    album: Album,
+}
+
+impl ForegroundMaps {
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of `frame_rate` frames per second that appears when it is finished.
+    ///
+    /// # Errors
+    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
+    pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
+        Ok(Self { album: Album::create(path.as_ref(), STEM, ARGUMENT, frame_rate)? })
+    }
+
+    /// Refuses a folder that holds maps of an earlier run, which would end up as a mixture, and a film that exists. Nothing is made.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) named `foreground`.
+    pub fn check(path: &Path) -> Result<()> {
+        Album::check(path, STEM, ARGUMENT)
+    }
+}
+
+impl ParticleSink for ForegroundMaps {
+    fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
+        let map = step.tracker.foreground()?;
+        self.album.add_grey(step.frame_index, map.map(|share| (255.0 * share).round() as u8))
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        self.album.finish(ending)
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        self.album.files()
+    }
+}

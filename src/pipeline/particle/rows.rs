@@ -1,0 +1,62 @@
+//! Targets followed by particle filters as rows of text.
+
+use super::{ParticleFrame, ParticleSink};
+use crate::error::Result;
+use crate::io::cell;
+use crate::pipeline::sink::{Ending, TableTarget};
+use crate::pipeline::track::{Row, RowWriter, TrackFormat};
+use crate::track::particle::ParticleTarget;
+use std::path::PathBuf;
+
+/// Columns that [`TrackTable`](crate::io::TrackTable) does not have.
+const FURTHER: [&str; 4] = ["effective_sample_size", "similarity", "n_tracks", "degenerate"];
+
+/// Writes a row for every target and frame, as [`TrackRows`](crate::pipeline::TrackRows). CSV has further columns:
+///
+/// | columns | unit |
+/// |---|---|
+/// | `effective_sample_size` | particles |
+/// | `similarity` | of the colours to those of the first frame, 0 to 1 |
+/// | `n_tracks` | corner tracks that belong to the target |
+/// | `degenerate` | `true` if no particle had a weight, else `false` |
+#[derive(Debug)]
+pub struct ParticleRows {
+    rows: RowWriter,
+}
+
+impl ParticleRows {
+    /// Begins the text.
+    ///
+    /// # Errors
+    /// As [`TrackTable::create`](crate::io::TrackTable::create).
+    pub fn create(target: &TableTarget, format: TrackFormat) -> Result<Self> {
+        Ok(Self { rows: RowWriter::create(target, format, &FURTHER)? })
+    }
+}
+
+fn further(target: &ParticleTarget) -> Vec<String> {
+    vec![
+        cell(target.effective_sample_size),
+        cell(target.similarity),
+        target.n_tracks.to_string(),
+        target.degenerate.to_string(),
+    ]
+}
+
+fn row(target: &ParticleTarget) -> Row<'_> {
+    Row { target: target.id as usize, state: &target.state, further: further(target) }
+}
+
+impl ParticleSink for ParticleRows {
+    fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
+        self.rows.write((step.frame_index, step.time), step.targets.iter().map(row))
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        self.rows.finish(ending)
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        self.rows.files()
+    }
+}
