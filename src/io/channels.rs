@@ -1,4 +1,5 @@
-//! From decoded channels to frames: what becomes of colour where grey is wanted, and of grey where colour is wanted.
+//! From decoded channels to frames: what becomes of colour where grey is wanted, and of grey where colour is
+//! wanted.
 
 use crate::error::{Error, Result};
 use crate::image::luminance;
@@ -9,8 +10,9 @@ use std::path::Path;
 /// What to do with colour pictures where grey frames are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Colour {
-    /// Refuse them with a message that says how to convert. The default: which grey is right depends on the scene. Grey stored as RGB (red, green and
-    /// blue equal in every pixel of an image file) is not colour and is taken as grey.
+    /// Refuse them with a message that says how to convert. The default: which grey is right depends on the
+    /// scene. Grey stored as RGB (red, green and blue equal in every pixel of an image file) is not colour
+    /// and is taken as grey.
     #[default]
     Error,
     /// Convert by [`luminance`].
@@ -20,7 +22,8 @@ pub enum Colour {
 /// What to do with grey pictures where colour frames are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Grey {
-    /// Refuse them: a method that needs colour has none to use. The default. Grey stored as RGB is taken as it is.
+    /// Refuse them: a method that needs colour has none to use. The default. Grey stored as RGB is taken as
+    /// it is.
     #[default]
     Error,
     /// Take the grey level for red, green and blue alike.
@@ -98,7 +101,8 @@ pub struct Channels<'a, S> {
 }
 
 impl<S: Sample> Channels<'_, S> {
-    /// Whether any pixel's red, green and blue differ. Grey stored as RGB (the only way in BMP) is grey: its luma is the level itself.
+    /// Whether any pixel's red, green and blue differ. Grey stored as RGB (the only way in BMP) is grey: its
+    /// luma is the level itself.
     fn holds_colour(&self) -> bool {
         self.count > 2
             && self.samples.chunks_exact(self.count).any(|p| {
@@ -122,7 +126,8 @@ pub trait ChannelPolicy: Copy + Debug + Send + Sync + 'static {
     /// The frame of a picture.
     ///
     /// # Errors
-    /// [`Error::Format`] with the path when the policy refuses the picture, or it holds another number of samples than its size says.
+    /// [`Error::Format`] with the path when the policy refuses the picture, or it holds another number of
+    /// samples than its size says.
     fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<Self::Frame>;
 
     /// Refuses a layout of `count` channels whose content need not be looked at.

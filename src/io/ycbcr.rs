@@ -1,7 +1,7 @@
 //! Red, green and blue to luma and chroma and back, by the matrix of ITU-R BT.601.
 //!
-//! With components in 0..1: `Y = 0.299 R + 0.587 G + 0.114 B`, `Cb = (B - Y) / 1.772`, `Cr = (R - Y) / 1.402`, so that chroma lies in -0.5..0.5
-//! (ITU-R BT.601-7, 2011, section 2.5.1; JFIF 1.02 uses the same).
+//! With components in 0..1: `Y = 0.299 R + 0.587 G + 0.114 B`, `Cb = (B - Y) / 1.772`, `Cr = (R - Y) /
+//! 1.402`, so that chroma lies in -0.5..0.5 (ITU-R BT.601-7, 2011, section 2.5.1; JFIF 1.02 uses the same).
 
 /// Weights of red, green and blue in luma.
 const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
@@ -28,7 +28,8 @@ pub(crate) struct Coding {
 }
 
 impl Coding {
-    /// Codes of `bits` bits. Full range uses all for 0..1; limited range 16..235 (luma) and 16..240 (chroma), times `2^(bits - 8)`.
+    /// Codes of `bits` bits. Full range uses all for 0..1; limited range 16..235 (luma) and 16..240 (chroma),
+    /// times `2^(bits - 8)`.
     pub(crate) fn new(bits: u32, full_range: bool) -> Self {
         Self { bits, full_range }
     }
@@ -97,7 +98,8 @@ mod tests {
     }
 
     proptest! {
-        /// Half a code of rounding in luma and in chroma moves a component by at most `(1 + 1.772) / 2` codes.
+        /// Half a code of rounding in luma and in chroma moves a component by at most `(1 + 1.772) / 2`
+        /// codes.
         #[test]
         fn colours_survive_within_their_rounding(rgb: [u16; 3], bits in 8_u32..=16, full_range: bool) {
             let coding = Coding::new(bits, full_range);

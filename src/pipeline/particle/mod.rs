@@ -1,4 +1,5 @@
-//! From colour frames to targets followed by particle filters: source, tracker, sinks; one frame at a time, in bounded memory.
+//! From colour frames to targets followed by particle filters: source, tracker, sinks; one frame at a time,
+//! in bounded memory.
 
 mod foreground;
 mod overlay;
@@ -47,7 +48,8 @@ pub trait ParticleSink: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and removes the rest.
+    /// Called once at the end, however the run ended: brings what is complete under its final name and
+    /// removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -57,7 +59,8 @@ pub trait ParticleSink: Send {
     fn files(&self) -> (usize, Option<PathBuf>);
 }
 
-/// Begins the sinks once the tracker has its first targets, so that no file is begun for those that cannot be followed.
+/// Begins the sinks once the tracker has its first targets, so that no file is begun for those that cannot be
+/// followed.
 pub type BeginParticleSinks<'a> = Box<dyn FnOnce() -> Result<Vec<Box<dyn ParticleSink>>> + 'a>;
 
 /// A target and where it starts.
@@ -82,7 +85,8 @@ pub struct ParticleRun {
 }
 
 impl ParticleRun {
-    /// A run that follows each target from its start on; `numbering` says which frames of the input come. A start at a frame that does not come is ignored.
+    /// A run that follows each target from its start on; `numbering` says which frames of the input come. A
+    /// start at a frame that does not come is ignored.
     pub fn new(starts: &[TargetStart], options: ParticleOptions, numbering: Numbering) -> Self {
         let mut by_frame = BTreeMap::<usize, Vec<(u64, TargetBox)>>::new();
         for start in starts {
@@ -98,11 +102,13 @@ impl ParticleRun {
 
     /// Works through `source` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its error stops the run, and what is complete then stays.
+    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
-    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named `frames` for fewer than two frames or one of
-    /// another size, `box` with the target's number for a box that cannot be followed.
+    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named
+    /// `frames` for fewer than two frames or one of another size, `box` with the target's number for a box
+    /// that cannot be followed.
     pub fn run(
         &mut self,
         source: Box<dyn FrameSource<AnyColourFrame>>,

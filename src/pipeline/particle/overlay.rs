@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// First word of the files' names.
 const STEM: &str = "track";
 
-/// Writes every frame with its targets, each in a colour of its own, as `track_000012.png`, numbered as in the input, each whole, or as one film.
+/// Writes every frame with its targets, each in a colour of its own, as `track_000012.png`, numbered as in
+/// the input, each whole, or as one film.
 #[derive(Debug)]
 pub struct ParticleOverlays {
     album: Album,
@@ -22,10 +23,12 @@ pub struct ParticleOverlays {
 }
 
 impl ParticleOverlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of `frame_rate` frames per second that appears when it is finished.
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
+    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         let overlay = TrackOverlay { colours: TrackColours::Target, ..overlay };

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Columns that [`TrackTable`](crate::io::TrackTable) does not have.
 const FURTHER: [&str; 4] = ["effective_sample_size", "similarity", "n_tracks", "degenerate"];
 
-/// Writes a row for every target and frame, as [`TrackRows`](crate::pipeline::TrackRows). CSV has further columns:
+/// Writes a row for every target and frame, as [`TrackRows`](crate::pipeline::TrackRows). CSV has further
+/// columns:
 ///
 /// | columns | unit |
 /// |---|---|
