@@ -5,6 +5,7 @@ mod median;
 pub mod random;
 mod real;
 pub mod special;
+mod ziggurat;
 
 pub(crate) use median::median;
 pub use real::Real;

@@ -45,25 +45,6 @@ impl CounterRng {
         let radius = (-2.0 * (1.0 - self.uniform(2 * index)).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform(2 * index + 1)).cos()
     }
-
-    /// Two independent standard normals of the same bits as [`Self::normal`], which is the first of them.
-    #[inline]
-    pub fn normal_pair(&self, index: u64) -> [f64; 2] {
-        let radius = (-2.0 * (1.0 - self.uniform(2 * index)).ln()).sqrt();
-        let (sine, cosine) = (std::f64::consts::TAU * self.uniform(2 * index + 1)).sin_cos();
-        [radius * cosine, radius * sine]
-    }
-
-    /// Fills `out` with standard normals: the pairs from index `first` on, one after another.
-    ///
-    /// A pair costs about as much as one [`Self::normal`]. Of an odd number the last pair's second is left
-    /// out.
-    #[inline]
-    pub fn fill_normal(&self, first: u64, out: &mut [f64]) {
-        for (index, out) in (first..).zip(out.chunks_mut(2)) {
-            out.copy_from_slice(&self.normal_pair(index)[..out.len()]);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -83,24 +64,6 @@ mod tests {
         }
         let n = n as f64;
         assert!((s1 / n).abs() < 0.01 && (s2 / n - 1.0).abs() < 0.02 && (s4 / n - 3.0).abs() < 0.1);
-    }
-
-    #[test]
-    fn pairs_are_normal_uncorrelated_and_begin_with_the_single_number() {
-        let rng = CounterRng::new(5).stream(1);
-        let mut numbers = vec![0.0; 200_001];
-        rng.fill_normal(7, &mut numbers);
-        let n = 100_000.0;
-        let (mut product, mut square, mut fourth) = (0.0, 0.0, 0.0);
-        for (index, pair) in (7..).zip(numbers.as_chunks::<2>().0) {
-            assert_eq!(*pair, rng.normal_pair(index));
-            assert!((pair[0] - rng.normal(index)).abs() < 1e-14);
-            product += pair[0] * pair[1];
-            square += pair[1] * pair[1];
-            fourth += pair[1].powi(4);
-        }
-        assert_eq!(numbers[200_000], rng.normal_pair(100_007)[0], "an odd number of values");
-        assert!((product / n).abs() < 0.015 && (square / n - 1.0).abs() < 0.02 && (fourth / n - 3.0).abs() < 0.15);
     }
 
     #[test]

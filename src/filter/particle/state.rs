@@ -154,13 +154,11 @@ impl ParticleFilter {
         let (n, particles) = (self.dim_x, self.particles());
         let step = self.step + u64::from(matches!(purpose, Purpose::Transition));
         let streams: Vec<_> = (0..self.batch).map(|set| self.rng(set, step, purpose)).collect();
-        // Pairs of components share their bits: an odd n leaves one number of each particle unused.
-        let pairs = n.div_ceil(2);
         self.for_each_row(n, out, |rows, out| {
             let mut normal = vec![0.0; n];
             for (row, out) in rows.zip(out.chunks_exact_mut(n)) {
                 let (set, particle) = (row / particles, row % particles);
-                streams[set].fill_normal((particle * pairs) as u64, &mut normal);
+                streams[set].fill_normal((particle * n) as u64, &mut normal);
                 work(set, row, &normal, out);
             }
         });
