@@ -19,7 +19,7 @@ const VARIABLE: &str = "JACOFLOW_THREADS";
 pub const USEFUL: usize = 4;
 
 /// How many threads a computation may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Threads(Option<usize>);
 
 impl Threads {

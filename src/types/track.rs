@@ -1,7 +1,7 @@
 //! What a tracker says of its target, frame by frame.
 
 /// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that its centre is `(x + width / 2, y + height / 2)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TargetBox {
     /// Left side, px.
     pub x: f64,
@@ -34,7 +34,7 @@ impl TargetBox {
 }
 
 /// How well the target is in hand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, serde::Serialize, serde::Deserialize)]
 #[repr(u8)]
 pub enum TrackStatus {
     /// Seen and measured.
@@ -72,13 +72,15 @@ impl TrackStatus {
 }
 
 /// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is NaN or `None`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrackState {
     /// Which frame, counted from the one the tracker began with (0).
     pub frame: usize,
     /// How well the target is in hand.
     pub status: TrackStatus,
     /// Why the status is what it is, in a few words; empty where there is nothing to be said.
+    /// Not part of a serialised state: these are words of the program.
+    #[serde(skip)]
     pub reason: &'static str,
     /// Whether this is the first measurement after the target was lost or out of the picture.
     pub reacquired: bool,

@@ -41,7 +41,7 @@ impl BandGrid {
 }
 
 /// Reference histograms of a target over the bins that occur in them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Appearance {
     /// Number of bands, 8 unless the first box has fewer rows.
     pub bands: usize,

@@ -30,7 +30,7 @@ pub(super) fn stream(seed: u64, target: u64, frame: usize, purpose: Purpose) -> 
 }
 
 /// Particles and their weights, which sum to 1.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Cloud {
     pub particles: Vec<Particle>,
     pub weights: Vec<f64>,

@@ -24,7 +24,7 @@ const CUT_SHARE: f64 = 0.8;
 const CUT_TRACKS: usize = 12;
 
 /// A corner and its history.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Track {
     pub id: u64,
     /// Where it is, px.
@@ -52,7 +52,7 @@ impl Track {
 pub(super) struct Corners {
     /// In ascending order of their ids: the older ones first.
     pub tracks: Vec<Track>,
-    next_id: u64,
+    pub next_id: u64,
     selection: CornerOptions,
     flow: PointFlowOptions,
 }

@@ -17,7 +17,7 @@ const SEGMENT_AREA: f64 = 120.0;
 const MIN_PARTICLES: usize = 8;
 
 /// Which evidence weighs the particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum ParticleMode {
     /// Corner tracks on a target must move with it; hidden targets are recognised; particles ride on the background's affine motion.
     #[default]
@@ -40,7 +40,7 @@ impl ParticleMode {
 }
 
 /// How a corner's flow becomes a probability of not being background.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum ForegroundModel {
     /// 1 - N(f) / max N of the background's Gaussian.
     #[default]
@@ -69,7 +69,7 @@ impl ForegroundModel {
 }
 
 /// The factors of a particle's likelihood, each of which can be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Likelihoods {
     /// Histograms of hue and saturation in bands.
     pub colour: bool,
@@ -112,7 +112,7 @@ impl Likelihoods {
 }
 
 /// Options of [`ParticleTracker`](super::ParticleTracker).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleOptions {
     /// Which evidence weighs the particles; default: improved.
     pub mode: ParticleMode,

@@ -25,7 +25,7 @@ const HIDDEN_NOISE: (f64, f64) = (0.4, 0.04);
 const LOST_AFTER: usize = 30;
 
 /// What the tracker remembers of how a target is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Presence {
     /// Usual similarity; `None` before the first one.
     pub similarity: Option<f64>,

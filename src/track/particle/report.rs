@@ -8,6 +8,20 @@ use super::target::Target;
 use super::tracker::ParticleTracker;
 use crate::types::{TargetBox, TrackState, TrackStatus};
 
+// Reasons of a status.
+const LEFT: &str = "the centre has left the picture";
+const LOST: &str = "hidden for more than 30 frames";
+const NOTHING_SHOWN: &str = "the frame shows nothing";
+const CUT: &str = "the scene was cut";
+const HIDDEN_BY_TARGET: &str = "hidden by another target";
+const HIDDEN: &str = "hidden: few of its tracks, colours unlike";
+const COVERED: &str = "another target covers half of it";
+const UNLIKE: &str = "colours unlike those it usually has";
+const NO_WEIGHT: &str = "no particle had a weight: the estimate is the prediction";
+/// All of them, in an order that files keep.
+pub(super) const REASONS: [&str; 10] =
+    ["", LEFT, LOST, NOTHING_SHOWN, CUT, HIDDEN_BY_TARGET, HIDDEN, COVERED, UNLIKE, NO_WEIGHT];
+
 /// The step at the tracker's frame. `seen`: whether the frame cut the scene; `None` if nothing was looked for, as in the first frame.
 pub(super) fn report(
     tracker: &ParticleTracker,
@@ -67,22 +81,21 @@ fn status_of(
     let presence = &target.presence;
     let is_covered = seeing.is_some_and(|seeing| !seeing.near.is_empty() && seeing.is_covered);
     if target.is_out {
-        (TrackStatus::Out, "the centre has left the picture")
+        (TrackStatus::Out, LEFT)
     } else if presence.is_lost() {
-        (TrackStatus::Lost, "hidden for more than 30 frames")
+        (TrackStatus::Lost, LOST)
     } else if seen.is_none() && frame > 0 && !target.is_new {
-        (TrackStatus::Coasting, "the frame shows nothing")
+        (TrackStatus::Coasting, NOTHING_SHOWN)
     } else if seen == Some(true) {
-        (TrackStatus::Coasting, "the scene was cut")
+        (TrackStatus::Coasting, CUT)
     } else if presence.is_hidden() {
-        let reason = if is_covered { "hidden by another target" } else { "hidden: few of its tracks, colours unlike" };
-        (TrackStatus::Coasting, reason)
+        (TrackStatus::Coasting, if is_covered { HIDDEN_BY_TARGET } else { HIDDEN })
     } else if is_covered {
-        (TrackStatus::Occluded, "another target covers half of it")
+        (TrackStatus::Occluded, COVERED)
     } else if presence.is_low {
-        (TrackStatus::Occluded, "colours unlike those it usually has")
+        (TrackStatus::Occluded, UNLIKE)
     } else if target.degenerate {
-        (TrackStatus::Tracking, "no particle had a weight: the estimate is the prediction")
+        (TrackStatus::Tracking, NO_WEIGHT)
     } else {
         (TrackStatus::Tracking, "")
     }

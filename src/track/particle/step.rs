@@ -3,7 +3,7 @@
 use crate::types::TrackState;
 
 /// The targets at one frame, and what they were found from.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleStep {
     /// Index of the frame, 0 for the one that the tracker began with.
     pub frame: usize,
@@ -18,7 +18,7 @@ pub struct ParticleStep {
 }
 
 /// One target at one frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleTarget {
     /// The number it was added with.
     pub id: u64,
@@ -39,7 +39,7 @@ pub struct ParticleTarget {
 }
 
 /// A corner that was followed from the frame before.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CornerTrack {
     /// Its number.
     pub id: u64,

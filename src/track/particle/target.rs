@@ -22,7 +22,7 @@ const SIMILARITY_QUANTILE: f64 = 0.9;
 const QUICK_START: (usize, f64) = (3, 0.5);
 
 /// A target and everything that is remembered of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Target {
     pub id: u64,
     /// Width and height at the start, px.

@@ -18,6 +18,7 @@ use crate::math::random::CounterRng;
 use crate::segment::{Labels, felzenszwalb};
 use crate::types::{AnyColourFrame, Frame, TargetBox};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Smallest side of the pictures that are tracked in, px.
 const MIN_SIDE: usize = 8;
@@ -49,7 +50,7 @@ pub struct ParticleTracker {
     /// Colour bins of the last frame that showed something.
     pub(super) bins: Frame<u8>,
     /// The last frame, as it came.
-    pub(super) last: AnyColourFrame,
+    pub(super) last: Arc<AnyColourFrame>,
     pub(super) step: ParticleStep,
     pub(super) next_id: u64,
 }
@@ -94,12 +95,12 @@ impl ParticleTracker {
             corners,
             pyramid,
             bins: view.bins,
-            last: frame.clone(),
+            last: Arc::new(frame.clone()),
             step,
             next_id: 0,
         };
         for (id, bounds) in targets {
-            tracker.add(Some(*id), *bounds)?;
+            tracker.add(Some(*id), *bounds).map_err(|error| of_boxes(error, *id))?;
         }
         Ok(tracker)
     }
@@ -113,17 +114,17 @@ impl ParticleTracker {
     pub fn add(&mut self, id: Option<u64>, bounds: TargetBox) -> Result<u64> {
         let bounds = self.check_box(bounds)?;
         let id = id.unwrap_or(self.next_id);
-        if let Some(known) = self.targets.iter().position(|target| target.id == id) {
-            if !self.targets[known].is_out {
+        if let Some(known) = self.targets.iter().find(|target| target.id == id) {
+            if !known.is_out {
                 return Err(Error::argument("id", "a number that is not in use", id));
             }
-            self.targets.remove(known);
+            self.remove(id)?;
         }
         let target = Target::new(id, bounds, (&self.bins, self.frame), &self.options);
         let at = self.targets.partition_point(|other| other.id < id);
         self.targets.insert(at, target);
         self.next_id = self.next_id.max(id.saturating_add(1));
-        self.step = report(self, &CameraMotion::NONE, &[], None);
+        self.tell_new(at);
         Ok(id)
     }
 
@@ -141,10 +142,23 @@ impl ParticleTracker {
         let keep = |i: usize, k: usize| i / k != at && i % k != at;
         let count = self.targets.len() + 1;
         self.step.near = self.step.near.iter().enumerate().filter(|(i, _)| keep(*i, count)).map(|(_, n)| *n).collect();
-        for track in &mut self.corners.tracks {
-            track.owner = track.owner.filter(|owner| *owner != id);
+        let tracks = self.corners.tracks.iter_mut().map(|track| &mut track.owner);
+        for owner in tracks.chain(self.step.tracks.iter_mut().map(|track| &mut track.owner)) {
+            *owner = owner.filter(|owner| *owner != id);
         }
         Ok(())
+    }
+
+    /// Adds a new target, near nothing, to the step of the last frame.
+    fn tell_new(&mut self, at: usize) {
+        let new = report(self, &CameraMotion::NONE, &[], None).targets.swap_remove(at);
+        let (before, count) = (self.step.targets.len(), self.targets.len());
+        let place = |k: usize| k - usize::from(k > at);
+        let near = |own: usize, other: usize| {
+            own != at && other != at && self.step.near[place(own) * before + place(other)]
+        };
+        self.step.near = (0..count * count).map(|k| near(k / count, k % count)).collect();
+        self.step.targets.insert(at, new);
     }
 
     /// The targets in the next frame.
@@ -271,7 +285,7 @@ impl ParticleTracker {
         self.corners.top_up(&view.grey)?;
         self.pyramid = pyramid;
         self.bins = view.bins;
-        self.last = frame.clone();
+        self.last = Arc::new(frame.clone());
         Ok(())
     }
 
@@ -345,5 +359,15 @@ impl ParticleTracker {
             })
             .collect();
         assign(&mut self.corners.tracks, &labelled, self.scale);
+    }
+}
+
+/// The error of one of the boxes given at the beginning.
+fn of_boxes(error: Error, id: u64) -> Error {
+    match error {
+        Error::Argument { argument: "box", expected, got } => {
+            Error::Argument { argument: "boxes", expected, got: format!("{got} for target {id}") }
+        }
+        other => other,
     }
 }
