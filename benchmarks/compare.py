@@ -4,7 +4,7 @@
 
 Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. Times are CPU time of the busiest thread, best
 of several rounds taken in turns. `--data` (or the environment variable JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables
-are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking motion3d` chooses among the sections; its table is then printed and not kept,
+are left out. `--only flow memory filter accuracy controlled coverage tracking mixture stereo stereo_tracking particle_tracking motion3d` chooses among the sections; its table is then printed and not kept,
 unless `--out` names a folder: the newest table there is written anew with those sections, and the others as they were. A section tells its machine where that is another than the head's.
 """
 
@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 Rows = list[dict[str, object]]
-SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo", "stereo_tracking", "motion3d")
+SECTIONS = ("flow", "memory", "filter", "controlled", "coverage", "accuracy", "tracking", "mixture", "stereo", "stereo_tracking", "particle_tracking", "motion3d")
 
 
 def main() -> None:
@@ -162,6 +162,10 @@ def run(name: str, quick: bool, data: Path | None) -> dict[str, Rows]:
         import stereo_tracking
 
         return stereo_tracking.sections(quick)
+    if name == "particle_tracking":
+        import particle_tracking
+
+        return particle_tracking.sections(data, recordings=(10,), runs=1) if quick else particle_tracking.sections(data)
     if name == "motion3d":
         import motion3d
 

@@ -113,12 +113,12 @@ def rivals() -> Iterator[Tracker]:
     cv2.setNumThreads(1)
     for times in (1, TIMES_LARGER):
         for name in RIVALS if times == 1 else ENLARGED:
-            create = _creator(name)
+            create = creator(name)
             if create is not None:
                 yield Tracker(f"OpenCV {name}" + (f" {times}x" if times > 1 else ""), _runner(create, times))
 
 
-def _creator(name: str) -> Callable[[], Any] | None:
+def creator(name: str) -> Callable[[], Any] | None:
     """What makes the tracker: in the main name space, or among the older ones; None where this OpenCV has neither."""
     for place in (cv2, getattr(cv2, "legacy", None)):
         create = getattr(place, f"Tracker{name}_create", None)
@@ -147,7 +147,7 @@ def _run_rival(create: Callable[[], Any], times: int, frames: Frames, box: Box) 
             boxes.extend([box] * (len(pictures) - 1))
             return
         for picture in pictures[1:]:
-            boxes.append(_next_box(tracker, picture, times) or boxes[-1])
+            boxes.append(next_box(tracker, picture, times) or boxes[-1])
 
     time = timing.once(work)
     track = np.array(boxes, float)
@@ -155,7 +155,7 @@ def _run_rival(create: Callable[[], Any], times: int, frames: Frames, box: Box) 
     return Track(track, np.diff(centres, axis=0, prepend=np.nan), milliseconds=1000 * time.busiest / (len(frames) - 1))
 
 
-def _next_box(tracker: Any, picture: Frames, times: int) -> Box | None:
+def next_box(tracker: Any, picture: Frames, times: int) -> Box | None:
     """The box in the next picture."""
     try:
         found, box = tracker.update(picture)
