@@ -91,11 +91,11 @@ def ours(particles: int, seed: int, threads: int | None = None) -> ParticleFilte
     return made
 
 
-def worst_step(filter_: ParticleFilter | NumpyFilter, scheme: str, seed: int) -> tuple[float, float, float, float]:
-    """Largest error of the mean in sd/sqrt(ESS), of variances (relative) and of the log evidence; error of the summed log evidence."""
+def worst_step(filter_: ParticleFilter | NumpyFilter, scheme: str, seed: int) -> tuple[float, ...]:
+    """Largest error of the mean in sd/sqrt(ESS), of variances (relative) and of the log evidence; error of its sum; N / smallest ESS."""
     kalman = KalmanFilter(2, 1)
     kalman.F, kalman.H, kalman.P, kalman.Q, kalman.R = F, np.array([[1.0, 0.0]]), P0, Q, R
-    steps, total = [], 0.0
+    steps, total, fewest = [], 0.0, np.inf
     for z in measurements(seed):
         kalman.predict()
         kalman.update(z)
@@ -106,20 +106,21 @@ def worst_step(filter_: ParticleFilter | NumpyFilter, scheme: str, seed: int) ->
         evidence = float(filter_.log_evidence - kalman.log_likelihood)
         steps.append(((np.abs(filter_.mean - kalman.x) / unit).max(), variance, abs(evidence)))
         total += evidence
+        fewest = min(fewest, float(filter_.effective_sample_size))
         filter_.resample(scheme)
     mean, variance, evidence = np.max(steps, axis=0)
-    return float(mean), float(variance), float(evidence), abs(total)
+    return float(mean), float(variance), float(evidence), abs(total), len(filter_.x) / fewest
 
 
 def accuracy(particles: int, seeds: int) -> None:
     """Prints the comparison with the Kalman filter: median and largest of the seeds' worst steps."""
     print(f"Worst of {STEPS} steps against the Kalman filter, N = {particles}: median of {seeds} seeds (largest). Bars: {BARS}\n")
-    print("| filter | mean, sd/sqrt(ESS) | variances, % | log evidence of a step | of all steps together |\n|---|---|---|---|---|")
+    print("| filter | mean, sd/sqrt(ESS) | variances, % | log evidence of a step | of all steps together | N / smallest ESS |\n|---|---|---|---|---|---|")
     for scheme in (*SCHEMES, "NumPy, systematic"):
         begin = NumpyFilter if scheme.startswith("NumPy") else ours
-        rows = np.array([worst_step(begin(particles, seed), scheme, seed) for seed in range(seeds)]) * [1, 100, 1, 1]
+        rows = np.array([worst_step(begin(particles, seed), scheme, seed) for seed in range(seeds)]) * [1, 100, 1, 1, 1]
         middle, largest = np.median(rows, axis=0), rows.max(axis=0)
-        cells = [f"{m:.{d}f} ({most:.{d}f})" for m, most, d in zip(middle, largest, (1, 1, 3, 3), strict=True)]
+        cells = [f"{m:.{d}f} ({most:.{d}f})" for m, most, d in zip(middle, largest, (1, 1, 3, 3, 1), strict=True)]
         print(f"| {scheme} | {' | '.join(cells)} |")
 
 
