@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
-# Wherever clippy, rustdoc and cargo test look at the binding they look at it with the same features, so that crates are built once.
-ALL := --features python
+# One profile for all that the check builds: crates that it depends on are built once.
+CI := --profile ci
+# Rust's tests also look for overflow and failed assertions.
+CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
 .PHONY: test demo format clippy rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare clean
 
@@ -13,20 +15,21 @@ test: format clippy rustdoc rust-test guide pytest stubtest typing examples
 
 # The main job on an embedded example.
 demo:
-	cargo run --release -- demo
+	cargo run $(CI) -- demo
 
 format:
 	cargo fmt --check
 
+# Everything with the binding; without it, what is not the same anyway.
 clippy:
-	cargo clippy -q --all-targets -- -D warnings
-	cargo clippy -q --all-targets $(ALL) -- -D warnings
+	cargo clippy -q $(CI) --all-targets --features python -- -D warnings
+	cargo clippy -q $(CI) --lib --bins -- -D warnings
 
 rustdoc:
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps
 
 rust-test:
-	cargo test
+	cargo test $(CI) $(CHECKED)
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
@@ -38,9 +41,9 @@ $(BIN)/maturin:
 
 wheel: $(BIN)/maturin
 	rm -rf $(WHEELS)
-	$(BIN)/maturin build -q --release --out $(WHEELS) -i $(BIN)/python
+	$(BIN)/maturin build -q $(CI) --out $(WHEELS) -i $(BIN)/python
 
-# The wheel as a user would get it, with what the tests need beside it.
+# The wheel, with what the tests need beside it.
 install: wheel
 	$(BIN)/python -m pip install -q --force-reinstall --no-deps $(WHEELS)/jacoflow-*.whl
 	$(BIN)/python -m pip install -q "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
@@ -61,7 +64,8 @@ examples: install
 develop: $(BIN)/maturin
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --extras test
 
-# Ours and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
+# Ours, as a user would get it, and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
+compare: CI := --release
 compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 	$(BIN)/python benchmarks/compare.py $(if $(DATA),--data $(DATA))
