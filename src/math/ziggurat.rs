@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 /// Layers of equal area under `exp(-x^2 / 2)`, the lowest with the tail.
 const LAYERS: usize = 256;
 /// Where the tail begins, for 256 layers (Marsaglia and Tsang 2000).
-const TAIL: f64 = 3.6541528853610088;
+const TAIL: f64 = 3.654_152_885_361_009;
 /// Area of a layer, for 256 layers (Marsaglia and Tsang 2000).
 const AREA: f64 = 0.00492867323399;
 
@@ -44,7 +44,7 @@ impl CounterRng {
     /// The number at `index` whose first attempt `bits` lies outside its layer's rectangle; other attempts
     /// come from a stream of their own.
     #[cold]
-    fn outside(&self, edges: &[f64; LAYERS + 1], index: u64, mut bits: u64) -> f64 {
+    fn outside(self, edges: &[f64; LAYERS + 1], index: u64, mut bits: u64) -> f64 {
         let rng = self.stream(index);
         let mut next = 0;
         let mut draw = || {

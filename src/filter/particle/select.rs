@@ -42,7 +42,9 @@ impl ParticleFilter {
             if indices.len() != count {
                 return Err(Error::argument("log_weights", "a weight above zero in every set", "none"));
             }
-            indices.iter().for_each(|&i| x.extend_from_slice(&particles[i * n..(i + 1) * n]));
+            for &i in &indices {
+                x.extend_from_slice(&particles[i * n..(i + 1) * n]);
+            }
             log_weights.resize(log_weights.len() + count, -(count as f64).ln());
         }
         (self.x, self.log_weights) = (x, log_weights);

@@ -113,7 +113,13 @@ fn an_impossible_measurement_is_refused_in_its_set_alone() {
     assert_eq!(filter.log_evidence_sum[..2], before.log_evidence_sum[..2]);
     assert!(filter.log_weights[100] == f64::NEG_INFINITY && filter.log_evidence[2].is_finite());
     let again = filter.clone();
-    let message = filter.update(|_, out| Ok(out.fill(f64::INFINITY))).unwrap_err().to_string();
+    let message = filter
+        .update(|_, out| {
+            out.fill(f64::INFINITY);
+            Ok(())
+        })
+        .unwrap_err()
+        .to_string();
     assert_eq!(message, "log_likelihood: expected a function with results below infinity, got inf");
     assert_eq!(filter, again);
 }
@@ -159,7 +165,15 @@ fn own_noise_and_built_in_noise_are_the_same_numbers() {
         .unwrap();
     assert_eq!(one.x, other.x);
     let mut third = start(2, 100, 3);
-    third.predict(|x, next| Ok(next.copy_from_slice(x)), Some(&Q)).unwrap();
+    third
+        .predict(
+            |x, next| {
+                next.copy_from_slice(x);
+                Ok(())
+            },
+            Some(&Q),
+        )
+        .unwrap();
     assert!(third.x.chunks_exact(2).zip(one.x.chunks_exact(2)).all(|(a, b)| (a[1] - b[1]).abs() < 1e-14));
     assert_ne!(one.standard_normal().unwrap(), normal);
 }
@@ -196,7 +210,16 @@ fn wrong_arguments_are_named_and_change_nothing() {
         (filter.predict_linear(&[nan; 4], &Q), "F: expected a matrix of finite"),
         (filter.predict_linear(&F, &[1.0, 2.0, 2.0, 1.0]), "Q: expected a symmetric positive"),
         (filter.predict_linear(&[1e308; 4], &Q), "numerical failure: x of set 0"),
-        (filter.predict(|_, next| Ok(next.fill(nan)), None), "transition: expected a function with finite"),
+        (
+            filter.predict(
+                |_, next| {
+                    next.fill(nan);
+                    Ok(())
+                },
+                None,
+            ),
+            "transition: expected a function with finite",
+        ),
         (filter.sample_gaussian(&[nan; 2], &P0), "mean: expected finite"),
         (filter.sample_gaussian(&[0.0; 3], &P0), "mean: expected 2 values"),
         (filter.sample_gaussian(&[0.0; 2], &[-1.0, 0.0, 0.0, 1.0]), "covariance: expected a symmetric"),

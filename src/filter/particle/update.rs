@@ -26,16 +26,13 @@ impl ParticleFilter {
         let sets = posterior.chunks_exact_mut(count).zip(self.log_weights.chunks_exact_mut(count));
         for (set, (posterior, prior)) in sets.enumerate() {
             posterior.iter_mut().zip(&*prior).for_each(|(posterior, prior)| *posterior += prior);
-            match normalise_log_weights(posterior) {
-                Some(evidence) => {
-                    prior.copy_from_slice(posterior);
-                    self.log_evidence[set] = evidence;
-                    self.log_evidence_sum[set] += evidence;
-                }
-                None => {
-                    self.log_evidence[set] = f64::NEG_INFINITY;
-                    self.degenerate[set] += 1;
-                }
+            if let Some(evidence) = normalise_log_weights(posterior) {
+                prior.copy_from_slice(posterior);
+                self.log_evidence[set] = evidence;
+                self.log_evidence_sum[set] += evidence;
+            } else {
+                self.log_evidence[set] = f64::NEG_INFINITY;
+                self.degenerate[set] += 1;
             }
         }
         Ok(())

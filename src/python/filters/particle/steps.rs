@@ -65,19 +65,17 @@ impl ParticleFilter {
         self.give(py, &mut core)?;
         let (n, callbacks, work) = (self.dim_x, Callbacks::default(), &mut *core);
         let shape = lead(self.batch, &[work.particles(), n]);
-        let result = py.detach(|| match &transition {
-            Some(function) => work.predict(
-                |x, next| {
+        let result = py.detach(|| {
+            if let Some(function) = &transition {
+                let step = |x: &[f64], next: &mut [f64]| {
                     callbacks.call("transition", &[(&shape, x)], &shape, next, |py, inputs| {
                         function.bind(py).call1((&inputs[0],))
                     })
-                },
-                q.as_deref(),
-            ),
-            None => {
-                let identity = || (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect();
-                work.predict_linear(&f.unwrap_or_else(identity), &q.unwrap_or_else(|| vec![0.0; n * n]))
+                };
+                return work.predict(step, q.as_deref());
             }
+            let identity = || (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect();
+            work.predict_linear(&f.unwrap_or_else(identity), &q.unwrap_or_else(|| vec![0.0; n * n]))
         });
         callbacks.finish(result)?;
         self.take(py, &mut core)
