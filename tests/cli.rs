@@ -12,6 +12,8 @@ mod commands;
 mod egomotion;
 #[path = "cli/mistakes.rs"]
 mod mistakes;
+#[path = "cli/particle.rs"]
+mod particle;
 #[path = "cli/recordings.rs"]
 mod recordings;
 #[path = "cli/stereo.rs"]

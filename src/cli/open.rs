@@ -4,17 +4,19 @@ use super::arguments::{ComputeArguments, InputArguments, Precision};
 use crate::error::{Error, Result};
 use crate::flow::{Estimator, Method};
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
-use crate::io::{Colour, FilesSource, FrameSource, OpenOptions, Selected, open, read_image};
+use crate::io::{
+    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_image,
+};
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
 use crate::simd::Level;
-use crate::types::{AnyFrame, Frame, Mask};
+use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask};
 use std::path::{Path, PathBuf};
 
 /// A source that is ready, with its first frame looked at.
-pub struct Opened {
+pub struct Opened<F = AnyFrame> {
     /// The frames.
-    pub source: Box<dyn FrameSource>,
+    pub source: Box<dyn FrameSource<F>>,
     /// What the first frame tells.
     pub first: FirstFrame,
     /// Number of frames, where it is known.
@@ -27,7 +29,20 @@ pub struct Opened {
 
 /// Opens the input and looks at its first frame.
 pub fn open_input(arguments: &InputArguments) -> Result<Opened> {
-    let source = open_source(&arguments.input, &arguments.selection.options())?;
+    looked_at(open_source(&arguments.input, &arguments.selection.options())?, arguments)
+}
+
+/// As [`open_input`], of colour frames.
+pub fn open_colour_input(arguments: &InputArguments) -> Result<Opened<AnyColourFrame>> {
+    let options = arguments.selection.options();
+    let source = match &arguments.input[..] {
+        [one] => open_colour(one, &options)?,
+        many => open_files(many, options.grey, &options)?,
+    };
+    looked_at(source, arguments)
+}
+
+fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputArguments) -> Result<Opened<F>> {
     let frames = source.len_hint();
     let name = source.describe();
     let numbering = arguments.selection.numbering(arguments.fps, source.frame_rate());
@@ -40,14 +55,21 @@ pub fn open_input(arguments: &InputArguments) -> Result<Opened> {
 pub fn open_source(input: &[String], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     match input {
         [one] => open(one, options),
-        many => {
-            if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
-                return Err(Error::argument("input", "image files only, when several inputs are given", folder));
-            }
-            let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), options.colour)?;
-            Ok(Box::new(Selected::new(files, options)?))
-        }
+        many => open_files(many, options.colour, options),
     }
+}
+
+/// Several image files in the order given.
+fn open_files<P: ChannelPolicy>(
+    many: &[String],
+    policy: P,
+    options: &OpenOptions,
+) -> Result<Box<dyn FrameSource<P::Frame>>> {
+    if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
+        return Err(Error::argument("input", "image files only, when several inputs are given", folder));
+    }
+    let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?;
+    Ok(Box::new(Selected::new(files, options)?))
 }
 
 /// Quantiser and smoother, which heeds the mask.

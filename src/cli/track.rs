@@ -2,25 +2,29 @@
 
 mod gradient;
 mod output;
+mod particle;
+mod report;
 mod stereo;
 
 use super::arguments::{
-    InputArguments, StereoTrackerArguments, TargetArguments, TellArguments, ThreadArguments, TrackerArguments,
+    InputArguments, ParticleTrackerArguments, StereoTrackerArguments, TargetArguments, TellArguments, ThreadArguments,
+    TrackerArguments,
 };
 use super::interrupt::Watch;
 use super::report::Report;
 use crate::error::{Error, Result};
 use clap::Args;
 use output::TrackOutputArguments;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Options of `track`.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(
-    after_help = "gradient follows given targets in one view, stereo everything that moves before two cameras (two inputs, or one with --layout).\n\n\
+    after_help = "gradient follows given targets in one view, particle given targets that may look alike, cross and hide each other in colour frames, stereo everything that moves before two cameras (two inputs, or one with --layout).\n\n\
     gradient: csv has one row a target and frame: status, position, velocity, acceleration, box, scale, rotation, visibility, ..., and the covariance; mot is\n\
     the MOT challenge's frame,id,x,y,w,h,conf,-1,-1,-1, counted from 1. Targets are followed independently of each other.\n\
+    particle: csv has, beside these, effective sample size, similarity of colours and number of tracks; mot has confidence 0 while a target is hidden.\n\
     stereo: csv has one row a cluster and step (track, group, x, y, disparity, motion, covariance, ...), json the graph of all clusters. Brightness is\n\
     taken on the scale 0 to 255: 16-bit samples are divided by 257, floats multiplied by 255 unless at least half of what is not dark\n\
     (above 0.1) exceeds 1.5.\n\
@@ -30,6 +34,8 @@ use std::path::Path;
     jacoflow track film.y4m > track.csv\n  \
     jacoflow track frames/ --box 120,80,24,30 --box 40,60,12,12 -o out/ --format csv,mot\n  \
     jacoflow track film.mp4 --luminance --point 64,48 -o track.csv --overlay pictures/\n  \
+    jacoflow track frames/ --method particle --box 40,60,24,66 --box 90,58,26,70 --mot out.txt --csv out.csv --overlay out.y4m\n  \
+    jacoflow track frames/ --method particle --boxes first.csv --mot out.txt --foreground maps/\n  \
     jacoflow track left/ right/ --method stereo -o out/ --format csv,json --overlay pictures/ --graph graph.png\n  \
     jacoflow track film.mp4 --luminance --layout side-by-side --method stereo --cameras 800,0.12 -o clusters.csv"
 )]
@@ -40,6 +46,8 @@ pub struct TrackCommand {
     pub targets: TargetArguments,
     #[command(flatten)]
     pub tracker: TrackerArguments,
+    #[command(flatten)]
+    pub particle: ParticleTrackerArguments,
     #[command(flatten)]
     pub stereo: StereoTrackerArguments,
     #[command(flatten)]
@@ -63,17 +71,23 @@ impl TrackCommand {
         }
         match self.tracker.method()? {
             "stereo" => self.follow_everything(watch),
+            "particle" => self.follow_by_particles(watch),
             _ => self.follow_targets(watch),
         }
     }
 
     /// Refuses to replace what is read: not even `--force` is meant for that.
     fn refuse_the_input_as_output(&self) -> Result<()> {
-        let inputs: Vec<_> = self.input.input.iter().filter_map(|input| Path::new(input).canonicalize().ok()).collect();
+        let boxes = self.particle.box_file.iter().map(PathBuf::as_path);
+        let given = self.input.input.iter().map(Path::new).chain(boxes);
+        let inputs: Vec<_> = given.filter_map(|input| input.canonicalize().ok()).collect();
         let outputs = [
             ("overlay", &self.output.overlay),
             ("disparity-overlay", &self.stereo.disparity_overlay),
             ("graph", &self.stereo.graph),
+            ("foreground", &self.particle.foreground),
+            ("mot", &self.particle.mot),
+            ("csv", &self.particle.csv),
             ("output", &self.output.output),
         ];
         for (option, path) in outputs {

@@ -36,9 +36,6 @@ pub struct StereoTrackerArguments {
     /// How far templates and depths are searched, cells and disparities [default: 8]
     #[arg(long, value_name = "CELLS")]
     pub search: Option<usize>,
-    /// Seed of the mixture [default: 0]
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
     /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and velocities in space
     #[arg(long, value_name = "FOCAL,BASELINE[,INFINITY]", allow_hyphen_values = true, value_parser = parse_cameras)]
     pub cameras: Option<StereoCamera>,
@@ -63,7 +60,6 @@ impl StereoTrackerArguments {
             self.tol.map(|_| "tol"),
             self.grid.map(|_| "grid"),
             self.search.map(|_| "search"),
-            self.seed.map(|_| "seed"),
             self.cameras.map(|_| "cameras"),
             self.times.as_ref().map(|_| "times"),
             self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
@@ -72,11 +68,11 @@ impl StereoTrackerArguments {
         self.layout.given().or(self.matches.given()).or(own.into_iter().find_map(|given| given))
     }
 
-    /// The options of the stereo tracker; layers of disparity as wide as the range.
+    /// The options of the stereo tracker; layers of disparity as wide as the range. `seed` of the mixture.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
-    pub fn options(&self, mode: StereoMode, threads: Threads) -> Result<StereoTrackerOptions> {
+    pub fn options(&self, mode: StereoMode, seed: Option<u64>, threads: Threads) -> Result<StereoTrackerOptions> {
         let mut options = StereoTrackerOptions::new(mode);
         if let Some((least, greatest)) = self.matches.disparities {
             options = options.with_disparities([least, greatest]);
@@ -101,7 +97,7 @@ impl StereoTrackerArguments {
             options.grid.layers = layers.unwrap_or(options.grid.layers);
         }
         options.search = self.search.unwrap_or(options.search);
-        options.seed = self.seed.unwrap_or(options.seed);
+        options.seed = seed.unwrap_or(options.seed);
         options.camera = self.cameras;
         options.threads = threads;
         options.check()?;

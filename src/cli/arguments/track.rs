@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::track::METHODS;
 use crate::track::gradient::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
+use crate::track::particle::ParticleMode;
 use crate::track::stereo::StereoMode;
 use crate::types::TargetBox;
 use clap::{Args, ValueEnum};
@@ -37,12 +38,16 @@ impl TargetArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct TrackerArguments {
-    /// Tracker: gradient (given targets in one view) or stereo (everything that moves before two cameras)
+    /// Tracker: gradient (given targets in one view), particle (given targets that may look alike and cross, in colour) or stereo (everything that moves
+    /// before two cameras)
     #[arg(long, value_name = "NAME", default_value = "gradient")]
     pub method: String,
-    /// Which system follows the targets [default: layered, stereo improved]
+    /// Which system follows the targets [default: layered, stereo and particle improved]
     #[arg(long, value_enum, value_name = "NAME")]
     pub mode: Option<ModeWord>,
+    /// Seed of the random numbers (stereo, particle) [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
     /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,
@@ -73,7 +78,7 @@ pub enum ModeWord {
     Layered,
     /// Local flow in a moving window, with the repairs that it needs; the fastest
     Local,
-    /// Stereo: motion to fractions of a pixel carries the clusters along
+    /// Stereo: motion to fractions of a pixel carries the clusters along; particle: corner tracks must move with their target
     Improved,
     /// The paper's text to the letter, for comparison
     Paper,
@@ -194,6 +199,20 @@ impl TrackerArguments {
             Some(ModeWord::Paper) => Ok(StereoMode::Paper),
             Some(ModeWord::Layered | ModeWord::Local) => {
                 Err(Error::argument("mode", "improved or paper for stereo", "a mode of gradient"))
+            }
+        }
+    }
+
+    /// The mode of the particle tracker.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `mode`.
+    pub fn particle_mode(&self) -> Result<ParticleMode> {
+        match self.mode {
+            None | Some(ModeWord::Improved) => Ok(ParticleMode::Improved),
+            Some(ModeWord::Paper) => Ok(ParticleMode::Paper),
+            Some(ModeWord::Layered | ModeWord::Local) => {
+                Err(Error::argument("mode", "improved or paper for particle", "a mode of gradient"))
             }
         }
     }

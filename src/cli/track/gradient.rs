@@ -1,27 +1,27 @@
 //! Targets followed by the gradient tracker.
 
 use super::TrackCommand;
-use super::output::{TrackOutputArguments, Wanted, files_in_words};
+use super::output::{TrackOutputArguments, Wanted};
 use crate::cli::interrupt::Watch;
 use crate::cli::open::{Opened, open_input, preprocess};
 use crate::cli::progress::Bar;
-use crate::cli::report::{Report, tell};
+use crate::cli::report::Report;
 use crate::error::{Error, Result};
 use crate::image::picture::TrackOverlay;
 use crate::parallel::Threads;
-use crate::pipeline::{
-    Begun, Overlays, TargetSummary, TrackFormat, TrackRows, TrackRun, TrackSink, TrackSummary, is_folder,
-};
+use crate::pipeline::{Begun, Overlays, TrackFormat, TrackRows, TrackRun, TrackSink};
 use crate::track::gradient::{GradientOptions, Start};
 use crate::track::{GradientTracker, Tracker};
-use crate::types::{Frame, TrackStatus};
+use crate::types::Frame;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 impl TrackCommand {
     /// Runs the command with the gradient tracker.
     pub(super) fn follow_targets(&self, watch: &Watch) -> Result<Report> {
         self.refuse(self.stereo.given(), "stereo")?;
+        self.refuse(self.particle.given(), "particle")?;
+        self.refuse(self.tracker.seed.map(|_| "seed"), "stereo or particle")?;
         let options = self.tracker.gradient()?;
         let threads = Threads::new(self.threads.threads)?;
         let wanted = self.output.wanted(self.tell.json, self.output.overlay.is_some())?;
@@ -71,28 +71,6 @@ impl TrackCommand {
             "method": self.tracker.method, "mode": options.mode.name(),
         })
     }
-
-    fn report(&self, summary: &TrackSummary, failure: Option<Error>, details: Value) -> Report {
-        let interrupted = matches!(failure, Some(Error::Interrupted));
-        let output = self.output.place(summary.latest.as_ref());
-        // Pictures are the first of the sinks. A film that was stopped has another name, too, or was not begun.
-        let overlay = match &self.output.overlay {
-            Some(film) if !is_folder(film) => summary.latest_of_sinks.first().and_then(Option::as_ref),
-            folder => folder.as_ref(),
-        };
-        if !self.tell.quiet && (failure.is_none() || interrupted) {
-            let place = output.or(overlay);
-            tell(&in_words(summary, place.map(PathBuf::as_path)));
-        }
-        let mut object = json!({
-            "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,
-            "seconds": summary.seconds, "output": output, "overlay": overlay, "interrupted": interrupted,
-        });
-        if let (Some(object), Value::Object(details)) = (object.as_object_mut(), details) {
-            object.extend(details);
-        }
-        Report { summary: object, failure }
-    }
 }
 
 /// A tracker for each target.
@@ -113,33 +91,4 @@ fn in_our_words(error: Error, target: usize) -> Error {
         Error::Argument { argument: "center", expected, got } => named("point", expected, got),
         other => other,
     }
-}
-
-/// The targets for the summary: how often each status was, and the last state.
-fn targets(summary: &TrackSummary) -> Value {
-    let one = |(index, target): (usize, &TargetSummary)| {
-        let counts: serde_json::Map<String, Value> = TrackStatus::ALL
-            .into_iter()
-            .map(|status| (status.name().to_string(), json!(target.counts[status as usize])))
-            .collect();
-        let (last, bounds) = (&target.last, target.last.bounds);
-        json!({
-            "target": index + 1, "frames": counts, "status": last.status.name(), "reason": last.reason,
-            "position": last.position, "velocity": last.velocity, "visibility": last.visibility,
-            "box": [bounds.x, bounds.y, bounds.width, bounds.height],
-        })
-    };
-    summary.targets.iter().enumerate().map(one).collect()
-}
-
-fn in_words(summary: &TrackSummary, output: Option<&Path>) -> String {
-    let mut parts = vec![format!("{} frames", summary.frames)];
-    for (index, target) in summary.targets.iter().enumerate() {
-        let measured = target.counts[TrackStatus::Tracking as usize] + target.counts[TrackStatus::Occluded as usize];
-        let share = 100.0 * measured as f64 / summary.frames.max(1) as f64;
-        parts.push(format!("target {}: seen in {share:.1} %, at last {}", index + 1, target.last.status.name()));
-    }
-    parts.push(format!("{:.2} s", summary.seconds));
-    parts.extend(files_in_words(summary.files, output));
-    parts.join(", ")
 }

@@ -15,7 +15,7 @@ pub struct TrackOutputArguments {
     /// A folder (for tracks.csv, ...), a file by the extension of its format, or - for standard output [default: -, but none with --json or pictures]
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
-    /// Formats. gradient: csv (everything), mot (boxes, .txt); stereo: csv (a row a cluster), json (the graph) [default: by the file's name, else csv]
+    /// Formats. gradient, particle: csv (everything), mot (boxes, .txt); stereo: csv (a row a cluster), json (the graph) [default: by the file's name, else csv]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub format: Vec<String>,
     /// Draw the targets, or clusters, over every frame: a folder for track_000000.png, ..., or a film by the name *.y4m

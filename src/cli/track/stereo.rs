@@ -22,11 +22,12 @@ impl TrackCommand {
     /// Runs the command with the stereo tracker.
     pub(super) fn follow_everything(&self, watch: &Watch) -> Result<Report> {
         self.refuse(self.targets.given().or(self.tracker.given()), "gradient")?;
+        self.refuse(self.particle.given(), "particle")?;
         if let Some(limit) = self.input.selection.limit.filter(|limit| *limit < 2) {
             return Err(Error::argument("limit", "at least 2 pairs of views to track through", limit));
         }
         let threads = Threads::new(self.threads.threads)?;
-        let options = self.stereo.options(self.tracker.stereo_mode()?, threads)?;
+        let options = self.stereo.options(self.tracker.stereo_mode()?, self.tracker.seed, threads)?;
         let pictures = self.pictures(&options);
         let drawn = !pictures.is_empty() || self.stereo.graph.is_some();
         let wanted = self.output.wanted(self.tell.json, drawn)?;

@@ -1,0 +1,160 @@
+//! What the particle tracker follows, how, and what it writes.
+
+use crate::error::{Error, Result};
+use crate::io::read_mot;
+use crate::parallel::Threads;
+use crate::pipeline::{Numbering, TargetStart};
+use crate::track::particle::{ParticleMode, ParticleOptions};
+use crate::types::TargetBox;
+use clap::Args;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Options of the particle tracker. Those that are not given keep the tracker's own default.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "With --method particle")]
+pub struct ParticleTrackerArguments {
+    /// Where targets start: lines of the MOT challenge, frame,id,left,top,width,height,... counted from 1;
+    /// each id starts at its first line
+    #[arg(long = "boxes", value_name = "FILE")]
+    pub box_file: Option<PathBuf>,
+    /// Particles of a target; twice as many while another target is near [default: 1000]
+    #[arg(long, value_name = "N")]
+    pub particles: Option<usize>,
+    /// Write boxes in the form of the MOT challenge: a .txt file, or any other name
+    #[arg(long, value_name = "FILE")]
+    pub mot: Option<PathBuf>,
+    /// Write everything as a table: a .csv file, or any other name
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Draw the foreground map of every frame, white where it is not background: a folder for
+    /// foreground_000000.png, ..., or a film *.y4m
+    #[arg(long, value_name = "FOLDER|FILM")]
+    pub foreground: Option<PathBuf>,
+}
+
+impl ParticleTrackerArguments {
+    /// Whether any was given.
+    pub fn given(&self) -> Option<&'static str> {
+        [
+            self.box_file.as_ref().map(|_| "boxes"),
+            self.particles.map(|_| "particles"),
+            self.mot.as_ref().map(|_| "mot"),
+            self.csv.as_ref().map(|_| "csv"),
+            self.foreground.as_ref().map(|_| "foreground"),
+        ]
+        .into_iter()
+        .find_map(|given| given)
+    }
+
+    /// The options of the particle tracker.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the option.
+    pub fn options(&self, mode: ParticleMode, seed: Option<u64>, threads: Threads) -> Result<ParticleOptions> {
+        let mut options = ParticleOptions { mode, threads, ..ParticleOptions::default() };
+        if let Some(particles) = self.particles {
+            options.n_particles = particles;
+            options.n_near = particles.saturating_mul(2);
+        }
+        options.seed = seed.unwrap_or(options.seed);
+        options.check().map_err(|error| match error {
+            Error::Argument { argument: "n_particles" | "n_near", expected, got } => {
+                Error::Argument { argument: "particles", expected, got }
+            }
+            other => other,
+        })?;
+        Ok(options)
+    }
+
+    /// Where targets start: `given` boxes in the first frame, numbered from 1, or those of the file.
+    /// `frames`: how many come, if that is known.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `box` without any, `boxes` for both, or a file none of whose targets starts
+    /// in a frame that is read; those of [`read_mot`].
+    pub fn starts(&self, given: &[TargetBox], numbering: Numbering, frames: Option<usize>) -> Result<Vec<TargetStart>> {
+        match (&self.box_file, given) {
+            (None, []) => Err(Error::argument("box", "a --box for each target, or --boxes FILE", "none")),
+            (None, given) => {
+                let start =
+                    |(id, bounds): (u64, &TargetBox)| TargetStart { frame: numbering.first, id, bounds: *bounds };
+                Ok((1..).zip(given).map(start).collect())
+            }
+            (Some(path), []) => starts_in(path, numbering, frames),
+            (Some(path), _) => {
+                let got = format!("{} beside --box", path.display());
+                Err(Error::argument("boxes", "either --box or --boxes, since both number the targets", got))
+            }
+        }
+    }
+}
+
+/// Every target of a file at its first line in a frame that is read.
+fn starts_in(path: &Path, numbering: Numbering, frames: Option<usize>) -> Result<Vec<TargetStart>> {
+    let is_read = |frame: usize| {
+        let after = frame.checked_sub(numbering.first).filter(|after| after.is_multiple_of(numbering.step));
+        after.is_some_and(|after| frames.is_none_or(|frames| after / numbering.step < frames))
+    };
+    let mut starts = BTreeMap::<u64, TargetStart>::new();
+    for line in read_mot(path)? {
+        let id = u64::try_from(line.target).map_err(|_| {
+            Error::format(path, format!("expected a target's number of at least 0, got {}", line.target))
+        })?;
+        let start = TargetStart { frame: line.frame, id, bounds: line.bounds };
+        if is_read(line.frame) {
+            let earliest = starts.entry(id).or_insert(start);
+            if line.frame < earliest.frame {
+                *earliest = start;
+            }
+        }
+    }
+    if starts.is_empty() {
+        let expected = "a box in at least one frame that is read";
+        return Err(Error::argument("boxes", expected, format!("none in {}", path.display())));
+    }
+    Ok(starts.into_values().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arguments(box_file: Option<PathBuf>) -> ParticleTrackerArguments {
+        ParticleTrackerArguments { box_file, particles: None, mot: None, csv: None, foreground: None }
+    }
+
+    #[test]
+    fn targets_start_at_their_first_line_that_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("first.csv");
+        std::fs::write(&path, "3,7,1,1,5,6,1\n2,7,2.5,1,5,6,1\n6,4,9,9,5,6,1\n1,9,8,8,5,6\n").unwrap();
+        let from_file = arguments(Some(path.clone()));
+        let starts = |numbering, limit| {
+            let starts = from_file.starts(&[], numbering, limit)?;
+            Ok::<_, Error>(starts.iter().map(|start| (start.id, start.frame, start.bounds.x)).collect::<Vec<_>>())
+        };
+        let all = Numbering::default();
+        // Pixel 1 of the file is pixel 0 here and reaches from -1/2.
+        assert_eq!(starts(all, None).unwrap(), [(4, 5, 7.5), (7, 1, 1.0), (9, 0, 6.5)]);
+        let every_second = Numbering { first: 0, step: 2, rate: None };
+        assert_eq!(starts(every_second, None).unwrap(), [(7, 2, -0.5), (9, 0, 6.5)]);
+        assert_eq!(starts(all, Some(1)).unwrap(), [(9, 0, 6.5)]);
+        let late = starts(Numbering { first: 6, step: 1, rate: None }, None).unwrap_err().to_string();
+        assert!(late.starts_with("boxes: expected"), "{late}");
+        std::fs::write(&path, "1,-1,1,1,5,6,1\n").unwrap();
+        assert!(starts(all, None).unwrap_err().to_string().contains("number of at least 0"));
+    }
+
+    #[test]
+    fn boxes_come_from_one_place() {
+        let bounds = TargetBox { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
+        let numbering = Numbering { first: 5, step: 1, rate: None };
+        let starts = arguments(None).starts(&[bounds, bounds], numbering, None).unwrap();
+        assert_eq!(starts.iter().map(|start| (start.id, start.frame)).collect::<Vec<_>>(), [(1, 5), (2, 5)]);
+        let none = arguments(None).starts(&[], numbering, None).unwrap_err().to_string();
+        assert!(none.starts_with("box: expected a --box"), "{none}");
+        let both = arguments(Some("a.csv".into())).starts(&[bounds], numbering, None).unwrap_err().to_string();
+        assert!(both.starts_with("boxes: expected either"), "{both}");
+    }
+}
