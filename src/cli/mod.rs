@@ -22,6 +22,7 @@ mod run;
 mod scene_list;
 mod stereo;
 mod synth;
+mod target_recording;
 mod track;
 
 use clap::Parser;

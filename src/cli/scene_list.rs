@@ -3,6 +3,7 @@
 use super::report::{Report, print};
 use crate::error::Result;
 use crate::synth::registry::{CARRIERS, Parameter, SCENES};
+use crate::synth::targets;
 use serde_json::{Value, json};
 
 /// Prints every scene and carrier with its parameters.
@@ -18,10 +19,17 @@ pub fn show(as_json: bool) -> Result<Report> {
         .iter()
         .map(|kind| json!({"name": kind.name, "summary": kind.summary, "parameters": parameters(kind.parameters)}))
         .collect();
+    let with_targets: Vec<Value> = targets::SCENES
+        .iter()
+        .map(|kind| json!({"name": kind.name, "summary": kind.summary, "frames": kind.frames}))
+        .collect();
     if !as_json {
         print(&text())?;
     }
-    Ok(Report { summary: json!({"command": "synth", "scenes": scenes, "carriers": carriers}), failure: None })
+    Ok(Report {
+        summary: json!({"command": "synth", "scenes": scenes, "carriers": carriers, "target_scenes": with_targets}),
+        failure: None,
+    })
 }
 
 fn parameters(list: &[Parameter]) -> Vec<Value> {
@@ -38,6 +46,10 @@ fn text() -> String {
     for kind in CARRIERS {
         text += &entry(kind.name, kind.summary);
         text += &rows(kind.parameters);
+    }
+    text += "\nScenes of targets, in colour, with true boxes (--boxes, --scale)\n";
+    for kind in targets::SCENES {
+        text += &format!("  {:<18}{}; {} frames\n", kind.name, kind.summary, kind.frames);
     }
     text
 }

@@ -6,15 +6,20 @@ use super::open::compute;
 use super::progress::Bar;
 use super::report::{Report, tell};
 use super::scene_list;
+use super::target_recording::{TargetRecording, check_folder};
 use crate::error::{Error, Result};
 use crate::io::{FieldFormat, check_sink, open_sink};
 use crate::parallel::{Progress, Threads};
 use crate::pipeline::{check_target, is_folder};
+use crate::synth::targets::{SCENES, TargetSceneOptions};
 use crate::synth::{Rounding, Scene, SceneOptions, Sensor, build, truth};
 use crate::types::{AnyFrame, Frame};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+
+/// Frames of a scene without targets, unless another number is asked for.
+const USUAL_FRAMES: usize = 10;
 
 /// Options of `synth`.
 #[derive(Debug, Args)]
@@ -25,7 +30,8 @@ use std::path::{Path, PathBuf};
     Examples:\n  \
     jacoflow synth --list\n  \
     jacoflow synth ramp -o ramp --frames 400 --rounding floor --truth ramp_truth\n  \
-    jacoflow synth disc -o disc.y4m --set rpm=45 --set fps=100 --rate 100 --noise 2"
+    jacoflow synth disc -o disc.y4m --set rpm=45 --set fps=100 --rate 100 --noise 2\n  \
+    jacoflow synth people_handheld -o people --boxes people.txt --seed 10"
 )]
 pub struct SynthCommand {
     /// Name of the scene (see --list)
@@ -37,10 +43,10 @@ pub struct SynthCommand {
     /// A folder (with / at the end where a new one has a dot in its name), a .npy or a .y4m file, or - for Y4M on standard output
     #[arg(long, short, value_name = "OUT", required_unless_present = "list")]
     pub output: Option<PathBuf>,
-    /// Number of frames
-    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
-    pub frames: usize,
-    /// Size of a frame in pixels
+    /// Number of frames [default: 10; of a scene of targets all]
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    pub frames: Option<usize>,
+    /// Size of a frame in pixels; that of a scene of targets follows from --scale
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "256x256", value_parser = parse_size)]
     pub size: (usize, usize),
     /// Scene coordinates of the upper left pixel
@@ -55,9 +61,15 @@ pub struct SynthCommand {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Standard deviation of added white noise, 8-bit grey levels
-    #[arg(long, value_name = "LEVELS", default_value = "0", value_parser = parse_not_negative)]
-    pub noise: f64,
+    /// Standard deviation of added white noise, 8-bit grey levels [default: 0; of a scene of targets 2.5]
+    #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
+    pub noise: Option<f64>,
+    /// Scene of targets: what its lengths are multiplied by; at 1 a frame has 720 x 480 pixels [default: 0.5]
+    #[arg(long, value_name = "FACTOR", value_parser = parse_not_negative)]
+    pub scale: Option<f64>,
+    /// Scene of targets: write the true boxes into this file, as MOT challenge text
+    #[arg(long, value_name = "FILE")]
+    pub boxes: Option<PathBuf>,
     /// Samples of the frames
     #[arg(long, value_enum, value_name = "TYPE", default_value = "8")]
     pub depth: Depth,
@@ -113,6 +125,10 @@ impl SynthCommand {
         let (Some(name), Some(output)) = (&self.scene, &self.output) else {
             return Err(Error::argument("scene", "the name of a scene and --output", "neither"));
         };
+        if SCENES.iter().any(|kind| kind.name == name) {
+            return self.record_targets(name, output, watch);
+        }
+        Self::refuse(name, "a scene of targets", &[("scale", self.scale.is_some()), ("boxes", self.boxes.is_some())])?;
         let (width, height) = self.size;
         let scene = build(
             name,
@@ -133,13 +149,55 @@ impl SynthCommand {
         drop(bar);
         let told = matches!(written.1, Ok(()) | Err(Error::Interrupted)) || written.0 > 0;
         if told && !self.tell.quiet {
-            tell(&format!("{} of {} frames written to {}", written.0, self.frames, output.display()));
+            tell(&format!("{} of {} frames written to {}", written.0, self.count(), output.display()));
         }
         let summary = json!({
             "command": "synth", "scene": name, "output": output, "frames": written.0, "width": width, "height": height,
             "truth": self.truth, "seed": self.seed, "interrupted": matches!(written.1, Err(Error::Interrupted)),
         });
         Ok(Report { summary, failure: written.1.err() })
+    }
+
+    /// Number of frames of a scene without targets.
+    fn count(&self) -> usize {
+        self.frames.unwrap_or(USUAL_FRAMES)
+    }
+
+    /// Records a scene of targets.
+    fn record_targets(&self, scene: &str, output: &Path, watch: &Watch) -> Result<Report> {
+        let others = [
+            ("carrier", self.carrier.is_some()),
+            ("set", !self.settings.is_empty()),
+            ("truth", self.truth.is_some()),
+            ("depth", self.depth != Depth::Eight),
+        ];
+        Self::refuse(scene, "a scene without targets", &others)?;
+        let usual = TargetSceneOptions::default();
+        let recording = TargetRecording {
+            scene,
+            options: TargetSceneOptions {
+                seed: self.seed,
+                scale: self.scale.unwrap_or(usual.scale),
+                noise: self.noise.unwrap_or(usual.noise),
+                frames: self.frames,
+                ..usual
+            },
+            output,
+            boxes: self.boxes.as_deref(),
+            rate: self.rate,
+            force: self.force,
+            quiet: self.tell.quiet,
+        };
+        let (threads, _) = compute(&self.compute)?;
+        recording.make(threads, watch)
+    }
+
+    /// Refuses options that go with another kind of scene.
+    fn refuse(scene: &str, wanted: &str, given: &[(&'static str, bool)]) -> Result<()> {
+        match given.iter().find(|(_, given)| *given) {
+            Some(&(option, _)) => Err(Error::argument(option, wanted, scene)),
+            None => Ok(()),
+        }
     }
 
     /// Writes the frames and their truth; how many frames are in place, and what stopped it.
@@ -157,8 +215,8 @@ impl SynthCommand {
             if let Some(folder) = &self.truth {
                 std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
             }
-            for index in 0..self.frames {
-                bar.step(index, self.frames)?;
+            for index in 0..self.count() {
+                bar.step(index, self.count())?;
                 let frame = threads.install(|| scene.frame(index as f64));
                 recording.write(&self.sample(&frame, index as u64))?;
                 if let Some(folder) = &self.truth {
@@ -183,7 +241,8 @@ impl SynthCommand {
             RoundingWord::Nearest => Rounding::Nearest,
             RoundingWord::Floor => Rounding::Floor,
         };
-        let sensor = Sensor { noise: self.noise, rounding: Rounding::None, saturate: false, seed: self.seed };
+        let sensor =
+            Sensor { noise: self.noise.unwrap_or(0.0), rounding: Rounding::None, saturate: false, seed: self.seed };
         match self.depth {
             Depth::Eight => AnyFrame::U8(Sensor { rounding, saturate: true, ..sensor }.apply_u8(frame, index)),
             Depth::Float => AnyFrame::F64(sensor.apply(frame, index)),
@@ -209,11 +268,7 @@ impl SynthCommand {
             check_target(output, self.force)?;
         }
         for folder in [is_folder(output).then_some(output), self.truth.as_deref()].into_iter().flatten() {
-            let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-            if occupied && !self.force {
-                let wanted = "an empty or new folder (--force writes into it)";
-                return Err(Error::argument("output", wanted, folder.display()));
-            }
+            check_folder(folder, self.force)?;
         }
         Ok(())
     }

@@ -188,6 +188,29 @@ fn synth_writes_every_kind_of_recording() {
 }
 
 #[test]
+fn synth_records_scenes_of_targets_with_their_boxes() {
+    let place = Place::new();
+    assert!(place.good("synth --list").out.contains("meet_and_return"));
+    let summary =
+        place.good("synth cars_handheld -o c.npy --boxes c.txt --frames 3 --scale 0.2 --seed 4 --json").json();
+    assert_eq!((summary["frames"].as_u64(), summary["targets"].as_u64()), (Some(3), Some(2)));
+    place.good("synth cars_handheld -o c.y4m --frames 2 --scale 0.2");
+    place.good("synth cars_handheld -o folder --frames 2 --scale 0.2");
+    assert_eq!(place.names("folder").len(), 2);
+    let boxes = jacoflow::io::read_mot(place.path("c.txt")).unwrap();
+    assert_eq!(
+        boxes.iter().map(|each| (each.frame, each.target)).collect::<Vec<_>>(),
+        [(0, 1), (0, 2), (1, 1), (1, 2), (2, 1), (2, 2)]
+    );
+    assert!(boxes.iter().all(|each| (each.bounds.width / each.bounds.height - 76.0 / 42.0).abs() < 1e-2));
+    for wrong in
+        ["cars_handheld -o d.npy --set u=1", "affine -o d.npy --boxes d.txt", "cars_handheld -o c.npy --frames 1"]
+    {
+        assert_eq!(place.line(&format!("synth {wrong}")).code, 2, "{wrong}");
+    }
+}
+
+#[test]
 fn info_reads_results() {
     let place = Place::new();
     place.good("synth affine -o s.npy --frames 3 --size 40x32");
