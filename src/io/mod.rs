@@ -41,10 +41,10 @@ pub use npy::{Element, ElementType, NpyHeader};
 pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_colour_png, write_frame_png, write_picture};
-pub use sink::{FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_colour_sink, open_sink};
+pub use sink::{ColourSink, FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_colour_sink, open_sink};
 pub use source::{
-    FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout, ViewPairs,
-    Y4mSource, kind_of, open, open_colour,
+    ColourSource, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout,
+    ViewPairs, Y4mSource, kind_of, open, open_colour,
 };
 pub use table::{FieldTable, TableWriter, cell};
 pub use text_boxes::read_otb;

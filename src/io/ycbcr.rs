@@ -42,9 +42,10 @@ impl Coding {
     /// Offset and scale of luma, then of chroma: `code = offset + scale * value`.
     fn lines(self) -> [(f64, f64); 2] {
         let unit = f64::from(1_u32 << (self.bits - 8));
-        match self.full_range {
-            true => [(0.0, self.top()), (128.0 * unit, self.top())],
-            false => [(16.0 * unit, 219.0 * unit), (128.0 * unit, 224.0 * unit)],
+        if self.full_range {
+            [(0.0, self.top()), (128.0 * unit, self.top())]
+        } else {
+            [(16.0 * unit, 219.0 * unit), (128.0 * unit, 224.0 * unit)]
         }
     }
 

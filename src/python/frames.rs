@@ -5,7 +5,8 @@ use super::colour_arrays::{colour_frame, from_any_colour_frame};
 use super::options;
 use crate::error::Error;
 use crate::io::{
-    Colour, FrameSink, FrameSource, Grey, OpenOptions, open, open_colour, open_colour_sink, open_sink, read_image,
+    Colour, ColourSource, FrameSink, FrameSource, Grey, OpenOptions, open, open_colour, open_colour_sink, open_sink,
+    read_image,
 };
 use crate::types::{AnyColourFrame, AnyFrame};
 use numpy::PyUntypedArrayMethods;
@@ -57,7 +58,7 @@ impl Reading {
 /// Frames of either kind.
 enum Source {
     Grey(Box<dyn FrameSource>),
-    Rgb(Box<dyn FrameSource<AnyColourFrame>>),
+    Rgb(Box<ColourSource>),
 }
 
 /// A frame of either kind.

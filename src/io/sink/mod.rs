@@ -28,11 +28,14 @@ pub trait FrameSink<F = AnyFrame>: Send {
     fn finish(self: Box<Self>) -> Result<()>;
 }
 
+/// A sink of colour frames.
+pub type ColourSink = dyn FrameSink<AnyColourFrame>;
+
 /// A kind of sink: which specifications it takes and how it is opened, with the frame rate (frames per second).
 struct Kind {
     accepts: fn(&str) -> bool,
     open: fn(&str, f64) -> Result<Box<dyn FrameSink>>,
-    open_colour: fn(&str, f64) -> Result<Box<dyn FrameSink<AnyColourFrame>>>,
+    open_colour: fn(&str, f64) -> Result<Box<ColourSink>>,
 }
 
 /// Every kind of sink; the first that accepts a specification opens it.
@@ -50,7 +53,7 @@ pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
 ///
 /// # Errors
 /// As [`open_sink`].
-pub fn open_colour_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink<AnyColourFrame>>> {
+pub fn open_colour_sink(spec: &str, frame_rate: f64) -> Result<Box<ColourSink>> {
     (kind_at_rate(spec, frame_rate)?.open_colour)(spec, frame_rate)
 }
 

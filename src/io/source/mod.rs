@@ -98,12 +98,15 @@ impl<F, S: FrameSource<F> + ?Sized> FrameSource<F> for Box<S> {
     }
 }
 
+/// A source of colour frames.
+pub type ColourSource = dyn FrameSource<AnyColourFrame>;
+
 /// A kind of source: what it is called, which specifications it takes, how it is opened.
 struct Kind {
     name: &'static str,
     accepts: fn(&str) -> bool,
     open: fn(&str, Colour) -> Result<Box<dyn FrameSource>>,
-    open_colour: fn(&str, Grey) -> Result<Box<dyn FrameSource<AnyColourFrame>>>,
+    open_colour: fn(&str, Grey) -> Result<Box<ColourSource>>,
 }
 
 /// Every kind of source; the first that accepts a specification opens it.
@@ -138,7 +141,7 @@ pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_colour(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource<AnyColourFrame>>> {
+pub fn open_colour(spec: &str, options: &OpenOptions) -> Result<Box<ColourSource>> {
     let source = (kind_for(spec, options)?.open_colour)(spec, options.grey)?;
     Ok(Box::new(Selected::new(source, options)?))
 }

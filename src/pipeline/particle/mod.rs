@@ -16,7 +16,7 @@ use super::run::{Numbering, check_size};
 use super::sink::Ending;
 use super::track::TrackSummary;
 use crate::error::{Error, Result};
-use crate::io::FrameSource;
+use crate::io::ColourSource;
 use crate::parallel::Progress;
 use crate::track::ParticleTracker;
 use crate::track::particle::{ParticleOptions, ParticleTarget};
@@ -111,7 +111,7 @@ impl ParticleRun {
     /// that cannot be followed.
     pub fn run(
         &mut self,
-        source: Box<dyn FrameSource<AnyColourFrame>>,
+        source: Box<ColourSource>,
         begin: BeginParticleSinks<'_>,
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -130,7 +130,7 @@ impl ParticleRun {
 
     fn work(
         &mut self,
-        source: Box<dyn FrameSource<AnyColourFrame>>,
+        source: Box<ColourSource>,
         begin: BeginParticleSinks<'_>,
         progress: &dyn Progress,
     ) -> Result<()> {

@@ -41,7 +41,7 @@ fn frame(index: usize) -> AnyColourFrame {
     }))
 }
 
-fn source(frames: usize) -> Box<dyn FrameSource<AnyColourFrame>> {
+fn source(frames: usize) -> Box<ColourSource> {
     Box::new(MemorySource::new((0..frames).map(frame).collect()).unwrap())
 }
 
