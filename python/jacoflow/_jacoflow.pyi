@@ -50,6 +50,8 @@ __all__ = [
     "_write_frames",
     "_GaussMarkovFilter",
     "_GradientTracker",
+    "_ParticleStep",
+    "_ParticleTracker",
     "_StereoTracker",
     "_TrackGraph",
     "_classify",
@@ -74,6 +76,9 @@ __all__ = [
     "_motion3d_sideways",
     "_motion3d_sideways_bound",
     "_observability",
+    "_restore_particle_step",
+    "_restore_particle_tracker",
+    "_write_particle_tracks",
     "_felzenszwalb",
     "_region_means",
     "_edge_disparity",
@@ -1204,6 +1209,37 @@ class _GaussMarkovFilter:
         """Their covariances along x and along y, (2, 3, 3)."""
 
 @final
+class _ParticleStep:
+    def told(self, /) -> dict[str, Any]:
+        """Everything, by the names of `jacoflow.track.ParticleStep`."""
+    def particles(self, /, id: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Particles (N, 6) and weights (N,) of a target; None where they were not kept."""
+    def foreground(self, /) -> NDArray[np.float32]:
+        """Foreground (H, W), 0 to 1."""
+    def segments(self, /) -> NDArray[np.int32]:
+        """Labels of the segments (H, W)."""
+    def keeps_frame(self, /) -> bool:
+        """Whether it keeps the frame."""
+    def keeping(self, /, frame: bool, particles: bool) -> _ParticleStep:
+        """The same without the frame, unless `frame`, and without the particles, unless `particles`."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes]]: ...
+
+@final
+class _ParticleTracker:
+    def __new__(
+        cls, frame: NDArray[Any], boxes: list[tuple[int, list[float]]], options: dict[str, Any]
+    ) -> _ParticleTracker: ...
+    def update(self, /, frame: NDArray[Any], camera: list[list[float]] | None) -> _ParticleStep:
+        """The targets in the next frame; `camera`: the background's motion since the one before, where it is known."""
+    def add(self, /, bounds: list[float], id: int | None) -> int:
+        """Adds a target at the last frame; returns its number."""
+    def remove(self, /, id: int) -> None:
+        """Removes a target."""
+    def step(self, /) -> _ParticleStep:
+        """The targets at the last frame."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes, bool]]: ...
+
+@final
 class _StereoTracker:
     def __new__(cls, options: dict[str, Any]) -> _StereoTracker: ...
     def update(self, left: NDArray[Any], right: NDArray[Any], dt: float | None) -> dict[str, Any]:
@@ -1339,4 +1375,10 @@ def _scene_carriers() -> dict[str, str]: ...
 def _scene_names() -> dict[str, str]: ...
 def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...
 def _target_scene_names() -> dict[str, str]: ...
+def _restore_particle_step(state: bytes) -> _ParticleStep:
+    """The inverse of `_ParticleStep.__reduce__`."""
+def _restore_particle_tracker(state: bytes, takes_grey: bool) -> _ParticleTracker:
+    """The inverse of `_ParticleTracker.__reduce__`."""
+def _write_particle_tracks(path: str, format: str, steps: list[_ParticleStep]) -> None:
+    """Writes steps to a file: "mot" or "csv"."""
 def _status_names() -> list[str]: ...

@@ -1,6 +1,8 @@
 """Trackers: a moving target followed from frame to frame, with its velocity, size, angle and how far each can be trusted.
 
-Frames are arrays (H, W) of uint8, uint16, float32 or float64; positions are (x, y) in px, x right, y down, times in frames.
+`GradientTracker` follows one target in grey frames, `ParticleTracker` several that may look alike in colour
+frames, `StereoTracker` everything that moves before two cameras. Grey frames are arrays (H, W), colour frames
+(H, W, 3) of uint8, uint16, float32 or float64; positions are (x, y) in px, x right, y down, times in frames.
 
 >>> import numpy as np
 >>> from jacoflow.track import GradientTracker
@@ -25,6 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
+from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
+from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
 from ._stereo_options import real_number
 from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
@@ -33,6 +37,11 @@ __all__ = [
     "GradientTracker",
     "MeanFlow",
     "MovingTarget",
+    "ParticleCorners",
+    "ParticleStep",
+    "ParticleTrack",
+    "ParticleTracker",
+    "ParticleTracks",
     "PixelFlow",
     "StereoCluster",
     "StereoStep",
@@ -47,6 +56,7 @@ __all__ = [
     "mean_flow",
     "refine_flow",
     "track",
+    "track_particles",
 ]
 
 Array = NDArray[np.float64]

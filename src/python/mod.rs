@@ -21,6 +21,7 @@ mod mixture;
 mod motion3d;
 mod observability;
 mod options;
+mod particle_track;
 mod points;
 mod progress;
 mod scenes;
@@ -72,6 +73,8 @@ mod _jacoflow {
     };
     #[pymodule_export]
     use super::observability::{classify, observability};
+    #[pymodule_export]
+    use super::particle_track::{PyParticleStep, PyParticleTracker, restore_step, restore_tracker, write_tables};
     #[pymodule_export]
     use super::points::{corners, point_flow};
     #[pymodule_export]

@@ -8,9 +8,6 @@ use crate::pipeline::track::{Row, RowWriter, TrackFormat};
 use crate::track::particle::ParticleTarget;
 use std::path::PathBuf;
 
-/// Columns that [`TrackTable`](crate::io::TrackTable) does not have.
-const FURTHER: [&str; 4] = ["effective_sample_size", "similarity", "n_tracks", "degenerate"];
-
 /// Writes a row for every target and frame, as [`TrackRows`](crate::pipeline::TrackRows). CSV has further
 /// columns:
 ///
@@ -26,26 +23,30 @@ pub struct ParticleRows {
 }
 
 impl ParticleRows {
+    /// Columns that [`TrackTable`](crate::io::TrackTable) does not have.
+    pub const COLUMNS: [&str; 4] = ["effective_sample_size", "similarity", "n_tracks", "degenerate"];
+
+    /// A target's cells of these columns.
+    pub fn cells(target: &ParticleTarget) -> Vec<String> {
+        vec![
+            cell(target.effective_sample_size),
+            cell(target.similarity),
+            target.n_tracks.to_string(),
+            target.degenerate.to_string(),
+        ]
+    }
+
     /// Begins the text.
     ///
     /// # Errors
     /// As [`TrackTable::create`](crate::io::TrackTable::create).
     pub fn create(target: &TableTarget, format: TrackFormat) -> Result<Self> {
-        Ok(Self { rows: RowWriter::create(target, format, &FURTHER)? })
+        Ok(Self { rows: RowWriter::create(target, format, &Self::COLUMNS)? })
     }
 }
 
-fn further(target: &ParticleTarget) -> Vec<String> {
-    vec![
-        cell(target.effective_sample_size),
-        cell(target.similarity),
-        target.n_tracks.to_string(),
-        target.degenerate.to_string(),
-    ]
-}
-
 fn row(target: &ParticleTarget) -> Row<'_> {
-    Row { target: target.id as usize, state: &target.state, further: further(target) }
+    Row { target: target.id as usize, state: &target.state, further: ParticleRows::cells(target) }
 }
 
 impl ParticleSink for ParticleRows {

@@ -49,6 +49,11 @@ impl StepRecord {
         &self.step
     }
 
+    /// Whether it keeps the frame, from which its pictures are made.
+    pub fn keeps_frame(&self) -> bool {
+        self.frame.is_some()
+    }
+
     /// The same without the frame, unless `frame`, and without the particles, unless `particles`.
     #[must_use]
     pub fn keeping(mut self, frame: bool, particles: bool) -> Self {

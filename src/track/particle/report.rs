@@ -22,12 +22,25 @@ const NO_WEIGHT: &str = "no particle had a weight: the estimate is the predictio
 pub(super) const REASONS: [&str; 10] =
     ["", LEFT, LOST, NOTHING_SHOWN, CUT, HIDDEN_BY_TARGET, HIDDEN, COVERED, UNLIKE, NO_WEIGHT];
 
-/// The step at the tracker's frame. `seen`: whether the frame cut the scene; `None` if nothing was looked for, as in the first frame.
+/// What a step comes of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Occasion {
+    /// Targets were given.
+    Begin,
+    /// A frame showed nothing.
+    Nothing,
+    /// Targets were looked for in a frame of the same scene.
+    Frame,
+    /// Targets were looked for in a frame that cut the scene.
+    Cut,
+}
+
+/// The step at the tracker's frame.
 pub(super) fn report(
     tracker: &ParticleTracker,
     camera: &CameraMotion,
     seeing: &[Seeing],
-    seen: Option<bool>,
+    occasion: Occasion,
 ) -> ParticleStep {
     let count = tracker.targets.len();
     let mut near = vec![false; count * count];
@@ -38,7 +51,7 @@ pub(super) fn report(
     }
     let target = |(own, target): (usize, &Target)| {
         let n_tracks = tracker.corners.tracks.iter().filter(|track| track.owner == Some(target.id)).count();
-        let (status, reason) = status_of(target, seeing.get(own), seen, tracker.frame);
+        let (status, reason) = status_of(target, seeing.get(own), occasion);
         let before = tracker.step.targets.iter().find(|before| before.id == target.id);
         ParticleTarget {
             id: target.id,
@@ -51,7 +64,8 @@ pub(super) fn report(
             degenerate: target.degenerate,
         }
     };
-    let tracks = if seen.is_some() { tracker.corners.tracks.iter().filter_map(corner).collect() } else { Vec::new() };
+    let looked = matches!(occasion, Occasion::Frame | Occasion::Cut);
+    let tracks = if looked { tracker.corners.tracks.iter().filter_map(corner).collect() } else { Vec::new() };
     ParticleStep {
         frame: tracker.frame,
         targets: tracker.targets.iter().enumerate().map(target).collect(),
@@ -72,21 +86,16 @@ fn corner(track: &super::corners::Track) -> Option<CornerTrack> {
 }
 
 /// Status and its reason.
-fn status_of(
-    target: &Target,
-    seeing: Option<&Seeing>,
-    seen: Option<bool>,
-    frame: usize,
-) -> (TrackStatus, &'static str) {
+fn status_of(target: &Target, seeing: Option<&Seeing>, occasion: Occasion) -> (TrackStatus, &'static str) {
     let presence = &target.presence;
     let is_covered = seeing.is_some_and(|seeing| !seeing.near.is_empty() && seeing.is_covered);
     if target.is_out {
         (TrackStatus::Out, LEFT)
     } else if presence.is_lost() {
         (TrackStatus::Lost, LOST)
-    } else if seen.is_none() && frame > 0 && !target.is_new {
+    } else if occasion == Occasion::Nothing {
         (TrackStatus::Coasting, NOTHING_SHOWN)
-    } else if seen == Some(true) {
+    } else if occasion == Occasion::Cut {
         (TrackStatus::Coasting, CUT)
     } else if presence.is_hidden() {
         (TrackStatus::Coasting, if is_covered { HIDDEN_BY_TARGET } else { HIDDEN })

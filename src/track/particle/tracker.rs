@@ -7,7 +7,7 @@ use super::foreground::{ForegroundMap, background_flow};
 use super::geometry::centred;
 use super::labels::{Labelled, assign};
 use super::options::{ForegroundModel, ParticleMode, ParticleOptions};
-use super::report::report;
+use super::report::{Occasion, report};
 use super::seeing::{Seeing, look};
 use super::step::ParticleStep;
 use super::target::{Moment, Target};
@@ -151,12 +151,11 @@ impl ParticleTracker {
 
     /// Adds a new target, near nothing, to the step of the last frame.
     fn tell_new(&mut self, at: usize) {
-        let new = report(self, &CameraMotion::NONE, &[], None).targets.swap_remove(at);
+        let new = report(self, &CameraMotion::NONE, &[], Occasion::Begin).targets.swap_remove(at);
         let (before, count) = (self.step.targets.len(), self.targets.len());
         let place = |k: usize| k - usize::from(k > at);
-        let near = |own: usize, other: usize| {
-            own != at && other != at && self.step.near[place(own) * before + place(other)]
-        };
+        let near =
+            |own: usize, other: usize| own != at && other != at && self.step.near[place(own) * before + place(other)];
         self.step.near = (0..count * count).map(|k| near(k / count, k % count)).collect();
         self.step.targets.insert(at, new);
     }
@@ -281,7 +280,7 @@ impl ParticleTracker {
         let active = self.targets.par_iter_mut().enumerate().filter(|(_, target)| !target.is_out);
         active.for_each(|(own, target)| target.advance(own, &moment));
         self.learn(&seeing, &camera, was_cut);
-        self.step = report(self, &camera, &seeing, Some(was_cut));
+        self.step = report(self, &camera, &seeing, if was_cut { Occasion::Cut } else { Occasion::Frame });
         self.corners.top_up(&view.grey)?;
         self.pyramid = pyramid;
         self.bins = view.bins;
@@ -328,7 +327,7 @@ impl ParticleTracker {
             target.coast(&self.options, self.scale, self.frame);
             target.is_out = !super::likelihood::is_inside(target.place(), self.size);
         }
-        self.step = report(self, &CameraMotion::NONE, &[], None);
+        self.step = report(self, &CameraMotion::NONE, &[], Occasion::Nothing);
     }
 
     /// What the frame teaches: usual values, labels of tracks, who has left.
@@ -341,7 +340,10 @@ impl ParticleTracker {
             if !(is_alone && target.presence.learn(target.similarity, seeing.labelled, &target.estimate)) {
                 target.presence.clear_place = target.presence.moved_on(camera);
             }
-            target.is_out = !super::likelihood::is_inside(target.place(), self.size);
+            let ahead = super::seeing::knob("AHEAD", 1.0);
+            let c = camera.at(target.place());
+            let p = [0, 1].map(|i| target.place()[i] + ahead * (c[i] + target.velocity()[i]));
+            target.is_out = !super::likelihood::is_inside(p, self.size);
         }
         if !self.options.factors().tracks || was_cut {
             return;
