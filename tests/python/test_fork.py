@@ -146,6 +146,13 @@ def stereo_tracked():
     return (np.frombuffer(tracker.graph.to_json().encode(), np.uint8),)
 
 
+def people(mode):
+    scene = scenes.TargetScene("people_static", scale=0.25)
+    options = {"mode": mode, "n_particles": 100, "n_near": 200}
+    found = track.track_particles([scene.frame(t) for t in range(4)], scene.boxes()[0], keep_frames=True, **options)
+    return found[-1].boxes, found[-1].covariance, found[-1].foreground
+
+
 def matched(method):
     step = stereo_scenes.small().film()[0]
     found = stereo.edge_disparity(step.left, step.right, disparity_range=(-20, 12), row_range=(-2, 2), method=method)
@@ -208,6 +215,7 @@ CALLS = {
     "row offset": row_offset,
     "edge pixels": lambda: stereo.edge_pixels(film()[0]),
     "stereo tracker": stereo_tracked,
+    **{f"particle tracker, {mode}": lambda mode=mode: people(mode) for mode in ("improved", "paper")},
     **{f"motion3d {robust}": lambda robust=robust: moved(robust) for robust in (True, False)},
     **{f"motion3d field {patches}": lambda patches=patches: moved_before_a_field(patches) for patches in (None, 24)},
     "motion3d bound": bound,

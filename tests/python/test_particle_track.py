@@ -3,6 +3,8 @@
 import copy
 import pickle
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -146,6 +148,20 @@ def test_threads_do_not_change_a_bit(crossing):
             for one, other in zip(runs[0], others, strict=True):
                 assert_same(one, other)
             assert_array_equal(runs[0][-1].foreground, others[-1].foreground)
+
+
+def test_each_likelihood_weighs(apart):
+    """Without any, all particles inside the picture weigh the same; each takes some weight away."""
+    frames = apart.frames[:3]
+    free = track_particles(frames, apart.boxes[0], likelihoods=(), **FEW)[-1]
+    assert_allclose(free.effective_sample_size, 100)
+    for name in ("colour", "velocity", "tracks", "foreground"):
+        step = track_particles(frames, apart.boxes[0], likelihoods=[name], **FEW)[-1]
+        assert (step.effective_sample_size < 99).all() and np.isfinite(step.boxes).all(), name
+    # Nothing is near: there is no distance to keep.
+    assert_array_equal(track_particles(frames, apart.boxes[0], likelihoods=["distance"], **FEW)[-1].boxes, free.boxes)
+    near = {0: apart.boxes[0][0], 1: apart.boxes[0][0] + [12, 0, 0, 0]}
+    assert (track_particles(frames, near, likelihoods=["distance"], **FEW)[-1].effective_sample_size < 190).all()
 
 
 def test_the_seed_decides(crossing):
@@ -334,6 +350,19 @@ def test_targets_come_and_go(apart):
         tracker.remove(7)
 
 
+def test_who_is_near_whom_survives_additions_and_removals(apart):
+    left, right = apart.boxes[0]
+    tracker = ParticleTracker(apart.frames[0], {3: left, 7: left}, **FEW)
+    assert tracker.update(apart.frames[1]).near.tolist() == [[False, True], [True, False]]
+    tracker.add(right, id=5)
+    assert tracker.step.near.tolist() == [[False, False, True], [False, False, False], [True, False, False]]
+    assert_array_equal(tracker.update(apart.frames[2]).near, [[False, False, True], [False, False, False], [True, False, False]])
+    tracker.remove(5)
+    assert tracker.step.near.tolist() == [[False, True], [True, False]]
+    tracker.remove(3)
+    assert tracker.step.near.tolist() == [[False]]
+
+
 def test_two_targets_in_one_box_and_boxes_of_few_rows(apart):
     box = apart.boxes[0][0]
     step = track_particles(apart.frames[:3], {0: box, 1: box}, **FEW)[-1]
@@ -394,6 +423,21 @@ def test_a_sequence_gives_tracks(crossing, tmp_path):
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
     assert header.startswith("target,frame,time,status,") and header.endswith(",similarity,n_tracks,degenerate") and len(rows) == 13
     assert float(rows[-1].split(",")[header.split(",").index("x")]) == late.position[-1, 0]
+
+
+def test_files_are_those_of_the_command(crossing, tmp_path):
+    frames = crossing.frames[:6]
+    np.save(tmp_path / "film.npy", frames)
+    boxes = [argument for box in crossing.boxes[0] for argument in ("--box", ",".join(repr(float(side)) for side in box))]
+    command = [sys.executable, "-m", "jacoflow", "track", "film.npy", "--method", "particle", *boxes, "--particles", "100", "--mot", "a.txt", "--csv", "a.csv"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    tracks = track_particles(frames, dict(enumerate(crossing.boxes[0], start=1)), **FEW)
+    tracks.save_mot(tmp_path / "b.txt")
+    tracks.save_csv(tmp_path / "b.csv")
+    for form in ("txt", "csv"):
+        assert (tmp_path / f"a.{form}").read_text() == (tmp_path / f"b.{form}").read_text()
+    with pytest.raises(OSError, match="none"):
+        tracks.save_mot(tmp_path / "none" / "a.txt")
 
 
 def test_hidden_targets_have_no_confidence_and_lost_ones_no_line(apart, tmp_path):

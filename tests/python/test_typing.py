@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import jacoflow
-from jacoflow import FlowEstimator, FlowField, FlowFilter, Status, filters, io, scenes
+from jacoflow import FlowEstimator, FlowField, FlowFilter, Status, filters, io, scenes, track
 
 
 def frames() -> NDArray[np.float64]:
@@ -90,6 +90,22 @@ def test_particle_filter() -> None:
     assert_type(made.log_weights, NDArray[np.float64])
     assert_type(made.quantile([0.1, 0.9]), NDArray[np.float64])
     assert_type(filters.resample([0.5, 0.5], 4, "stratified", uniforms=np.full(4, 0.5)), NDArray[np.int64])
+
+
+def test_particle_tracker() -> None:
+    scene = scenes.TargetScene("people_static", scale=0.25)
+    tracker = track.ParticleTracker(scene.frame(0), {4: scene.boxes()[0, 0]}, n_particles=20, n_near=20, segmentation={"scale": 100})
+    step = tracker.update(scene.frame(1), camera=np.eye(2, 3))
+    assert_type(step, track.ParticleStep)
+    assert_type(step.foreground, NDArray[np.float32])
+    assert_type(step.segments, NDArray[np.int32])
+    assert_type(step.tracks.owner, NDArray[np.int64])
+    assert_type(step.particles(4), tuple[NDArray[np.float64], NDArray[np.float64]])
+    assert_type(tracker.add(scene.boxes()[1, 1]), int)
+    tracks = track.track_particles(scene.frames()[:3], {0: {1: scene.boxes()[0, 0]}, 1: {2: scene.boxes()[1, 1]}}, n_particles=20, n_near=20, threads=1)
+    assert_type(tracks[0], track.ParticleStep)
+    assert_type(tracks[1:], tuple[track.ParticleStep, ...])
+    assert_type(tracks.track(2).status, tuple[str, ...])
 
 
 def test_observability() -> None:
