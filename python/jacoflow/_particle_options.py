@@ -31,7 +31,9 @@ _SWITCHES = (bool, np.bool_)
 
 
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options, each in the unit it had, as the compiled part takes them; what is of another kind is refused by name."""
+    """The options, each in the unit it had, as the compiled part takes them; what is of another kind is
+    refused by name.
+    """
     out = dict(options)
     for name, expected in WORDS.items():
         if not isinstance(out[name], str):

@@ -1,4 +1,4 @@
-"""The particle tracker: several targets that may look alike, cross and hide each other, followed in colour frames."""
+"""The particle tracker: targets that may look alike, cross and hide each other, followed in colour frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ParticleCorners:
-    """The N corners that a frame was judged by: those that were followed from the frame before; lengths in px."""
+    """The N corners that a frame was judged by: those followed from the frame before; lengths in px."""
 
     ids: NDArray[np.int64]
     """Their numbers, (N,), no unit: a corner keeps its number as long as it is followed."""
@@ -39,9 +39,9 @@ class ParticleCorners:
 class ParticleStep:
     """The K targets at one frame, in ascending order of their ids. Lengths in px, times in frames.
 
-    It stays what it is when the tracker goes on, and pickles. For that it holds the particles (56 bytes each) and shares
-    with the tracker one copy of the frame, from which `foreground` and `segments` are made when they are first asked for;
-    `without` drops them.
+    It stays what it is when the tracker goes on, and pickles. For that it holds the particles (56 bytes each)
+    and shares with the tracker one copy of the frame, from which `foreground` and `segments` are made when
+    they are first asked for; `without` drops them.
     """
 
     frame: int
@@ -61,7 +61,7 @@ class ParticleStep:
     effective_sample_size: Array
     """1 / sum of squared weights before the particles are drawn again, (K,), particles."""
     similarity: Array
-    """Likeness of the colours to those of the first frame, .9 quantile over the particles, 0 to 1, (K,), no unit."""
+    """Likeness of the colours to the first frame's, .9 quantile over the particles, 0 to 1, (K,), no unit."""
     n_tracks: NDArray[np.int64]
     """How many corner tracks belong to each target, (K,), no unit."""
     degenerate: NDArray[np.bool_]
@@ -69,11 +69,15 @@ class ParticleStep:
     near: NDArray[np.bool_]
     """Which targets are near each other, (K, K), no unit."""
     status: tuple[str, ...]
-    """K words: "tracking", "occluded" (near and covered, or colours unlike), "coasting" (hidden), "out" (the centre has left the picture) or "lost" (hidden for more than 30 frames)."""
+    """K words: "tracking", "occluded" (near and covered, or colours unlike), "coasting" (hidden), "out" (the
+    centre has left the picture) or "lost" (hidden for more than 30 frames).
+    """
     reason: tuple[str, ...]
     """Why each status is what it is, K strings; empty if there is nothing to be said (no unit)."""
     camera: Array
-    """Motion of the background since the frame before, (2, 3): (x', y') = camera @ (x, y, 1), px; the identity in paper mode."""
+    """Motion of the background since the frame before, (2, 3): (x', y') = camera @ (x, y, 1), px; the
+    identity in paper mode.
+    """
     tracks: ParticleCorners
     """The corners that the frame was judged by; none in the first frame; lengths in px."""
     _compiled: _ParticleStep = field(repr=False)
@@ -89,7 +93,8 @@ class ParticleStep:
         return int(found[0])
 
     def particles(self, id: int) -> tuple[Array, Array]:
-        """Particles of a target, (N, 6): centre x, y (px), velocity u, v (px/frame), width, height (px); and their weights, (N,), no unit.
+        """Particles of a target, (N, 6): centre x, y (px), velocity u, v (px/frame), width, height (px); and
+        their weights, (N,), no unit.
 
         Raises
         ------
@@ -103,7 +108,8 @@ class ParticleStep:
 
     @cached_property
     def foreground(self) -> NDArray[np.float32]:
-        """What is not background, (H, W), 0 to 1, no unit: density of the corners that do not move with it, averaged over the segments, over its maximum; 0 where there are none, as in the first frame.
+        """What is not background, (H, W), 0 to 1, no unit: density of the corners that do not move with it,
+        averaged over the segments, over its maximum; 0 where there are none, as in the first frame.
 
         ValueError for a step that was told not to keep its frame.
         """
@@ -111,7 +117,9 @@ class ParticleStep:
 
     @cached_property
     def segments(self) -> NDArray[np.int32]:
-        """Segments of the frame (of the last one that showed anything), labels (H, W) from 0, no unit. ValueError as `foreground`."""
+        """Segments of the frame (of the last one that showed anything), labels (H, W) from 0, no unit.
+        ValueError as `foreground`.
+        """
         return self._of_frame(self._compiled.segments)
 
     def _of_frame(self, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
@@ -120,7 +128,9 @@ class ParticleStep:
         return make()
 
     def without(self, *, frame: bool = True, particles: bool = True) -> ParticleStep:
-        """The same step without its frame, without its particles or without both, for little memory (no unit): then `foreground` and `segments`, or `particles`, are not to be had."""
+        """The same step without its frame, without its particles or without both, for little memory (no
+        unit): then `foreground` and `segments`, or `particles`, are not to be had.
+        """
         return step_of(self._compiled.keeping(not frame, not particles))
 
     def __reduce__(self) -> tuple[Callable[[_ParticleStep], ParticleStep], tuple[_ParticleStep]]:
@@ -134,37 +144,49 @@ def step_of(compiled: _ParticleStep) -> ParticleStep:
 
 
 class ParticleTracker:
-    """Follows several targets that may look alike, cross and hide each other, before a moving camera, by a particle filter each.
+    """Follows targets that look alike, cross and hide each other, before a moving camera: a particle filter each.
 
-    Source: K. Takechi, S. Fukui, Y. Iwahori, "Robust tracking by a particle filter with a probabilistic background model". A particle holds centre, velocity and size; it is weighed by colour (histograms of bands), velocity (near the
-    prediction) and corners that must move with the target. Deterministic: a seed fixes everything, bit for bit, on any number of threads, and a target does not depend on others that are never near. It pickles, also in midstream.
+    Source: K. Takechi, S. Fukui, Y. Iwahori, "Robust tracking by a particle filter with a probabilistic
+    background model". A particle holds centre, velocity and size; it is weighed by colour (histograms of
+    bands), velocity (near the prediction) and corners that must move with the target. Deterministic: a seed
+    fixes everything, bit for bit, on any number of threads, and a target does not depend on others that are
+    never near. It pickles, also in midstream.
 
-    It needs texture: a target with fewer than about 4 corners falls back on colour and velocity. The background must be what most of the picture shows; else give `camera` to `update`.
+    It needs texture: a target with fewer than about 4 corners falls back on colour and velocity. The
+    background must be what most of the picture shows; else give `camera` to `update`.
 
     Parameters
     ----------
     frame : array (H, W, 3) of uint8, uint16, float32 or float64, red, green, blue
         The first frame, at least 8 x 8 px. Pixels that are not finite are not counted.
     boxes : array (K, 4) or dict id -> box
-        Left, top, width, height, px, of the targets in it; rows have the ids 0 to K - 1. May be empty. A box may reach over the border. The colours of a box are compared in 8 bands from top to bottom; one of fewer than 8 rows has as many bands as rows, but at least 3.
+        Left, top, width, height, px, of the targets in it; rows have the ids 0 to K - 1. May be empty. A box
+        may reach over the border. The colours of a box are compared in 8 bands from top to bottom; one of
+        fewer than 8 rows has as many bands as rows, but at least 3.
     mode : "improved" or "paper"
-        "improved" (default): hidden targets are recognised, corners remember whose they are, particles ride on the camera's motion. "paper": the published method, with a foreground map and a distance factor.
+        "improved" (default): hidden targets are recognised, corners remember whose they are, particles ride
+        on the camera's motion. "paper": the published method, with a foreground map and a distance factor.
     n_particles, n_near : int
         Particles of a target, and while another target is near; at least 8.
     scale : float
         Factor of all lengths; default H / 480.
     likelihoods : sequence of "colour", "velocity", "distance", "tracks", "foreground"
-        Factors of a particle's weight; default the mode's: the first two with "tracks" ("improved"), or with "distance" and "foreground" ("paper").
+        Factors of a particle's weight; default the mode's: the first two with "tracks" ("improved"), or with
+        "distance" and "foreground" ("paper").
     resampling : "multinomial", "stratified", "systematic" or "residual"
         How particles are drawn.
     ess_threshold : float
-        They are drawn when the effective sample size is below this share of their number; default 1: in every frame.
+        They are drawn when the effective sample size is below this share of their number; default 1: in every
+        frame.
     foreground : "ratio", "posterior", "literal" or "affine"
-        What makes a corner foreground in paper mode: 1 - N / max N of the background's flow, 1 - its responsibility, 1 - N as printed, or 1 - the probability of following an affine motion.
+        What makes a corner foreground in paper mode: 1 - N / max N of the background's flow, 1 - its
+        responsibility, 1 - N as printed, or 1 - the probability of following an affine motion.
     segmentation : dict of scale, sigma, min_size
-        Of the foreground map: scale (default 150, grey levels), sigma (default 0.8 px), smallest region (px^2, default 120 scale^2).
+        Of the foreground map: scale (default 150, grey levels), sigma (default 0.8 px), smallest region
+        (px^2, default 120 scale^2).
     grey : "error" or "value"
-        "value": frames (H, W) are taken as red = green = blue, so that brightness takes the place of colour. Default: they are refused.
+        "value": frames (H, W) are taken as red = green = blue, so that brightness takes the place of colour.
+        Default: they are refused.
     seed : int
         Seed of all random numbers.
     threads : int
@@ -173,7 +195,8 @@ class ParticleTracker:
     Raises
     ------
     ValueError
-        For a frame that is too small or not (H, W, 3), a box that is not finite, has no area or lies outside, an id that is used twice and options out of range; each message names the argument.
+        For a frame that is too small or not (H, W, 3), a box that is not finite, has no area or lies outside,
+        an id that is used twice and options out of range; each message names the argument.
     TypeError
         For another dtype.
 
@@ -215,7 +238,9 @@ class ParticleTracker:
     def update(self, frame: ArrayLike, camera: ArrayLike | None = None) -> ParticleStep:
         """The targets in the next frame, an array (H, W, 3) as large and of the same dtype as the first.
 
-        A frame without finite pixels is one in which nothing was seen: targets move on, nothing is learnt. `camera`: the background's motion since the frame before where it is known, (2, 3): (x', y') = camera @ (x, y, 1), px; default: measured.
+        A frame without finite pixels is one in which nothing was seen: targets move on, nothing is learnt.
+        `camera`: the background's motion since the frame before where it is known, (2, 3): (x', y') = camera
+        @ (x, y, 1), px; default: measured.
 
         Raises
         ------
@@ -225,7 +250,8 @@ class ParticleTracker:
         return step_of(self._tracker.update(as_frame(frame), checked_camera(camera)))
 
     def add(self, box: ArrayLike, id: int | None = None) -> int:
-        """Adds a target at the last frame by its box (left, top, width, height), px; returns its number, by default the next one. A target that is out of the picture may be added again under its own.
+        """Adds a target at the last frame by its box (left, top, width, height), px; returns its number, by
+        default the next one. A target that is out of the picture may be added again under its own.
 
         Raises
         ------

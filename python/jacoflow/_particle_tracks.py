@@ -22,7 +22,8 @@ Starts = dict[int, list[tuple[int, list[float]]]]
 
 @dataclass(frozen=True, eq=False)
 class ParticleTrack:
-    """One target through all T frames, in px; NaN (or "", -1, False) in frames in which it is not followed."""
+    """One target through all T frames, in px; NaN (or "", -1, False) in frames in which it is not followed.
+    """
 
     id: int
     """Its number (no unit)."""
@@ -57,7 +58,8 @@ class ParticleTrack:
 
 @dataclass(frozen=True, eq=False)
 class ParticleTracks:
-    """The steps of a sequence of T frames, a list of them that cannot be changed; lengths in px. It pickles."""
+    """The steps of a sequence of T frames, a list of them that cannot be changed; lengths in px. It pickles.
+    """
 
     steps: tuple[ParticleStep, ...]
     """One for each of the T frames."""
@@ -112,14 +114,18 @@ class ParticleTracks:
         )
 
     def save_mot(self, path: str | os.PathLike[str]) -> None:
-        """Writes the boxes in the form of the MOT challenge: lines frame, id, left, top, width, height, confidence, -1, -1, -1, px.
+        """Writes the boxes in the form of the MOT challenge: lines frame, id, left, top, width, height,
+        confidence, -1, -1, -1, px.
 
-        Frames and pixels are counted from 1. The confidence is 0 while a target is hidden; one that is out or lost has no line. As the command line's `--mot`.
+        Frames and pixels are counted from 1. The confidence is 0 while a target is hidden; one that is out or
+        lost has no line. As the command line's `--mot`.
         """
         self._write(path, "mot")
 
     def save_csv(self, path: str | os.PathLike[str]) -> None:
-        """Writes everything, a row a target and frame, as the command line's `--csv`: positions in px, velocities in px/frame; frames are counted from 0."""
+        """Writes everything, a row a target and frame, as the command line's `--csv`: positions in px,
+        velocities in px/frame; frames are counted from 0.
+        """
         self._write(path, "csv")
 
     def _write(self, path: str | os.PathLike[str], form: str) -> None:
@@ -135,11 +141,14 @@ def track_particles(
     keep_particles: bool = False,
     **options: Any,
 ) -> ParticleTracks:
-    """Follows several targets through frames (T, H, W, 3), or any iterable of frames (H, W, 3), of red, green and blue.
+    """Follows targets through colour frames (T, H, W, 3), or any iterable of such frames (H, W, 3).
 
-    `boxes`: those of the targets in the first frame, as `ParticleTracker` takes them, px; or {frame: {id: box}} for targets that start later, frames counted from 0. Options are those of `ParticleTracker`.
-    `progress`: None is silent, True draws a line on standard error, a function is called with (done, total) frames, total 0 where it is not known. Ctrl-C stops between frames. `keep_frames`: whether steps keep their
-    frame, so that `foreground` and `segments` can be had: a frame's memory each. `keep_particles`: whether they keep the particles, 56 bytes each.
+    `boxes`: those of the targets in the first frame, as `ParticleTracker` takes them, px; or {frame: {id:
+    box}} for targets that start later, frames counted from 0. Options are those of `ParticleTracker`.
+    `progress`: None is silent, True draws a line on standard error, a function is called with (done, total)
+    frames, total 0 where it is not known. Ctrl-C stops between frames. `keep_frames`: whether steps keep
+    their frame, so that `foreground` and `segments` can be had: a frame's memory each. `keep_particles`:
+    whether they keep the particles, 56 bytes each.
 
     Raises
     ------

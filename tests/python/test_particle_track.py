@@ -1,4 +1,6 @@
-"""The particle tracker through Python: identities kept in a crossing, promises on random numbers, copies, odd frames and errors."""
+"""The particle tracker through Python: identities kept in a crossing, promises on random numbers, copies, odd
+frames and errors.
+"""
 
 import copy
 import pickle

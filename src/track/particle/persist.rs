@@ -1,6 +1,7 @@
 //! The tracker and its steps as bytes, from which they go on bit for bit.
 //!
-//! A mark, the number of the layout, the content and a checksum. What follows from the last frame (colour bins, the pyramid) is made again.
+//! A mark, the number of the layout, the content and a checksum. What follows from the last frame (colour
+//! bins, the pyramid) is made again.
 
 use super::corners::{Corners, Track};
 use super::options::{ParticleMode, ParticleOptions};
@@ -227,7 +228,8 @@ fn opened<T: DeserializeOwned>(mark: [u8; 4], bytes: &[u8]) -> Result<T> {
     postcard::from_bytes(&content[HEAD..]).map_err(|error| damaged(&error.to_string()))
 }
 
-/// FNV-1a of 64 bits (G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm"): any one changed byte changes it.
+/// FNV-1a of 64 bits (G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash
+/// Algorithm"): any one changed byte changes it.
 fn checksum(bytes: &[u8]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
