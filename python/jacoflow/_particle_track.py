@@ -144,7 +144,7 @@ def step_of(compiled: _ParticleStep) -> ParticleStep:
 
 
 class ParticleTracker:
-    """Follows targets that look alike, cross and hide each other, before a moving camera: a particle filter each.
+    """Follows targets that look alike, cross and hide each other before a moving camera: a filter for each.
 
     Source: K. Takechi, S. Fukui, Y. Iwahori, "Robust tracking by a particle filter with a probabilistic
     background model". A particle holds centre, velocity and size; it is weighed by colour (histograms of
