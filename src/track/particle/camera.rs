@@ -52,6 +52,12 @@ impl CameraMotion {
         [0, 1].map(|i| self.shift[i] + self.jacobian[i][0] * dx + self.jacobian[i][1] * dy)
     }
 
+    /// Where something at a place of the frame before is that moves relative to the background.
+    pub fn carry(&self, place: [f64; 2], velocity: [f64; 2]) -> [f64; 2] {
+        let c = self.at(place);
+        [0, 1].map(|i| place[i] + c[i] + velocity[i])
+    }
+
     /// By how much lengths grow: `exp(tr J / 2)`.
     pub fn growth(&self) -> f64 {
         (0.5 * (self.jacobian[0][0] + self.jacobian[1][1])).exp()
@@ -283,7 +289,10 @@ mod tests {
         let motion = fit_background(&points, &flow, None, &CounterRng::new(1)).motion;
         let at = motion.at([10.0, 5.0]);
         assert!((at[0] - 0.5).abs() < 1e-6 && at[1].abs() < 1e-6, "{motion:?}");
-        assert_eq!(fit_background(&vec![[3.0, 3.0]; 30], &flow, &CounterRng::new(1)).motion.at([3.0, 3.0])[0], 0.5);
+        assert_eq!(
+            fit_background(&vec![[3.0, 3.0]; 30], &flow, None, &CounterRng::new(1)).motion.at([3.0, 3.0])[0],
+            0.5
+        );
     }
 
     #[test]

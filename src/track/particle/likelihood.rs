@@ -7,16 +7,16 @@ use rayon::prelude::*;
 const OUTSIDE: f64 = -50.0;
 /// Particles that one task weighs: fixed, so that results do not depend on the number of threads.
 const TASK: usize = 256;
-/// Weight of the track likelihood, since neighbouring tracks are not independent.
+/// Weight of a track, since neighbouring tracks are not independent.
 const TRACK_GAIN: f64 = 0.2;
+/// Own tracks that say as much as any larger number of them: a box must not grow to hold more.
+const FULL_TRACKS: f64 = 20.0;
 /// Half sides of the part of a box whose tracks count, over its sides.
 const INNER: [f64; 2] = [0.45, 0.48];
 /// Standard deviation of a track's motion about its target's, px/frame in a picture of 480 rows.
 const TRACK_SIGMA: f64 = 1.2;
 /// Density of motions that belong to no target, 1/(px/frame)^2 in a picture of 480 rows.
 const CLUTTER_DENSITY: f64 = 0.012;
-/// Largest logarithm that one track gives.
-const MAX_TRACK_LOG: f64 = 2.0;
 /// What the foreground map is raised by, so that an empty region does not end a filter.
 const FOREGROUND_FLOOR: f64 = 1e-3;
 
@@ -80,15 +80,24 @@ pub(super) fn clutter_density(scale: f64) -> f64 {
     CLUTTER_DENSITY / (scale * scale)
 }
 
-/// Tracks in the box move with the particle:
-/// `0.2 sum_j { P_j min(log(1/2 + N(r_j; (u, v)) / (2 tau)), 2) - B_j }` over the tracks in the inner box.
+/// Tracks in the box move with the particle: `gain sum_j { P_j max(log(1/2 + N(r_j; (u, v)) / (2 tau)), 0) - B_j }` over the
+/// tracks in the inner box. A track that moves otherwise says nothing: it may be a swinging leg, and left outside the box it
+/// would be no better explained.
 #[derive(Debug, Clone)]
 pub(super) struct TrackFactor {
     pub evidence: Vec<TrackEvidence>,
     pub scale: f64,
+    /// Weight of the sum.
+    pub gain: f64,
 }
 
 impl TrackFactor {
+    /// The factor of some tracks, of which `own` belong to the target.
+    pub fn new(evidence: Vec<TrackEvidence>, own: usize, scale: f64) -> Self {
+        let gain = TRACK_GAIN * (FULL_TRACKS / (own as f64).max(FULL_TRACKS));
+        Self { evidence, scale, gain }
+    }
+
     fn log(&self, [x, y, u, v, w, h]: &Particle) -> f64 {
         let (across, down) = (INNER[0] * w, INNER[1] * h);
         let variance = (TRACK_SIGMA * self.scale).powi(2);
@@ -98,10 +107,10 @@ impl TrackFactor {
             if (track.position[0] - x).abs() < across && (track.position[1] - y).abs() < down {
                 let square = (track.residual[0] - u).powi(2) + (track.residual[1] - v).powi(2);
                 let ratio = 0.5 + peak * (-0.5 * square / variance).exp();
-                sum += track.probability * ratio.ln().min(MAX_TRACK_LOG) - track.penalty;
+                sum += track.probability * ratio.ln().max(0.0) - track.penalty;
             }
         }
-        TRACK_GAIN * sum
+        self.gain * sum
     }
 }
 
@@ -188,13 +197,14 @@ mod tests {
         let particle = [30.0, 40.0, 1.0, 0.5, 20.0, 40.0];
         let one = |position, residual| {
             let evidence = vec![TrackEvidence { position, residual, probability: 0.5, penalty: 0.1 }];
-            let factors = Factors { tracks: Some(TrackFactor { evidence, scale: 0.5 }), ..factors((100, 100)) };
+            let factors =
+                Factors { tracks: Some(TrackFactor { evidence, scale: 0.5, gain: 0.2 }), ..factors((100, 100)) };
             factors.log_likelihoods(&[particle])[0]
         };
         let ratio = motion_density([1.0, 0.5], [1.0, 0.5], 0.5) / clutter_density(0.5);
         let want = 0.2 * (0.5 * (0.5 + 0.5 * ratio).ln() - 0.1);
         assert!((one([33.0, 50.0], [1.0, 0.5]) - want).abs() < 1e-12);
-        assert!(one([33.0, 50.0], [4.0, 0.5]) < 0.0);
+        assert!((one([33.0, 50.0], [4.0, 0.5]) + 0.02).abs() < 1e-12);
         assert_eq!(one([39.5, 50.0], [1.0, 0.5]), 0.0);
     }
 }

@@ -97,8 +97,7 @@ impl Presence {
 
     /// The place where it was last clear, one frame on.
     pub fn moved_on(&self, camera: &CameraMotion) -> [f64; 2] {
-        let c = camera.at(self.clear_place);
-        [0, 1].map(|i| self.clear_place[i] + c[i] + self.velocity[i])
+        camera.carry(self.clear_place, self.velocity)
     }
 
     /// Compares a similarity with the usual one.

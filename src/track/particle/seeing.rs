@@ -87,9 +87,8 @@ pub(super) fn look(
 
 /// Where a target should be.
 fn predicted(target: &Target, camera: &CameraMotion) -> Seeing {
-    let (place, velocity) = (target.place(), target.velocity());
-    let c = camera.at(place);
-    let place = [0, 1].map(|i| place[i] + c[i] + velocity[i]);
+    let velocity = target.velocity();
+    let place = camera.carry(target.place(), velocity);
     let growth = camera.growth();
     Seeing {
         id: target.id,

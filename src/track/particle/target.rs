@@ -199,8 +199,8 @@ impl Target {
             DistanceFactor { other: place, square: distance(prediction, place).powi(2) }
         });
         let tracks = on.tracks.then(|| {
-            let evidence = Evidence { own, target: self, prediction, moment };
-            TrackFactor { evidence: track_evidence(&evidence), scale: moment.scale }
+            let evidence = track_evidence(&Evidence { own, target: self, prediction, moment });
+            TrackFactor::new(evidence, seeing.labelled, moment.scale)
         });
         let map = moment.foreground.and_then(|map| map.at(particles, prediction));
         Factors {

@@ -124,7 +124,7 @@ impl ParticleTracker {
         let at = self.targets.partition_point(|other| other.id < id);
         self.targets.insert(at, target);
         self.next_id = self.next_id.max(id.saturating_add(1));
-        self.tell_new(at);
+        self.insert_into_step(at);
         Ok(id)
     }
 
@@ -150,7 +150,7 @@ impl ParticleTracker {
     }
 
     /// Adds a new target, near nothing, to the step of the last frame.
-    fn tell_new(&mut self, at: usize) {
+    fn insert_into_step(&mut self, at: usize) {
         let new = report(self, &CameraMotion::NONE, &[], Occasion::Begin).targets.swap_remove(at);
         let (before, count) = (self.step.targets.len(), self.targets.len());
         let place = |k: usize| k - usize::from(k > at);
@@ -340,10 +340,9 @@ impl ParticleTracker {
             if !(is_alone && target.presence.learn(target.similarity, seeing.labelled, &target.estimate)) {
                 target.presence.clear_place = target.presence.moved_on(camera);
             }
-            let ahead = super::seeing::knob("AHEAD", 1.0);
-            let c = camera.at(target.place());
-            let p = [0, 1].map(|i| target.place()[i] + ahead * (c[i] + target.velocity()[i]));
-            target.is_out = !super::likelihood::is_inside(p, self.size);
+            // The particles stay inside: only where they are going shows that the target leaves.
+            let next = camera.carry(target.place(), target.velocity());
+            target.is_out = !super::likelihood::is_inside(next, self.size);
         }
         if !self.options.factors().tracks || was_cut {
             return;
