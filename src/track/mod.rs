@@ -16,4 +16,4 @@ pub use stereo::StereoTracker;
 pub use tracker::Tracker;
 
 /// Names of the methods; a new tracker is one folder and one name here.
-pub const METHODS: &[&str] = &["gradient", "stereo"];
+pub const METHODS: &[&str] = &["gradient", "stereo", "particle"];
