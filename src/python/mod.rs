@@ -56,11 +56,11 @@ mod _jacoflow {
     #[pymodule_export]
     use super::flow_filter::{FlowFilter, restore_filter};
     #[pymodule_export]
+    use super::frames::{FrameReader, open_frames, read_one_image, write_frames};
+    #[pymodule_export]
     use super::gauss_markov::PyGaussMarkovFilter;
     #[pymodule_export]
     use super::image::{luminance, quantise, smooth};
-    #[pymodule_export]
-    use super::frames::{FrameReader, open_frames, read_one_image, write_frames};
     #[pymodule_export]
     use super::io::{read_float_map, read_flow, write_float_map, write_flow};
     #[pymodule_export]
