@@ -30,7 +30,9 @@ impl TargetScene {
             for (line, row) in band.chunks_mut(width).zip(rows) {
                 let mut colours: Vec<[f64; 3]> =
                     (0..width).map(|column| self.world_colour(frame, column, row)).collect();
-                drawings.iter().for_each(|drawing| draw_row(drawing, row, &mut colours));
+                for drawing in &drawings {
+                    draw_row(drawing, row, &mut colours);
+                }
                 self.finish_row(frame, row, &mut colours);
                 for (pixel, colour) in line.iter_mut().zip(&colours) {
                     *pixel = colour.map(|level| level.round_ties_even().clamp(0.0, 255.0) as u8);

@@ -114,11 +114,6 @@ impl TargetScene {
         [0, 1].map(|axis| [right[axis] - origin[axis], down[axis] - origin[axis], origin[axis]])
     }
 
-    /// The camera's pose in a frame.
-    pub(super) fn pose(&self, frame: usize) -> Pose {
-        self.poses[frame]
-    }
-
     /// The picture of the targets.
     pub(super) fn sprite(&self) -> &Sprite {
         &self.sprite
