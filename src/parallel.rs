@@ -72,7 +72,8 @@ fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
 ///
 /// Nothing here may use rayon's global pool: it cannot be made anew in a forked process.
 fn pool(count: usize) -> Arc<rayon::ThreadPool> {
-    static POOLS: PerProcess<Mutex<Vec<(usize, Arc<rayon::ThreadPool>)>>> = PerProcess::new();
+    type Pools = Vec<(usize, Arc<rayon::ThreadPool>)>;
+    static POOLS: PerProcess<Mutex<Pools>> = PerProcess::new();
     let mut pools = POOLS.get().lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if let Some((_, pool)) = pools.iter().find(|(n, _)| *n == count) {
         return Arc::clone(pool);
