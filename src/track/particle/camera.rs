@@ -76,7 +76,7 @@ pub(super) fn fit_background(
     points: &[[f64; 2]],
     flow: &[[f64; 2]],
     known: Option<CameraMotion>,
-    rng: &CounterRng,
+    rng: CounterRng,
 ) -> Background {
     if points.len() < TRANSLATION_TRACKS {
         return Background { motion: known.unwrap_or(CameraMotion::NONE), probability: vec![1.0; points.len()] };
@@ -115,7 +115,7 @@ fn median_square(motion: &CameraMotion, points: &[[f64; 2]], flow: &[[f64; 2]], 
 }
 
 /// The map through three tracks that leaves the least median of squared residuals, or the translation.
-fn least_median(points: &[[f64; 2]], flow: &[[f64; 2]], translation: CameraMotion, rng: &CounterRng) -> CameraMotion {
+fn least_median(points: &[[f64; 2]], flow: &[[f64; 2]], translation: CameraMotion, rng: CounterRng) -> CameraMotion {
     let origin = translation.origin;
     let reach = points.iter().map(|p| (p[0] - origin[0]).hypot(p[1] - origin[1])).fold(0.0, f64::max);
     let mut squares = Vec::with_capacity(points.len());
@@ -138,7 +138,7 @@ fn through(places: [[f64; 2]; 3], flow: [[f64; 2]; 3], origin: [f64; 2], reach: 
     let [p, q, r] = places;
     let (a, b) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
     let determinant = a[0] * b[1] - a[1] * b[0];
-    if !(determinant.abs() >= MIN_DETERMINANT) {
+    if determinant.is_nan() || determinant.abs() < MIN_DETERMINANT {
         return None;
     }
     let row = |i: usize| {
@@ -194,7 +194,7 @@ impl Model {
     /// `affine`: whether the motion is affine or a translation; `None`: it stays.
     fn maximise(&mut self, points: &[[f64; 2]], flow: &[[f64; 2]], affine: Option<bool>) {
         let total: f64 = self.probability.iter().sum();
-        if !(total > 0.0) {
+        if total.is_nan() || total <= 0.0 {
             return;
         }
         self.share = (total / points.len() as f64).clamp(SHARE[0], SHARE[1]);
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn zoom_and_roll_are_found_among_outliers() {
         let (points, flow, truth) = tracks(300, 0.05);
-        let found = fit_background(&points, &flow, None, &CounterRng::new(1));
+        let found = fit_background(&points, &flow, None, CounterRng::new(1));
         for place in [[0.0, 0.0], [360.0, 0.0], [180.0, 240.0]] {
             let (got, want) = (found.motion.at(place), truth.at(place));
             assert!((got[0] - want[0]).hypot(got[1] - want[1]) < 0.05, "{got:?} {want:?}");
@@ -276,21 +276,21 @@ mod tests {
     fn few_tracks_give_a_translation_and_fewer_none() {
         let points = [[0.0, 0.0], [10.0, 0.0], [0.0, 10.0], [10.0, 10.0]];
         let flow = [[1.0, 2.0]; 4];
-        let found = fit_background(&points, &flow, None, &CounterRng::new(1));
+        let found = fit_background(&points, &flow, None, CounterRng::new(1));
         assert!((found.motion.shift[0] - 1.0).abs() < 1e-12 && found.motion.jacobian == [[0.0; 2]; 2]);
-        assert_eq!(fit_background(&points[..2], &flow[..2], None, &CounterRng::new(1)).motion, CameraMotion::NONE);
-        assert_eq!(fit_background(&[], &[], None, &CounterRng::new(1)).probability, [0.0; 0]);
+        assert_eq!(fit_background(&points[..2], &flow[..2], None, CounterRng::new(1)).motion, CameraMotion::NONE);
+        assert_eq!(fit_background(&[], &[], None, CounterRng::new(1)).probability, [0.0; 0]);
     }
 
     #[test]
     fn collinear_tracks_give_a_finite_motion() {
         let points: Vec<[f64; 2]> = (0..30).map(|k| [f64::from(k), 5.0]).collect();
         let flow = vec![[0.5, 0.0]; 30];
-        let motion = fit_background(&points, &flow, None, &CounterRng::new(1)).motion;
+        let motion = fit_background(&points, &flow, None, CounterRng::new(1)).motion;
         let at = motion.at([10.0, 5.0]);
         assert!((at[0] - 0.5).abs() < 1e-6 && at[1].abs() < 1e-6, "{motion:?}");
         assert_eq!(
-            fit_background(&vec![[3.0, 3.0]; 30], &flow, None, &CounterRng::new(1)).motion.at([3.0, 3.0])[0],
+            fit_background(&vec![[3.0, 3.0]; 30], &flow, None, CounterRng::new(1)).motion.at([3.0, 3.0])[0],
             0.5
         );
     }

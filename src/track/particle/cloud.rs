@@ -1,7 +1,7 @@
 //! The particles of one target: centre x, y (px), velocity u, v (px/frame), width, height (px), with their weights.
 
 use super::camera::CameraMotion;
-use super::options::{Noise, ParticleMode};
+use super::options::Noise;
 use crate::filter::particle::{Resampling, effective_sample_size, normalise_log_weights};
 use crate::math::random::CounterRng;
 
@@ -47,7 +47,7 @@ pub(super) struct Start {
 
 impl Cloud {
     /// A cloud about a mean, with the start's spread.
-    pub fn begin(start: &Start, count: usize, rng: &CounterRng) -> Self {
+    pub fn begin(start: &Start, count: usize, rng: CounterRng) -> Self {
         let Start { mean: [x, y, u, v, w, h], noise, scale } = *start;
         let particle = |i: usize| {
             let z = |component: usize| rng.normal((i * COMPONENTS + component) as u64);
@@ -71,19 +71,19 @@ impl Cloud {
     }
 
     /// Draws `count` particles by their weights, if the effective sample size is below a share of them or their number changes.
-    pub fn select(&mut self, scheme: Resampling, threshold: f64, count: usize, rng: &CounterRng) {
+    pub fn select(&mut self, scheme: Resampling, threshold: f64, count: usize, rng: CounterRng) {
         let enough = self.effective_sample_size() >= threshold * self.weights.len() as f64;
         if enough && threshold < 1.0 && count == self.weights.len() {
             return;
         }
         let mut indices = Vec::with_capacity(count);
-        scheme.indices(&self.weights, count, rng, &mut indices);
+        scheme.indices(&self.weights, count, &rng, &mut indices);
         self.particles = indices.iter().map(|&i| self.particles[i]).collect();
         self.weights = vec![1.0 / count as f64; count];
     }
 
     /// Moves every particle on: with the camera, by its velocity, and by noise (equations (1) and (2) of the paper).
-    pub fn predict(&mut self, camera: &CameraMotion, noise: &Noise, first_size: [f64; 2], rng: &CounterRng) {
+    pub fn predict(&mut self, camera: &CameraMotion, noise: &Noise, first_size: [f64; 2], rng: CounterRng) {
         let growth = camera.growth();
         for (i, particle) in self.particles.iter_mut().enumerate() {
             let z = |component: usize| rng.normal((i * COMPONENTS + component) as u64);
@@ -176,12 +176,13 @@ fn size_steps(noise: &Noise, first: f64, second: f64) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::options::ParticleMode;
     use super::*;
 
     fn cloud(count: usize) -> Cloud {
         let start =
             Start { mean: [50.0, 40.0, 1.0, -0.5, 20.0, 44.0], noise: Noise::of(ParticleMode::Paper, 0.5), scale: 0.5 };
-        Cloud::begin(&start, count, &stream(1, 7, 0, Purpose::Start))
+        Cloud::begin(&start, count, stream(1, 7, 0, Purpose::Start))
     }
 
     #[test]
@@ -200,7 +201,7 @@ mod tests {
         let camera = CameraMotion { origin: [0.0; 2], shift: [2.0, 1.0], jacobian: [[0.1, 0.0], [0.0, 0.1]] };
         let still = Noise { position: 0.0, velocity: 0.0, size: 0.0, aspect: None };
         let mut one = Cloud { particles: vec![[10.0, 20.0, 3.0, 4.0, 8.0, 400.0]], weights: vec![1.0] };
-        one.predict(&camera, &still, [8.0, 90.0], &stream(0, 0, 1, Purpose::Transition));
+        one.predict(&camera, &still, [8.0, 90.0], stream(0, 0, 1, Purpose::Transition));
         let [x, y, u, v, w, h] = one.particles[0];
         assert!((x - 16.0).abs() < 1e-12 && (y - 27.0).abs() < 1e-12 && (u, v) == (3.0, 4.0));
         assert!((w - 8.0 * 0.1f64.exp()).abs() < 1e-12 && h == 360.0);
@@ -216,7 +217,7 @@ mod tests {
         one[3] = -1e4;
         assert!(cloud.weigh(&one));
         assert_eq!((cloud.weights[3], cloud.effective_sample_size()), (1.0, 1.0));
-        cloud.select(Resampling::Systematic, 1.0, 5, &stream(0, 0, 0, Purpose::Selection));
+        cloud.select(Resampling::Systematic, 1.0, 5, stream(0, 0, 0, Purpose::Selection));
         assert!(cloud.particles.iter().all(|particle| *particle == before.particles[3]) && cloud.weights == [0.2; 5]);
     }
 }

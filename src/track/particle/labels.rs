@@ -48,7 +48,7 @@ pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
             }
         }
         let left: Vec<usize> = mine.into_iter().filter(|&j| tracks[j].owner.is_some()).collect();
-        let Some(middle) = median_residual(left.iter().map(|&j| &tracks[j])) else { continue };
+        let Some(middle) = median_residual(&left.iter().map(|&j| &tracks[j]).collect::<Vec<_>>()) else { continue };
         for j in left {
             let track = &tracks[j];
             let doubtful = track.foreground < DOUBTFUL;
@@ -81,8 +81,8 @@ fn follows_other(track: &Track, own: &Labelled, targets: &[Labelled], scale: f64
 }
 
 /// Middle motion of some tracks relative to the background, px/frame.
-pub(super) fn median_residual<'a>(tracks: impl Iterator<Item = &'a Track> + Clone) -> Option<[f64; 2]> {
-    let along = |i: usize| median(&mut tracks.clone().filter_map(|track| Some(track.residual?[i])).collect::<Vec<_>>());
+pub(super) fn median_residual(tracks: &[&Track]) -> Option<[f64; 2]> {
+    let along = |i: usize| median(&mut tracks.iter().filter_map(|track| Some(track.residual?[i])).collect::<Vec<_>>());
     Some([along(0)?, along(1)?])
 }
 

@@ -70,6 +70,7 @@ impl ForegroundModel {
 
 /// The factors of a particle's likelihood, each of which can be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[allow(clippy::struct_excessive_bools, reason = "a set of factors")]
 pub struct Likelihoods {
     /// Histograms of hue and saturation in bands.
     pub colour: bool,

@@ -49,7 +49,7 @@ pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Optio
     if (group.len() as f64) < MIN_GROUP.0.max(MIN_GROUP.1 * target.presence.tracks) {
         return None;
     }
-    let velocity = median_residual(group.iter().copied())?;
+    let velocity = median_residual(&group)?;
     let middle = [0, 1].map(|i| group.iter().map(|track| track.position[i]).sum::<f64>() / group.len() as f64);
     if belongs_to_other(middle, velocity, own, moment) {
         return None;

@@ -61,7 +61,7 @@ impl Target {
         let scale = options.length_scale(bins.height());
         let [x, y, w, h] = bounds;
         let start = Start { mean: [x, y, 0.0, 0.0, w, h], noise: Noise::of(options.mode, scale), scale };
-        let cloud = Cloud::begin(&start, options.n_particles, &stream(options.seed, id, frame, Purpose::Start));
+        let cloud = Cloud::begin(&start, options.n_particles, stream(options.seed, id, frame, Purpose::Start));
         Self {
             id,
             first_size: [w, h],
@@ -100,12 +100,12 @@ impl Target {
         let rng = |purpose| stream(moment.options.seed, id, moment.frame, purpose);
         let (selection, transition) = (rng(Purpose::Selection), rng(Purpose::Transition));
         let count = if seeing.near.is_empty() { moment.options.n_particles } else { moment.options.n_near };
-        self.cloud.select(moment.options.resampling, moment.options.ess_threshold, count, &selection);
+        self.cloud.select(moment.options.resampling, moment.options.ess_threshold, count, selection);
         if self.is_new && moment.factors.tracks {
-            self.quick_start(moment.tracks, &rng(Purpose::QuickStart));
+            self.quick_start(moment.tracks, rng(Purpose::QuickStart));
         }
         let noise = Noise::of(moment.options.mode, moment.scale).times(self.presence.noise());
-        self.cloud.predict(&moment.camera, &noise, self.first_size, &transition);
+        self.cloud.predict(&moment.camera, &noise, self.first_size, transition);
         let mut prediction = seeing.place;
         if seeing.entered_low {
             prediction = self.return_to_clear_place(moment);
@@ -114,7 +114,7 @@ impl Target {
             let [_, _, w, h] = seeing.bounds;
             let mean = [place[0], place[1], velocity[0], velocity[1], w, h];
             let start = Start { mean, noise: Noise::of(moment.options.mode, moment.scale), scale: moment.scale };
-            self.cloud = Cloud::begin(&start, count, &rng(Purpose::Start));
+            self.cloud = Cloud::begin(&start, count, rng(Purpose::Start));
             self.presence.hidden = 0;
             self.estimate = mean;
             prediction = place;
@@ -131,14 +131,14 @@ impl Target {
     /// The frame shows nothing: particles move on without being weighed.
     pub fn coast(&mut self, options: &ParticleOptions, scale: f64, frame: usize) {
         let rng = stream(options.seed, self.id, frame, Purpose::Transition);
-        self.cloud.predict(&CameraMotion::NONE, &Noise::of(options.mode, scale), self.first_size, &rng);
+        self.cloud.predict(&CameraMotion::NONE, &Noise::of(options.mode, scale), self.first_size, rng);
         self.estimate = self.cloud.mean();
         self.effective_sample_size = self.cloud.effective_sample_size();
         self.degenerate = false;
     }
 
     /// Half of the particles take the motion of a track in the box, drawn by its probability of not being background.
-    fn quick_start(&mut self, tracks: &[Track], rng: &CounterRng) {
+    fn quick_start(&mut self, tracks: &[Track], rng: CounterRng) {
         let bounds = self.bounds();
         let inside = |track: &&Track| {
             track.foreground > QUICK_START.1 && super::geometry::holds(bounds, track.previous(), 1.0, 0.0)

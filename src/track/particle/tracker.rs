@@ -299,7 +299,7 @@ impl ParticleTracker {
             (CameraMotion::NONE, background.foreground, relative)
         } else {
             let rng = CounterRng::new(self.options.seed).stream(CAMERA_STREAM).stream(self.frame as u64);
-            let background = fit_background(&points, &flow, known, &rng);
+            let background = fit_background(&points, &flow, known, rng);
             let foreground = background.probability.iter().map(|q| 1.0 - q).collect();
             let rides = self.options.mode == ParticleMode::Improved || known.is_some();
             (if rides { background.motion } else { CameraMotion::NONE }, foreground, background.motion)
