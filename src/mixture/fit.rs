@@ -51,7 +51,7 @@ impl Fit {
 /// Fits a mixture to weighted points. Precision: `f64`. The result does not depend on the number of threads, nor, from seeds, on the order of the points, but for rounding.
 ///
 /// # Errors
-/// [`Error::Argument`] naming an option, the points (`X`), their weights (`sample_weight`), the responsibilities (`resp`) or components (`start`) that cannot be used.
+/// [`Error::Argument`](crate::error::Error::Argument) naming an option, the points (`X`), their weights (`sample_weight`), the responsibilities (`resp`) or components (`start`) that cannot be used.
 pub fn fit(points: &Points, options: &MixtureOptions, start: Start) -> Result<Fit> {
     options.check()?;
     points.check()?;
