@@ -1,4 +1,4 @@
-//! Optical flow together with its Jacobian, and how far each number can be trusted.
+//! Optical flow together with its Jacobian and the uncertainty of both.
 //!
 //! From recorded or live image sequences: the flow `(u, v)`, its four spatial derivatives and their covariance, filtered over time.
 //!

@@ -1,4 +1,4 @@
-"""Optical flow together with its Jacobian, and how far each number can be trusted.
+"""Optical flow together with its Jacobian and the uncertainty of both.
 
 Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow (u, v) is in px/frame along (x, y); the Jacobian
 is [[u_x, u_y], [v_x, v_y]] in 1/frame.

@@ -29,7 +29,7 @@ use clap::Parser;
 use command::Command;
 use std::ffi::OsString;
 
-/// Optical flow together with its Jacobian, and how far each number can be trusted.
+/// Optical flow together with its Jacobian and the uncertainty of both.
 #[derive(Debug, Parser)]
 #[command(name = "jacoflow", version, propagate_version = true, max_term_width = 110)]
 #[command(
