@@ -32,7 +32,7 @@ HARD_SCENES = ("slow_cross", "stop_and_go", "pillar")
 PAPER, IMPROVED = ("colour", "velocity", "distance", "foreground"), ("colour", "velocity", "tracks")
 """Factors of the likelihood in each mode."""
 RECORDINGS, RUNS, SEEDS = (10, 11), 3, (0, 1, 2)
-"""Seeds of the scenes and runs of the tracker on them, and its seeds on recordings, unless others are asked for."""
+"""Seeds of the scenes and runs of the tracker on them, and its seeds on recordings, by default."""
 IMPROVED_MODE, PAPER_MODE = Settings("improved mode", "improved"), Settings("paper mode", "paper")
 
 
@@ -155,7 +155,7 @@ def sections(
 
 
 def main() -> None:
-    """Prints the tables; writes them into a folder if asked."""
+    """Prints the tables; writes them into a folder if one is given."""
     import compare
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

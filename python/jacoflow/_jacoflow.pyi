@@ -1082,12 +1082,14 @@ class Scene:
 
 @final
 class TargetScene:
-    """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with exact boxes.
+    """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
+    exact boxes.
 
-    `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and noise. `scale` multiplies all lengths; at 1 a
-    frame has 720 x 480 px. `noise` is the standard deviation of the white noise of each channel, grey levels. `frames` is their number, by default that
-    of the scene; zoom and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red is multiplied by 1 - r,
-    blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
+    `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and
+    noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
+    the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
+    and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
+    is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
     """
     def __new__(
         cls,
@@ -1116,17 +1118,20 @@ class TargetScene:
     def frame(self, /, t: int, *, targets: Sequence[int] | None = None) -> NDArray[np.uint8]:
         """Frame `t`: uint8 array (H, W, 3), red, green and blue.
 
-        With `targets`, indices, only those are drawn; world, post and noise are the same, so that the difference shows the pixels of the others.
+        With `targets`, indices, only those are drawn; world, post and noise are the same, so that the
+        difference shows the pixels of the others.
         """
     def frames(self, /) -> NDArray[np.uint8]:
         """All frames: uint8 array (T, H, W, 3), red, green and blue."""
     def boxes(self, /) -> NDArray[np.float64]:
-        """Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px, whether the target is seen or not.
+        """Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px,
+        whether the target is seen or not.
 
-        Pixel centres lie at integers; the centre is left + width / 2, top + height / 2. Arms, legs and a car on a slope reach a little over it.
+        Pixel centres lie at integers; the centre is left + width / 2, top + height / 2. Arms, legs and a car
+        on a slope reach a little over it.
         """
     def camera_motion(self, /) -> NDArray[np.float64]:
-        """Where the camera's motion takes the still world from each frame to the next: float64 array (T - 1, 2, 3).
+        """Motion of the still world from each frame to the next: float64 array (T - 1, 2, 3).
 
         What is at (x, y) px in frame t is at `motion[t] @ (x, y, 1)` px in frame t + 1.
         """
@@ -1162,7 +1167,9 @@ class Sensor:
 
 @final
 class FrameReader:
-    """Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from whatever `jacoflow.io.frames` was given; memory stays bounded. Samples keep the file's dtype and grey levels."""
+    """Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from the source of
+    `jacoflow.io.frames`; memory stays bounded. Samples keep the file's dtype and grey levels.
+    """
     def __iter__(self, /) -> FrameReader: ...
     def __next__(self, /) -> NDArray[Any]: ...
     def __length_hint__(self, /) -> int: ...
@@ -1230,7 +1237,9 @@ class _ParticleTracker:
         cls, frame: NDArray[Any], boxes: list[tuple[int, list[float]]], options: dict[str, Any]
     ) -> _ParticleTracker: ...
     def update(self, /, frame: NDArray[Any], camera: list[list[float]] | None) -> _ParticleStep:
-        """The targets in the next frame; `camera`: the background's motion since the one before, where it is known."""
+        """The targets in the next frame; `camera`: the background's motion since the one before, where it is
+        known.
+        """
     def add(self, /, bounds: list[float], id: int | None) -> int:
         """Adds a target at the last frame; returns its number."""
     def remove(self, /, id: int) -> None:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ParticleCorners:
-    """The N corners that a frame was judged by: those followed from the frame before; lengths in px."""
+    """The N corners that were followed from the frame before; lengths in px."""
 
     ids: NDArray[np.int64]
     """Their numbers, (N,), no unit: a corner keeps its number as long as it is followed."""
@@ -41,7 +41,7 @@ class ParticleStep:
 
     It stays what it is when the tracker goes on, and pickles. For that it holds the particles (56 bytes each)
     and shares with the tracker one copy of the frame, from which `foreground` and `segments` are made when
-    they are first asked for; `without` drops them.
+    they are first used; `without` drops them.
     """
 
     frame: int
@@ -79,7 +79,7 @@ class ParticleStep:
     identity in paper mode.
     """
     tracks: ParticleCorners
-    """The corners that the frame was judged by; none in the first frame; lengths in px."""
+    """The corners followed from the frame before; none in the first frame; lengths in px."""
     _compiled: _ParticleStep = field(repr=False)
 
     def __len__(self) -> int:
@@ -99,7 +99,7 @@ class ParticleStep:
         Raises
         ------
         ValueError
-            For an `id` that is not there, and a step that was told not to keep its particles.
+            For an `id` that is not there, and for a step that does not keep its particles.
         """
         found = self._compiled.particles(checked_id(id))
         if found is None:
@@ -108,10 +108,10 @@ class ParticleStep:
 
     @cached_property
     def foreground(self) -> NDArray[np.float32]:
-        """What is not background, (H, W), 0 to 1, no unit: density of the corners that do not move with it,
-        averaged over the segments, over its maximum; 0 where there are none, as in the first frame.
+        """What is not background, (H, W), 0 to 1, no unit. Density of the corners that do not move with the
+        background, averaged over the segments, divided by its maximum; 0 without such corners.
 
-        ValueError for a step that was told not to keep its frame.
+        ValueError for a step that does not keep its frame.
         """
         return self._of_frame(self._compiled.foreground)
 
@@ -139,8 +139,8 @@ class ParticleStep:
 
 def step_of(compiled: _ParticleStep) -> ParticleStep:
     """A step, in px and frames, of its compiled part."""
-    told = compiled.told()
-    return ParticleStep(tracks=ParticleCorners(**told.pop("tracks")), _compiled=compiled, **told)
+    fields = compiled.told()
+    return ParticleStep(tracks=ParticleCorners(**fields.pop("tracks")), _compiled=compiled, **fields)
 
 
 class ParticleTracker:

@@ -165,7 +165,7 @@ def track_particles(
     last_start = max(starts, default=0)
     if total and last_start >= total:
         raise ValueError(f"boxes: expected frames from 0 to {total - 1}, got {last_start}")
-    tell = _reporter(progress)
+    report = _reporter(progress)
     steps: list[ParticleStep] = []
     tracker: ParticleTracker | None = None
     for t, frame in enumerate(_iterator(frames)):
@@ -179,11 +179,11 @@ def track_particles(
                 tracker.add(box, number)
             step = tracker.step if begin else step
         steps.append(step.without(frame=not keep_frames, particles=not keep_particles))
-        tell(len(steps), total)
+        report(len(steps), total)
     if not steps:
         raise ValueError("frames: expected at least one frame, got none")
     if not total:
-        tell(len(steps), len(steps))
+        report(len(steps), len(steps))
     if last_start >= len(steps):
         warnings.warn(f"boxes: a target starts at frame {last_start}, but there are {len(steps)} frames", UserWarning, stacklevel=2)
     return ParticleTracks(tuple(steps))

@@ -26,7 +26,7 @@ pub struct TargetRecording<'a> {
     pub rate: f64,
     /// Whether files that exist are replaced.
     pub force: bool,
-    /// Whether nothing is told of the work.
+    /// Whether progress and summary are suppressed.
     pub quiet: bool,
 }
 

@@ -110,8 +110,8 @@ impl Source {
     }
 }
 
-/// Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from whatever `jacoflow.io.frames` was
-/// given; memory stays bounded. Samples keep the file's dtype and grey levels.
+/// Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from the source of
+/// `jacoflow.io.frames`; memory stays bounded. Samples keep the file's dtype and grey levels.
 #[pyclass(module = "jacoflow.io", frozen)]
 pub struct FrameReader {
     spec: String,

@@ -1,4 +1,5 @@
-//! The particle tracker for Python: colour frames in, plain values out; the classes a user meets are in `jacoflow.track`.
+//! The particle tracker for Python: colour frames in, plain values out; the classes a user meets are in
+//! `jacoflow.track`.
 
 mod options;
 mod step;
@@ -34,7 +35,7 @@ impl PyParticleTracker {
 
 #[pymethods]
 impl PyParticleTracker {
-    /// From the first frame, the targets' numbers with their boxes (left, top, width, height), and the options.
+    /// Begins with the first frame, the targets' numbers and boxes (left, top, width, height), and options.
     #[new]
     fn new(frame: &Bound<'_, PyAny>, boxes: Vec<(u64, [f64; 4])>, options: &Bound<'_, PyDict>) -> PyResult<Self> {
         let (options, takes_grey) = options.extract::<Given>()?.options()?;
@@ -45,7 +46,8 @@ impl PyParticleTracker {
         Ok(Self { tracker: Mutex::new(tracker), takes_grey })
     }
 
-    /// The targets in the next frame; `camera`: the background's motion since the one before, where it is known.
+    /// The targets in the next frame; `camera`: the background's motion since the one before, where it is
+    /// known.
     fn update(&self, frame: &Bound<'_, PyAny>, camera: Option<[[f64; 3]; 2]>) -> PyResult<PyParticleStep> {
         let py = frame.py();
         let frame = coloured(frame, self.takes_grey)?;

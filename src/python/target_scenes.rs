@@ -10,12 +10,14 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with exact boxes.
+/// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
+/// exact boxes.
 ///
-/// `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and noise. `scale` multiplies all lengths; at 1 a
-/// frame has 720 x 480 px. `noise` is the standard deviation of the white noise of each channel, grey levels. `frames` is their number, by default that
-/// of the scene; zoom and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red is multiplied by 1 - r,
-/// blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
+/// `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and
+/// noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
+/// the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
+/// and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
+/// is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct TargetScene {
     core: CoreScene,
@@ -95,7 +97,8 @@ impl TargetScene {
 
     /// Frame `t`: uint8 array (H, W, 3), red, green and blue.
     ///
-    /// With `targets`, indices, only those are drawn; world, post and noise are the same, so that the difference shows the pixels of the others.
+    /// With `targets`, indices, only those are drawn; world, post and noise are the same, so that the
+    /// difference shows the pixels of the others.
     #[pyo3(signature = (t, *, targets=None))]
     fn frame<'py>(&self, py: Python<'py>, t: Integer, targets: Option<Vec<Integer>>) -> PyResult<Bound<'py, PyAny>> {
         let (t, drawn, threads) = (self.index(t)?, self.drawn(targets)?, Threads::new(None)?);
@@ -122,9 +125,11 @@ impl TargetScene {
         Ok(arrays::owned(py, &[count, height, width, 3], data)?.into_any())
     }
 
-    /// Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px, whether the target is seen or not.
+    /// Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px,
+    /// whether the target is seen or not.
     ///
-    /// Pixel centres lie at integers; the centre is left + width / 2, top + height / 2. Arms, legs and a car on a slope reach a little over it.
+    /// Pixel centres lie at integers; the centre is left + width / 2, top + height / 2. Arms, legs and a car
+    /// on a slope reach a little over it.
     fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (frames, targets) = (self.core.frame_count(), self.core.target_count());
         let boxes = (0..frames).flat_map(|t| (0..targets).map(move |k| self.core.target_box(t, k)));
@@ -132,7 +137,7 @@ impl TargetScene {
         Ok(arrays::owned::<f64>(py, &[frames, targets, 4], values)?.into_any())
     }
 
-    /// Where the camera's motion takes the still world from each frame to the next: float64 array (T - 1, 2, 3).
+    /// Motion of the still world from each frame to the next: float64 array (T - 1, 2, 3).
     ///
     /// What is at (x, y) px in frame t is at `motion[t] @ (x, y, 1)` px in frame t + 1.
     fn camera_motion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -59,7 +59,7 @@ def test_a_nearer_target_covers_a_farther_one():
 
 
 def test_targets_have_one_palette():
-    """Joint histograms of hue and saturation of both boxes agree: colour does not tell the targets apart."""
+    """Joint histograms of hue and saturation of both boxes agree: colour does not distinguish the targets."""
     scene = scenes.TargetScene("people_static", noise=0.0)
     shares = []
     for target in (0, 1):

@@ -8,7 +8,7 @@
 //! log-sum-exp. Arrays are row-major with a leading batch axis: `x` is `(B, N, n)`, `log_weights` `(B, N)`.
 //!
 //! Random numbers are addressed by (seed, target, step, particle, component): results are bit-identical for
-//! any number of threads, and a batch entry has the same particles whatever the other entries are.
+//! any number of threads, and a batch entry has the same particles for any other entries.
 //!
 //! ```
 //! use jacoflow::filter::particle::{ParticleFilter, Resampling};

@@ -102,7 +102,7 @@ impl ParticleRun {
 
     /// Works through `source` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// `progress` is called with the number of frames read, at least once a frame and while waiting for one; its
     /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
@@ -118,7 +118,7 @@ impl ParticleRun {
         let start = Instant::now();
         let worked = self.work(source, begin, progress);
         let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        // Every sink is ended even when an earlier one fails; the first error is returned.
         let mut result = worked;
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending));

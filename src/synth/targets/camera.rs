@@ -71,7 +71,7 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// The angle by which upright things of the world are turned in the window, rad, from x towards y.
+    /// The angle by which upright objects of the world are turned in the window, rad, from x towards y.
     pub(super) fn angle(&self) -> f64 {
         -self.sin.atan2(self.cos)
     }

@@ -1,8 +1,10 @@
-//! Colour scenes with targets that look alike, cross and hide each other before a moving camera, with exact boxes.
+//! Colour scenes with targets that look alike, cross and hide each other before a moving camera, with exact
+//! boxes.
 //!
-//! People and cars drawn from signed distances move over a textured world, which a camera that pans, shakes, rolls and zooms looks at. All targets of a
-//! scene share one texture, and rectangles of the world have their colours: neither colour nor texture alone tells them apart. Lengths are those of a
-//! window of 720 x 480 px and are multiplied by the scale of [`TargetSceneOptions`].
+//! People and cars drawn from signed distances move over a textured world, which a camera that pans, shakes,
+//! rolls and zooms looks at. All targets of a scene share one texture, and rectangles of the world have their
+//! colours: neither colour nor texture alone distinguishes them. Lengths are those of a window of 720 x 480
+//! px and are multiplied by the scale of [`TargetSceneOptions`].
 //!
 //! ```
 //! use jacoflow::synth::targets::{TargetScene, TargetSceneOptions};

@@ -30,7 +30,8 @@ enum Stream {
     Noise = 5,
 }
 
-/// A scene of targets that look alike, with exact boxes. Frame t is the same however many frames are rendered, in any order and on any number of threads.
+/// A scene of targets that look alike, with exact boxes. Frame t is the same however many frames are
+/// rendered, in any order and on any number of threads.
 #[derive(Debug, Clone)]
 pub struct TargetScene {
     pub(super) kind: &'static TargetSceneKind,
@@ -100,14 +101,15 @@ impl TargetScene {
         &self.order
     }
 
-    /// The exact box of a target in a frame: its nominal size about its centre, whether it is seen or not, px.
+    /// The exact box of a target in a frame: its nominal size about its centre, whether it is seen or not,
+    /// px.
     pub fn target_box(&self, frame: usize, target: usize) -> TargetBox {
         let Stance { centre, size: [width, height], .. } = self.stance(frame, target);
         TargetBox::about(centre, width, height)
     }
 
-    /// Where the camera's motion takes the still world from a frame to the next: `[[a, b, c], [d, e, f]]`, so that what is at (x, y) px is then at
-    /// `(a x + b y + c, d x + e y + f)`.
+    /// Motion of the still world in the picture from a frame to the next: `[[a, b, c], [d, e, f]]`. A point
+    /// at (x, y) px is then at `(a x + b y + c, d x + e y + f)`.
     pub fn camera_motion(&self, frame: usize) -> [[f64; 3]; 2] {
         let next = |x: f64, y: f64| self.window_place(frame + 1, self.world_place(frame, [x, y]));
         let (origin, right, down) = (next(0.0, 0.0), next(1.0, 0.0), next(0.0, 1.0));

@@ -74,7 +74,8 @@ fn the_silhouette_is_centred_in_the_box() {
 
 #[test]
 fn targets_of_a_scene_share_their_texture() {
-    // The second is a little larger and mirrored; without gait and at one size both would be the same picture.
+    // The second is a little larger and mirrored; without gait and at one size both would be the same
+    // picture.
     let scene = scene("cars_handheld", options());
     let look = |target: usize| -> Vec<[u8; 3]> {
         let (frame, bounds) = (scene.frame_with(20, |k| k == target), scene.target_box(20, target));

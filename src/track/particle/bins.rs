@@ -18,7 +18,7 @@ const MIN_VALUE: f32 = 51.0;
 /// White, grey levels.
 const WHITE: f32 = 255.0;
 
-/// The bin of each pixel of a frame in grey levels 0 to 255; `values`: pixels without hue go to bins of value.
+/// The bin of each pixel of a frame in grey levels 0 to 255. `values`: pixels without hue have bins of value.
 ///
 /// `floor(10 hue) 10 + floor(10 saturation)`, each at most 9, with hue 0 for grey and saturation 0 for black.
 pub(super) fn colour_bins(frame: &ColourFrame<f32>, values: bool) -> Frame<u8> {

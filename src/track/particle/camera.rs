@@ -71,7 +71,8 @@ pub(super) struct Background {
     pub probability: Vec<f64>,
 }
 
-/// Fits the background to the flow of tracks at `points` (places in the frame before), px. `known`: its motion is not estimated.
+/// Fits the background's motion to the flow of tracks at `points`, their positions in the frame before, px.
+/// A `known` motion is not estimated.
 pub(super) fn fit_background(
     points: &[[f64; 2]],
     flow: &[[f64; 2]],
@@ -243,7 +244,8 @@ fn weighted_affine(points: &[[f64; 2]], flow: &[[f64; 2]], weights: &[f64], orig
 mod tests {
     use super::*;
 
-    /// Tracks on a background that zooms, rolls and shifts; every fourth is on something that moves by itself.
+    /// Tracks on a background that zooms, rolls and shifts; every fourth is on something that moves by
+    /// itself.
     fn tracks(count: usize, noise: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>, CameraMotion) {
         let rng = CounterRng::new(3);
         let truth = CameraMotion { origin: [0.0; 2], shift: [2.0, -1.0], jacobian: [[0.004, -0.003], [0.003, 0.004]] };

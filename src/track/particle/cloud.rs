@@ -1,4 +1,4 @@
-//! The particles of one target: centre x, y (px), velocity u, v (px/frame), width, height (px), with their weights.
+//! Weighted particles of one target: centre x, y (px), velocity u, v (px/frame), width, height (px).
 
 use super::camera::CameraMotion;
 use super::options::Noise;
@@ -15,7 +15,7 @@ const SIZE_RANGE: [f64; 2] = [0.25, 4.0];
 /// Centre, velocity and size.
 pub(super) type Particle = [f64; COMPONENTS];
 
-/// Independent random numbers of one target at one frame, by what they are for.
+/// Purposes of random numbers: independent streams of one target at one frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Purpose {
     Start,
@@ -36,7 +36,7 @@ pub(super) struct Cloud {
     pub weights: Vec<f64>,
 }
 
-/// What a cloud is begun about.
+/// Mean and noise of a cloud's first particles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
     pub mean: Particle,
@@ -70,7 +70,8 @@ impl Cloud {
         effective_sample_size(&self.weights)
     }
 
-    /// Draws `count` particles by their weights, if the effective sample size is below a share of them or their number changes.
+    /// Resamples to `count` particles if the effective sample size is below `threshold` times their number,
+    /// or if the number changes.
     pub fn select(&mut self, scheme: Resampling, threshold: f64, count: usize, rng: CounterRng) {
         let enough = self.effective_sample_size() >= threshold * self.weights.len() as f64;
         if enough && threshold < 1.0 && count == self.weights.len() {
@@ -82,7 +83,8 @@ impl Cloud {
         self.weights = vec![1.0 / count as f64; count];
     }
 
-    /// Moves every particle on: with the camera, by its velocity, and by noise (equations (1) and (2) of the paper).
+    /// Moves every particle by the camera's motion, its velocity and noise (equations (1) and (2) of the
+    /// paper).
     pub fn predict(&mut self, camera: &CameraMotion, noise: &Noise, first_size: [f64; 2], rng: CounterRng) {
         let growth = camera.growth();
         for (i, particle) in self.particles.iter_mut().enumerate() {
@@ -102,7 +104,7 @@ impl Cloud {
         }
     }
 
-    /// Multiplies the weights by likelihoods; false, and nothing is changed, if no particle has one.
+    /// Multiplies the weights by likelihoods. Returns false, and changes nothing, if all products are zero.
     pub fn weigh(&mut self, log_likelihood: &[f64]) -> bool {
         let mut logs: Vec<f64> = self.weights.iter().zip(log_likelihood).map(|(w, l)| w.ln() + l).collect();
         if normalise_log_weights(&mut logs).is_none() {
@@ -141,7 +143,7 @@ impl Cloud {
         covariance
     }
 
-    /// Shifts position and velocity of every particle by so much.
+    /// Adds `by` to position and velocity of every particle.
     pub fn shift(&mut self, by: [f64; 4]) {
         for particle in &mut self.particles {
             for (value, by) in particle.iter_mut().zip(by) {

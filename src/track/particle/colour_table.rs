@@ -8,7 +8,8 @@ use crate::types::Frame;
 /// Slots are filled up to a multiple of this, so that loops over them are whole vectors.
 const LANES: usize = 16;
 
-/// Summed-area tables over a rectangle, all slots of a pixel side by side; the last slot counts the pixels that have a bin.
+/// Summed-area tables over a rectangle, all slots of a pixel side by side. The last slot counts pixels with a
+/// bin.
 pub(super) struct ColourTable<'a> {
     appearance: &'a Appearance,
     /// Reference and weight, padded to `stride` slots a window.
@@ -85,7 +86,8 @@ impl<'a> ColourTable<'a> {
         }
     }
 
-    /// Similarity of each box to the reference, 0 to 1: the mean over the windows of `sum_b weight_b min(H_b, R_b)` (equation (4) of the paper).
+    /// Similarity of each box to the reference, 0 to 1 (equation (4) of the paper): the mean over the windows
+    /// of `sum_b weight_b min(H_b, R_b)`.
     pub fn similarities(&self, boxes: &[CentredBox], out: &mut [f64]) {
         dispatch(Level::detect(), Similarities { table: self, boxes, out });
     }

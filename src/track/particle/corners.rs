@@ -18,9 +18,9 @@ const LEAST_DISTANCE: f64 = 3.0;
 const LEVELS: usize = 3;
 /// Greatest distance between a corner and where its flow leads forward and back, px.
 const FORWARD_BACKWARD: f64 = 0.7;
-/// More than this share of the tracks lost at once is another scene.
+/// The scene was cut if more than this share of the tracks is lost at once.
 const CUT_SHARE: f64 = 0.8;
-/// Fewer tracks than this say nothing of a cut.
+/// Number of tracks that deciding on a cut needs.
 const CUT_TRACKS: usize = 12;
 
 /// A corner and its history.
@@ -31,7 +31,8 @@ pub(super) struct Track {
     pub position: [f64; 2],
     /// Its motion since the frame before, px.
     pub flow: [f64; 2],
-    /// That relative to the background, px/frame, and the one of the frame before; `None` before it was followed.
+    /// Motion relative to the background, px/frame, now and in the frame before; `None` before it was
+    /// followed.
     pub residual: Option<[f64; 2]>,
     pub last_residual: Option<[f64; 2]>,
     /// Probability of not being background.
@@ -81,7 +82,8 @@ impl Corners {
         PointPyramid::new(grey, LEVELS)
     }
 
-    /// Follows every corner into the next frame and forgets those that cannot be; true where the scene was cut.
+    /// Follows every corner into the next frame and drops those that are lost. Returns whether the scene was
+    /// cut.
     ///
     /// # Errors
     /// As [`track_points`].
@@ -108,7 +110,7 @@ impl Corners {
         Ok(had >= CUT_TRACKS && lost as f64 > CUT_SHARE * had as f64)
     }
 
-    /// Adds corners where there are none.
+    /// Adds corners where there are none yet.
     ///
     /// # Errors
     /// As [`corner_score`].

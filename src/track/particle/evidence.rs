@@ -1,4 +1,4 @@
-//! Which corner tracks speak for and against a target.
+//! Corner tracks as evidence for and against a target.
 
 use super::corners::Track;
 use super::geometry::holds;
@@ -41,7 +41,7 @@ pub(super) fn track_evidence(evidence: &Evidence<'_>) -> Vec<TrackEvidence> {
     moment.tracks.iter().filter(is_near).filter_map(|track| weigh_track(track, own, target, moment)).collect()
 }
 
-/// What one track says of a target; `None` if nothing.
+/// Evidence of one track for a target; `None` if it has another owner.
 fn weigh_track(track: &Track, own: usize, target: &Target, moment: &Moment<'_>) -> Option<TrackEvidence> {
     let residual = track.residual?;
     let said = |probability, penalty| Some(TrackEvidence { position: track.position, residual, probability, penalty });

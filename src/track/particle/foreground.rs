@@ -1,4 +1,5 @@
-//! What is not background, by two mixtures: one over the flow of corners, one over the picture (sections 3.3.1 and 3.3.2 of the paper).
+//! Foreground by two mixtures: over the flow of corners, and over their positions (sections 3.3.1 and 3.3.2
+//! of the paper).
 
 use super::cloud::Particle;
 use super::corners::Track;
@@ -16,11 +17,11 @@ const COMPONENTS: usize = 12;
 const FLOW_FLOOR: f64 = 0.05;
 /// Floor of the standard deviation of positions, px at 480 rows.
 const PLACE_FLOOR: f64 = 4.0;
-/// Standard deviation of positions beforehand, px at 480 rows.
+/// Prior standard deviation of positions, px at 480 rows.
 const PLACE_PRIOR: f64 = 24.0;
-/// Corners that are background but for this probability do not count.
+/// Corners with a smaller probability of being foreground do not count.
 const MIN_FOREGROUND: f64 = 0.01;
-/// Fewer corners have no background.
+/// Number of corners that a background needs.
 const MIN_CORNERS: usize = 3;
 /// Density over the component's greatest at which it counts as zero.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -169,7 +170,7 @@ impl ForegroundMap {
         Ok(Self { labels, components, means, radius })
     }
 
-    /// The map at each particle's centre for a target with this predicted place; `None` if no component is near it.
+    /// The map at each particle's centre for a target predicted at `place`; `None` if no component is near.
     pub fn at(&self, particles: &[Particle], place: [f64; 2]) -> Option<Vec<f64>> {
         let near: Vec<&Vec<f64>> = self
             .components

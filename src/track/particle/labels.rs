@@ -7,7 +7,7 @@ use crate::math::median;
 
 /// A label is kept, and gained, inside the target's box enlarged by this.
 const KEEP: f64 = 1.3;
-/// A track without a label gains one if it is background with less than the rest of this probability.
+/// A track gains a label only above this probability of not being background.
 const MIN_FOREGROUND: f64 = 0.7;
 /// Below this probability of not being background a track is doubtful.
 const DOUBTFUL: f64 = 0.3;
@@ -34,7 +34,7 @@ pub(super) struct Labelled {
     pub is_unlike: bool,
 }
 
-/// Takes labels away that the new motion speaks against.
+/// Withdraws labels that contradict the new motion.
 pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
     for own in targets {
         let mine: Vec<usize> = (0..tracks.len()).filter(|&j| tracks[j].owner == Some(own.id)).collect();

@@ -9,7 +9,7 @@ const OUTSIDE: f64 = -50.0;
 const TASK: usize = 256;
 /// Weight of a track, since neighbouring tracks are not independent.
 const TRACK_GAIN: f64 = 0.2;
-/// Own tracks that say as much as any larger number of them: a box must not grow to hold more.
+/// A larger number of own tracks has the same weight, so that a box does not grow to hold more.
 const FULL_TRACKS: f64 = 20.0;
 /// Half sides of the part of a box whose tracks count, over its sides.
 const INNER: [f64; 2] = [0.45, 0.48];
@@ -17,11 +17,11 @@ const INNER: [f64; 2] = [0.45, 0.48];
 const TRACK_SIGMA: f64 = 1.2;
 /// Density of motions that belong to no target, 1/(px/frame)^2 in a picture of 480 rows.
 const CLUTTER_DENSITY: f64 = 0.012;
-/// What the foreground map is raised by, so that an empty region does not end a filter.
+/// Added to the foreground map, so that an empty region does not end a filter.
 const FOREGROUND_FLOOR: f64 = 1e-3;
 
-/// Near the constant-velocity prediction: `-|(x, y) - p| / (2 sigma^2)`, `sigma = |(u, v)| + 1`, lengths in px of a
-/// picture of 480 rows (equations (8) and (9) of the paper).
+/// Near the constant-velocity prediction: `-|(x, y) - p| / (2 sigma^2)`, `sigma = |(u, v)| + 1`, lengths in
+/// px of a picture of 480 rows (equations (8) and (9) of the paper).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct VelocityFactor {
     pub prediction: [f64; 2],
@@ -40,7 +40,8 @@ impl VelocityFactor {
     }
 }
 
-/// Away from a near target's prediction: `1 - exp(-|(x, y) - p_l|^2 / (2 |p - p_l|^2))` (equation (10) of the paper).
+/// Away from a near target's prediction: `1 - exp(-|(x, y) - p_l|^2 / (2 |p - p_l|^2))` (equation (10) of the
+/// paper).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DistanceFactor {
     pub other: [f64; 2],
@@ -51,7 +52,7 @@ pub(super) struct DistanceFactor {
 impl DistanceFactor {
     fn log(&self, [x, y, ..]: &Particle) -> f64 {
         let square = (x - self.other[0]).powi(2) + (y - self.other[1]).powi(2);
-        // Two targets with one prediction push nothing apart.
+        // Targets with the same prediction do not repel each other.
         if self.square > 0.0 { (-(-square / (2.0 * self.square)).exp_m1()).ln() } else { 0.0 }
     }
 }
@@ -64,7 +65,7 @@ pub(super) struct TrackEvidence {
     pub residual: [f64; 2],
     /// Probability that it is the target's, `P_j`.
     pub probability: f64,
-    /// What it says against the target, `B_j`.
+    /// Evidence against the target, `B_j`.
     pub penalty: f64,
 }
 
@@ -80,9 +81,9 @@ pub(super) fn clutter_density(scale: f64) -> f64 {
     CLUTTER_DENSITY / (scale * scale)
 }
 
-/// Tracks in the box move with the particle: `gain sum_j { P_j max(log(1/2 + N(r_j; (u, v)) / (2 tau)), 0) - B_j }` over the
-/// tracks in the inner box. A track that moves otherwise says nothing: it may be a swinging leg, and left outside the box it
-/// would be no better explained.
+/// Tracks in the box move with the particle. The logarithm is a sum over the tracks in the inner box:
+/// `gain sum_j { P_j max(log(1/2 + N(r_j; (u, v)) / (2 tau)), 0) - B_j }`. A track with another motion is
+/// neutral: it may lie on a swinging leg, and a box that excludes it does not explain it better.
 #[derive(Debug, Clone)]
 pub(super) struct TrackFactor {
     pub evidence: Vec<TrackEvidence>,

@@ -1,9 +1,18 @@
-//! Several targets that may look alike, cross and hide each other, before a moving camera: a particle filter each, on colour frames.
+//! Several targets that may look alike, cross and hide each other before a moving camera: a particle filter
+//! each.
 //!
-//! In the order in which a frame passes them: [`view`] (colour bins, brightness), [`corners`] (corner tracks), [`camera`] or [`foreground`] (what
-//! is background), [`seeing`] (predictions, near and hidden targets; [`labels`], [`presence`]), then for each [`target`] its particles
-//! ([`cloud`]), [`recovery`], colours ([`appearance`], [`colour_table`]), [`evidence`] of tracks and [`likelihood`]; last [`report`].
-//! [`record`] keeps a step, [`persist`] makes bytes of it and of the tracker.
+//! A frame passes the files in this order:
+//!
+//! * [`view`]: colour bins ([`bins`]) and brightness;
+//! * [`corners`]: corner tracks;
+//! * [`camera`] or, in paper mode, [`foreground`]: motion of the background;
+//! * [`seeing`]: predictions, near and hidden targets ([`labels`], [`presence`]);
+//! * [`target`], for each target: particles ([`cloud`]), [`recovery`], colours ([`appearance`],
+//!   [`colour_table`]), [`evidence`] of tracks, [`likelihood`];
+//! * [`report`]: the result ([`step`]).
+//!
+//! [`record`] keeps a step, [`persist`] serialises it and the tracker. Model and limits:
+//! `docs/particle_tracker.md`.
 
 mod appearance;
 mod bins;

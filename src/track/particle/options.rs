@@ -13,16 +13,17 @@ const SEGMENT_SCALE: f64 = 150.0;
 const SEGMENT_SIGMA: f64 = 0.8;
 /// Smallest region in a picture of 480 rows, px^2.
 const SEGMENT_AREA: f64 = 120.0;
-/// Smallest number of particles that a weighted covariance of six components makes sense for.
+/// Smallest number of particles: a regular covariance of six components needs at least seven.
 const MIN_PARTICLES: usize = 8;
 
 /// Which evidence weighs the particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum ParticleMode {
-    /// Corner tracks on a target must move with it; hidden targets are recognised; particles ride on the background's affine motion.
+    /// Corner tracks on a target must move with it; hidden targets are recognised; particles move with the
+    /// background's affine motion.
     #[default]
     Improved,
-    /// The published method: a foreground map from a mixture over the flow of corners and a graph segmentation.
+    /// The published method: a foreground map from mixtures over corners and a graph segmentation.
     Paper,
 }
 
@@ -88,7 +89,7 @@ impl Likelihoods {
     /// Names of the factors, in the order of the fields.
     pub const NAMES: [&'static str; 5] = ["colour", "velocity", "distance", "tracks", "foreground"];
 
-    /// The factors that a mode uses unless told otherwise.
+    /// The default factors of a mode.
     pub fn of(mode: ParticleMode) -> Self {
         let improved = mode == ParticleMode::Improved;
         Self { colour: true, velocity: true, distance: !improved, tracks: improved, foreground: !improved }
@@ -125,9 +126,10 @@ pub struct ParticleOptions {
     pub scale: Option<f64>,
     /// Factors of the likelihood; default `None`: those of the mode.
     pub likelihoods: Option<Likelihoods>,
-    /// How particles are drawn; default multinomial.
+    /// Resampling scheme; default multinomial.
     pub resampling: Resampling,
-    /// Particles are drawn when the effective sample size is below this share of them; default 1: in every frame.
+    /// Particles are resampled if the effective sample size is below this share of their number; default 1:
+    /// in every frame.
     pub ess_threshold: f64,
     /// What makes a corner foreground (paper mode); default: the ratio.
     pub foreground: ForegroundModel,
@@ -201,7 +203,8 @@ impl ParticleOptions {
     }
 }
 
-/// Standard deviations of the position within which targets are near each other, along each axis (equation (7) of the paper).
+/// Radius within which targets are near each other, in standard deviations of the position along each axis
+/// (equation (7) of the paper).
 const NEAR: f64 = 6.0;
 
 /// Noise of the transition and the start, in a picture of 480 rows: lengths in px, times in frames.
@@ -218,7 +221,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// That of a mode at a length scale.
+    /// The noise of a mode at a length scale.
     pub fn of(mode: ParticleMode, scale: f64) -> Self {
         match mode {
             ParticleMode::Paper => Self { position: 6.5 * scale, velocity: 0.2 * scale, size: 0.01, aspect: None },

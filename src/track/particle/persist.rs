@@ -27,7 +27,7 @@ const HEAD: usize = 6;
 /// Bytes of the checksum.
 const TAIL: usize = 8;
 
-/// What is kept of a tracker.
+/// Saved state of a tracker.
 #[derive(Serialize, Deserialize)]
 struct SavedTracker {
     options: ParticleOptions,

@@ -1,4 +1,4 @@
-//! Whether a target is seen, and what is usual for it.
+//! Whether a target is hidden; running means of its similarity, velocity and number of tracks.
 
 use super::camera::CameraMotion;
 use super::cloud::Particle;
@@ -13,7 +13,8 @@ const GAINS: [f64; 2] = [0.2, 0.1];
 const HIDDEN_SHARE: f64 = 0.25;
 /// Share of a box that another one covers when it may hide it.
 pub(super) const COVER: f64 = 0.5;
-/// Share of the usual number of tracks, and their least number, with which a low similarity is a new look of the target.
+/// A low similarity is a new look of the target, not a cover, with at least this share of the usual number of
+/// tracks and at least this number.
 const NEW_LOOK: (f64, f64) = (0.7, 4.0);
 /// That share after the target was hidden: light may have changed behind the occluder.
 const NEW_LOOK_AFTER: f64 = 0.5;
@@ -79,7 +80,7 @@ impl Presence {
         SEEN_AGAIN.0.max(SEEN_AGAIN.1 * self.tracks)
     }
 
-    /// Decides whether the target is hidden in this frame; true where it becomes so.
+    /// Decides whether the target is hidden in this frame. Returns whether it was not before.
     pub fn decide(&mut self, labelled: usize, is_covered: bool, returning: usize) -> bool {
         let few = (labelled as f64) < HIDDEN_SHARE * self.tracks;
         let hidden = few && (self.is_low || is_covered) && (returning as f64) < self.tracks_to_return();
@@ -89,7 +90,7 @@ impl Presence {
         entered
     }
 
-    /// The target is hidden whatever the tracks say, as after a cut.
+    /// Hides the target without a decision by its tracks, as after a cut.
     pub fn hide(&mut self) {
         self.hidden += 1;
         self.was_hidden = true;
@@ -106,7 +107,8 @@ impl Presence {
         self.is_low = similarity < LOW * usual;
     }
 
-    /// Learns what is usual from a frame in which the target is seen and nothing is near; true if it is clear there.
+    /// Updates the usual values by a frame in which the target is seen and nothing is near. Returns whether
+    /// the target is clear there.
     pub fn learn(&mut self, similarity: f64, labelled: usize, estimate: &Particle) -> bool {
         let usual = self.similarity.unwrap_or(similarity);
         let learned = Some(usual + SIMILARITY_GAIN * (similarity - usual));

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Particles of a target, N x 6 (centre x, y, velocity u, v, width, height), and their weights.
 pub type Particles = (Vec<[f64; 6]>, Vec<f64>);
 
-/// A step with what its pictures are made from and its particles, each as long as it is kept.
+/// A step, with its frame and particles unless they were dropped.
 #[derive(Debug, Clone)]
 pub struct StepRecord {
     pub(super) step: ParticleStep,
@@ -107,7 +107,7 @@ impl StepRecord {
         let frame = self
             .frame
             .as_ref()
-            .ok_or_else(|| Error::argument("frame", "a step that keeps its frame", "one that was told not to"))?;
+            .ok_or_else(|| Error::argument("frame", "a step that keeps its frame", "one that does not"))?;
         felzenszwalb(&frame.scaled(self.gain), &self.options.segmentation(self.scale))
     }
 }

@@ -1,4 +1,4 @@
-//! A target that was hidden for some frames takes over tracks that move together and belong to nobody.
+//! Recovery of a hidden target from tracks that move together and have no owner.
 
 use super::corners::Track;
 use super::geometry::{covered_share, distance, holds};
@@ -11,17 +11,17 @@ const HIDDEN_FRAMES: usize = 4;
 const MIN_FOREGROUND: f64 = 0.7;
 /// Growth of the reach across in each hidden frame, px at 480 rows.
 const REACH_GROWTH: f64 = 2.0;
-/// Largest reach across over the width, and the reach up and down over the height; half a box is added to both.
+/// Largest reach across over the width, and reach up and down over the height; half a box is added.
 const REACH: [f64; 2] = [2.5, 0.4];
 /// Greatest difference of motion in a group, px/frame at 480 rows.
 const TOGETHER: f64 = 2.4;
 /// Smallest group, and its share of the usual number of tracks.
 const MIN_GROUP: (f64, f64) = (6.0, 0.3);
-/// Centres that are tried about a group, to each side, and how far apart the outermost are, over width and height.
+/// Number of centres tried to each side of a group, and distance of the outermost over width and height.
 const TRIALS: (i32, [f64; 2]) = (2, [0.4, 0.2]);
 /// Share of the usual similarity that the best centre must have.
 const MIN_SIMILARITY: f64 = 0.75;
-/// A group belongs rather to another target within this of it, over width and height.
+/// Distance within which a group may belong to another target, over width and height.
 const OTHER_REACH: [f64; 2] = [1.0, 0.6];
 
 /// Where a hidden target was found again.
@@ -38,7 +38,7 @@ pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Optio
     if seeing.hidden < HIDDEN_FRAMES || !moment.factors.tracks || !moment.factors.colour {
         return None;
     }
-    // Two hidden targets in one place cannot be told apart.
+    // Two hidden targets in one place cannot be distinguished.
     let twin = |l: &super::seeing::Seeing| {
         l.id != seeing.id && !l.is_out && l.hidden > 0 && covered_share(seeing.bounds, l.bounds) > 0.0
     };

@@ -1,4 +1,4 @@
-//! From what the tracker holds to what it reports.
+//! Assembles the result of a frame from the tracker's state.
 
 use super::appearance::CentredBox;
 use super::camera::CameraMotion;
@@ -22,7 +22,7 @@ const NO_WEIGHT: &str = "no particle had a weight: the estimate is the predictio
 pub(super) const REASONS: [&str; 10] =
     ["", LEFT, LOST, NOTHING_SHOWN, CUT, HIDDEN_BY_TARGET, HIDDEN, COVERED, UNLIKE, NO_WEIGHT];
 
-/// What a step comes of.
+/// Cause of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Occasion {
     /// Targets were given.

@@ -1,4 +1,4 @@
-//! Before a frame is weighed: where each target should be, which are near each other, and which are hidden.
+//! Predictions before a frame is weighed: positions, near targets, hidden targets.
 
 use super::appearance::CentredBox;
 use super::camera::CameraMotion;
@@ -11,14 +11,14 @@ use super::target::Target;
 
 /// Targets are near each other, too, if their boxes shrunk to this overlap.
 const NEAR_BOXES: f64 = 0.9;
-/// Share of the box that tracks which make a target seen again lie in, to each side of its place.
+/// Factor of the box in which tracks can end a target's being hidden.
 const RETURN_BOX: f64 = 1.2;
 /// Probability of not being background of such a track.
 const RETURN_FOREGROUND: f64 = 0.7;
 /// Greatest difference of its motion, px/frame at 480 rows.
 const RETURN_DIFFERENCE: f64 = 2.4;
 
-/// How one target should be seen.
+/// Prediction of one target in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seeing {
     pub id: u64,
@@ -45,7 +45,7 @@ pub(super) struct Seeing {
     pub labelled: usize,
 }
 
-/// Looks at all targets. Labels of tracks are reviewed, and hidden targets recognised, in improved mode.
+/// Predicts all targets. With the track factor, labels are reviewed and hidden targets recognised.
 pub(super) fn look(
     targets: &mut [Target],
     tracks: &mut [Track],
@@ -85,7 +85,7 @@ pub(super) fn look(
     seeing
 }
 
-/// Where a target should be.
+/// Prediction of a target from its last estimate.
 fn predicted(target: &Target, camera: &CameraMotion) -> Seeing {
     let velocity = target.velocity();
     let place = camera.carry(target.place(), velocity);

@@ -1,8 +1,8 @@
-//! What the tracker reports for each frame.
+//! Result of each frame.
 
 use crate::types::TrackState;
 
-/// The targets at one frame, and what they were found from.
+/// The targets at one frame, with the background's motion and the corner tracks.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleStep {
     /// Index of the frame, 0 for the one that the tracker began with.
@@ -11,9 +11,9 @@ pub struct ParticleStep {
     pub targets: Vec<ParticleTarget>,
     /// K x K, row-major: which targets are near each other.
     pub near: Vec<bool>,
-    /// Motion of the background since the frame before, `(x', y') = A (x, y, 1)` in px; the identity in paper mode.
+    /// Motion of the background since the frame before, `(x', y') = A (x, y, 1)`, px; identity in paper mode.
     pub camera: [[f64; 3]; 2],
-    /// The corner tracks that the frame was judged by.
+    /// Corner tracks followed from the frame before.
     pub tracks: Vec<CornerTrack>,
 }
 
@@ -22,7 +22,7 @@ pub struct ParticleStep {
 pub struct ParticleTarget {
     /// The number it was added with.
     pub id: u64,
-    /// Box, position, velocity and status; its filtered covariance is that of position and velocity along each axis.
+    /// Box, position, velocity and status; covariance of position and velocity along each axis.
     pub state: TrackState,
     /// Width and height, px.
     pub size: [f64; 2],

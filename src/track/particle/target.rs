@@ -1,4 +1,4 @@
-//! One target: its look, its particles, and how it fares in one frame.
+//! One target: appearance, particles, and its estimate in one frame.
 
 use super::appearance::{Appearance, CentredBox};
 use super::camera::CameraMotion;
@@ -21,7 +21,7 @@ const SIMILARITY_QUANTILE: f64 = 0.9;
 /// Tracks that a quick start needs, and the probability of not being background above which they count.
 const QUICK_START: (usize, f64) = (3, 0.5);
 
-/// A target and everything that is remembered of it.
+/// A target with its state.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Target {
     pub id: u64,
@@ -93,7 +93,7 @@ impl Target {
         [x, y, w, h]
     }
 
-    /// Selection, prediction, weights and estimate of one frame. `own` is the target's place among those of the moment.
+    /// Selection, prediction, weights and estimate of one frame. `own`: index of the target in the moment.
     pub fn advance(&mut self, own: usize, moment: &Moment<'_>) {
         let seeing = &moment.seeing[own];
         let id = self.id;
@@ -137,7 +137,7 @@ impl Target {
         self.degenerate = false;
     }
 
-    /// Half of the particles take the motion of a track in the box, drawn by its probability of not being background.
+    /// Half of the particles take the motion of a track in the box, drawn by the probability of foreground.
     fn quick_start(&mut self, tracks: &[Track], rng: CounterRng) {
         let bounds = self.bounds();
         let inside = |track: &&Track| {
@@ -160,7 +160,8 @@ impl Target {
         }
     }
 
-    /// What was estimated while an occluder came in is not trusted: back to where the target was last clear, moved on.
+    /// Returns to where the target was last clear, moved on to this frame: estimates made while the occluder
+    /// came in are not reliable.
     fn return_to_clear_place(&mut self, moment: &Moment<'_>) -> [f64; 2] {
         let mean = self.cloud.mean();
         let place = self.presence.moved_on(&moment.camera);

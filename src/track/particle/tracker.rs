@@ -27,12 +27,13 @@ const CAMERA_STREAM: u64 = u64::MAX;
 
 /// Follows several targets in colour frames by a particle filter each.
 ///
-/// A target's particles hold centre, velocity and size. Its likelihood is a product of banded colour histograms, nearness to
-/// the constant-velocity prediction and, in improved mode, corner tracks that must move with the target; in paper mode the
-/// distance from other targets and a map of what is not background (K. Takechi, S. Fukui, Y. Iwahori, "Robust tracking by a
-/// particle filter with a probabilistic background model").
+/// A target's particles hold centre, velocity and size. Factors of the likelihood are banded colour
+/// histograms and nearness to the constant-velocity prediction. Improved mode adds corner tracks that must
+/// move with the target; paper mode the distance from other targets and a foreground map (K. Takechi, S.
+/// Fukui, Y. Iwahori, "Robust tracking by a particle filter with a probabilistic background model").
 ///
-/// Deterministic: the same frames, boxes and seed give the same results, bit for bit, on any number of threads.
+/// Deterministic: the same frames, boxes and seed give the same results, bit for bit, on any number of
+/// threads.
 #[derive(Debug, Clone)]
 pub struct ParticleTracker {
     pub(super) options: ParticleOptions,
@@ -59,8 +60,8 @@ impl ParticleTracker {
     /// Begins with a frame and the boxes of its targets, each with its number; there may be none yet.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frame` for a picture with a side below 8 px, `boxes` for a box that is not finite, has no area or lies outside
-    /// the picture, `id` for a number given twice, or an option.
+    /// [`Error::Argument`] naming `frame` for a picture with a side below 8 px; `boxes` for a box that is not
+    /// finite, has no area or lies outside the picture; `id` for a number given twice; or an option.
     pub fn new(frame: &AnyColourFrame, targets: &[(u64, TargetBox)], options: &ParticleOptions) -> Result<Self> {
         options.check()?;
         let size = frame.size();
@@ -168,7 +169,8 @@ impl ParticleTracker {
         self.update_with_camera(frame, None)
     }
 
-    /// As [`ParticleTracker::update`], with the background's motion since the frame before where it is known: `(x', y') = A (x, y, 1)`, px.
+    /// As [`ParticleTracker::update`], with the background's motion since the frame before if it is known:
+    /// `(x', y') = A (x, y, 1)`, px.
     ///
     /// # Errors
     /// As [`ParticleTracker::update`]; [`Error::Argument`] named `camera` for numbers that are not finite.
@@ -215,8 +217,8 @@ impl ParticleTracker {
         self.options.threads.install(|| self.segment(&self.last))
     }
 
-    /// Foreground of the last frame, 0 to 1: density of the corners that are not background, averaged over segments,
-    /// over its maximum; all zero where there are no such corners.
+    /// Foreground of the last frame, 0 to 1: density of the corners that are not background, averaged over
+    /// segments, over its maximum; all zero where there are no such corners.
     ///
     /// # Errors
     /// As [`felzenszwalb`].
@@ -288,7 +290,7 @@ impl ParticleTracker {
         Ok(())
     }
 
-    /// Motion of the background; sets each track's residual motion and its probability of not being background.
+    /// Motion of the background. Sets each track's residual motion and its probability of foreground.
     fn measure_background(&mut self, known: Option<CameraMotion>) -> Result<CameraMotion> {
         let points: Vec<[f64; 2]> = self.corners.tracks.iter().map(super::corners::Track::previous).collect();
         let flow: Vec<[f64; 2]> = self.corners.tracks.iter().map(|track| track.flow).collect();
@@ -330,7 +332,7 @@ impl ParticleTracker {
         self.step = report(self, &CameraMotion::NONE, &[], Occasion::Nothing);
     }
 
-    /// What the frame teaches: usual values, labels of tracks, who has left.
+    /// Updates usual values, labels of tracks and who has left.
     fn learn(&mut self, seeing: &[Seeing], camera: &CameraMotion, was_cut: bool) {
         for (target, seeing) in self.targets.iter_mut().zip(seeing).filter(|(target, _)| !target.is_out) {
             if self.options.factors().colour {

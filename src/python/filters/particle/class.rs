@@ -30,7 +30,7 @@ pub struct ParticleFilter {
 }
 
 impl ParticleFilter {
-    /// Shape `(B, N, n)` or `(N, n)` of the particles, by the array: a callback may ask while the core is
+    /// Shape `(B, N, n)` or `(N, n)` of the particles, by the array: a callback may read it while the core is
     /// locked.
     pub(super) fn shape(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
         read(py, &self.x).bind(py).getattr("shape")?.extract()
