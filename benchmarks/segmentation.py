@@ -2,9 +2,10 @@
 
     python benchmarks/segmentation.py [--rounds 10] [--data FOLDER]
 
-Agreement: number of regions, and adjusted Rand index of our labels against scikit-image's, at scale / min_size 150 / 30 and 300 / 60, sigma 0.8. Without
-`--data` (or JACOFLOW_DATA) only pictures that come with scikit-image are used. Time: 720 x 480 colour px of 8 bits, scale 150, sigma 0.8, min_size 120; all run in turns in this process; CPU time of the
-busiest thread, and the median of the time on the clock.
+Agreement: number of regions, and adjusted Rand index of our labels against scikit-image's, at scale / min_size
+150 / 30 and 300 / 60, sigma 0.8. Without `--data` (or JACOFLOW_DATA) only pictures that come with scikit-image
+are used. Time: 720 x 480 colour px of 8 bits, scale 150, sigma 0.8, min_size 120. All run in turns in this
+process; given are CPU time of the busiest thread and the median of the time on the clock.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ fn pairs(py: Python<'_>, points: Vec<[f64; 2]>) -> PyResult<Bound<'_, PyAny>> {
 ///
 /// The score is the smaller eigenvalue of the mean of (Ix^2, Ix Iy; Ix Iy, Iy^2) over `window` x `window` px
 /// (odd). A corner scores at least `quality` (0 to 1) times the best of the frame and no less than its 8
-/// neighbours, and is at least `min_distance` px away from every better corner and from every point of
+/// neighbours. It is at least `min_distance` px away from every better corner and from every point of
 /// `existing` (N, 2). At most `max_count` corners, `existing` not counted.
 ///
 /// Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN.
@@ -73,14 +73,15 @@ fn span(frame: &Frame<f32>) -> f64 {
 /// gradient steps on a pyramid.
 ///
 /// B. Lucas, T. Kanade, 1981; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade feature tracker",
-/// 2000: the translation that minimises the squared differences in a window of `window` x `window` px (odd),
-/// on `levels` levels (1: full size alone), at most `max_steps` steps a level, ended by one shorter than
-/// `min_step` px. `guesses` (N, 2): expected flow, default zero.
+/// 2000. Minimises the squared differences in a window of `window` x `window` px (odd), on `levels` levels
+/// (1: full size alone). A level takes at most `max_steps` steps and ends with one shorter than `min_step` px.
+/// `guesses` (N, 2): expected flow, default zero.
 ///
 /// `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
 /// point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or
-/// when the smaller eigenvalue of the window's mean structure tensor is below `min_eigenvalue` (levels/px)^2;
-/// None: 0.1 where the first frame spans 255 levels, scaled by the square of its span.
+/// when the window has too little structure: smaller eigenvalue of its mean structure tensor below
+/// `min_eigenvalue`, (levels/px)^2. None: 0.1 where the first frame spans 255 levels, scaled by the square of
+/// its span.
 ///
 /// Returns flow (u, v) px/frame, float64 (N, 2); ok, bool (N,); error, the distance between forward and back,
 /// px, float64 (N,). ValueError for a number out of its range, for frames of different shape and for colour

@@ -34,11 +34,11 @@ impl PointFlow {
 
 /// Flow from `before` to `after` at `points` (x, y) px, in their order.
 ///
-/// Minimises `sum (before(q) - after(q + d))^2` over the window around each point by steps `G^-1 sum grad
-/// before (before - after)` with `G = sum grad before grad before'` of the window, from the coarsest level
-/// down (Lucas and Kanade 1981; Bouguet 2000). Samples are bilinear, slopes are central differences of the
-/// samples, and the border is replicated, so that a window may hang over it. Only levels whose sides are at
-/// least the window are used.
+/// Minimises `sum (before(q) - after(q + d))^2` over the window around each point by steps
+/// `G^-1 sum grad before (before - after)` with `G = sum grad before grad before'` of the window. Levels are
+/// passed from the coarsest down (Lucas and Kanade 1981; Bouguet 2000). Samples are bilinear, slopes are
+/// central differences of the samples, and the border is replicated, so that a window may hang over it. Only
+/// levels whose sides are at least the window are used.
 ///
 /// Flow back from the new position starts without knowledge of the flow forward: from minus `guesses`, or
 /// from zero. A point is lost (NaN) if it leaves the picture, if the window has too little structure or

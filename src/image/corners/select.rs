@@ -41,7 +41,7 @@ impl CornerOptions {
 /// New corners `(x, y)` px, in decreasing `score` (ties: in row-major order).
 ///
 /// A corner has a positive score of at least `quality` times the best of the frame, no larger score among its
-/// 8 neighbours, and is at least `min_distance` away from every better corner that was chosen and from every
+/// 8 neighbours. It is at least `min_distance` away from every better corner that was chosen and from every
 /// `existing` point. NaN is no corner, and hides none beside it.
 pub fn select_corners(score: &Frame<f32>, existing: &[[f64; 2]], options: &CornerOptions) -> Vec<[f64; 2]> {
     let (width, height) = score.size();

@@ -106,9 +106,9 @@ impl ParticleRun {
     /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
-    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named
-    /// `frames` for fewer than two frames or one of another size, `box` with the target's number for a box
-    /// that cannot be followed.
+    /// Those of the source, of `begin`, the tracker, the sinks and `progress`. [`Error::Argument`] named
+    /// `frames` for fewer than two frames or one of another size; named `box`, with the target's number, for a
+    /// box that cannot be followed.
     pub fn run(
         &mut self,
         source: Box<ColourSource>,
