@@ -1,13 +1,15 @@
-//! Kalman filters that know nothing of images: linear, extended and unscented, each over a batch of independent states.
+//! Filters without images: linear, extended and unscented Kalman filters and a particle filter, each over a
+//! batch of independent states.
 //!
 //! Names follow the literature and `filterpy`: `x`, `P`, `Q`, `R`, [`predict`](UnscentedFilter::predict),
-//! [`update`](UnscentedFilter::update), residual `y`, its covariance `S`, gain `K`, `log_likelihood`. Every array carries a leading batch axis and
-//! is row-major: `x` is `(B, n)`, `P` is `(B, n, n)`. A callback receives the whole batch at once, so that one vectorised function call
-//! serves every state and every sigma point.
+//! [`update`](UnscentedFilter::update), residual `y`, its covariance `S`, gain `K`, `log_likelihood`. Every
+//! array carries a leading batch axis and is row-major: `x` is `(B, n)`, `P` is `(B, n, n)`. A callback
+//! receives the whole batch at once, so that one vectorised function call serves every state and every sigma
+//! point.
 //!
-//! Means, covariances and noise that are not finite, symmetric and positive semi-definite are refused by name at every step.
-//! Covariances stay so: updates use the Joseph form, and a matrix that loses that in a step is mended and counted in
-//! [`GaussianState::repairs`].
+//! Means, covariances and noise that are not finite, symmetric and positive semi-definite are refused by name
+//! at every step. Covariances stay so: updates use the Joseph form, and a matrix that loses that in a step is
+//! mended and counted in [`GaussianState::repairs`].
 //!
 //! ```
 //! use jacoflow::filter::{SigmaPoints, UnscentedFilter};

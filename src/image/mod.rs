@@ -1,4 +1,5 @@
-//! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling, corners; and pictures of results.
+//! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling,
+//! corners; and pictures of results.
 
 mod blocks;
 mod border;

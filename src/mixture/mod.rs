@@ -1,7 +1,11 @@
-//! Mixtures of Gaussians for weighted points: with a Dirichlet prior on the proportions by variational Bayes ([`fit()`]), and Dirichlet-process mixtures ([`fit_dirichlet`]).
+//! Mixtures of Gaussians for weighted points: with a Dirichlet prior on the proportions by variational Bayes
+//! ([`fit()`]), and Dirichlet-process mixtures ([`fit_dirichlet`]).
 //!
-//! A mixture of K Gaussians in D dimensions with a Dirichlet prior on its proportions and Gauss-Wishart priors on means and precisions; q(Z) q(pi, mu, Lambda) approximates its posterior (C. Bishop, "Pattern Recognition and Machine
-//! Learning", 2006, section 10.2; equations (6) to (28) of the stereo paper, which adds the weights). A point's weight is evidence: a weight of 3 is the point three times. Surplus components lose their points and go back to the prior.
+//! A mixture of K Gaussians in D dimensions with a Dirichlet prior on its proportions and Gauss-Wishart
+//! priors on means and precisions; q(Z) q(pi, mu, Lambda) approximates its posterior (C. Bishop, "Pattern
+//! Recognition and Machine Learning", 2006, section 10.2; equations (6) to (28) of the stereo paper, which
+//! adds the weights). A point's weight is evidence: a weight of 3 is the point three times. Surplus
+//! components lose their points and go back to the prior.
 //!
 //! ```
 //! use jacoflow::mixture::{CovariancePrior, MixtureOptions, Points, Start, fit};

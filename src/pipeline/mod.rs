@@ -1,9 +1,11 @@
-//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter, sinks; and, with trackers in their place, to
-//! tracks ([`TrackRun`], of colour frames [`ParticleRun`]); and from pairs of views to tracks of everything that moves ([`StereoRun`]).
+//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter,
+//! sinks; and, with trackers in their place, to tracks ([`TrackRun`], of colour frames [`ParticleRun`]); and
+//! from pairs of views to tracks of everything that moves ([`StereoRun`]).
 //!
-//! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`] frames wait behind the reader,
-//! and a stage keeps the few frames that it needs (figures 1 and 2 of WO2010/098160). Frames are read and decoded on a thread of their own
-//! while the stage works; results come in the order of the frames and do not depend on timing.
+//! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`]
+//! frames wait behind the reader, and a stage keeps the few frames that it needs (figures 1 and 2 of
+//! WO2010/098160). Frames are read and decoded on a thread of their own while the stage works; results come
+//! in the order of the frames and do not depend on timing.
 
 mod album;
 mod output;

@@ -1,7 +1,10 @@
-//! Trackers: of one moving target each, behind one trait; of several targets that may look alike; and of everything that moves before a pair of cameras.
+//! Trackers: follow targets from frame to frame.
 //!
-//! A tracker of one target is begun with a frame and what is known of the target in it, and is then given one frame after the other; [`ParticleTracker`] is given the boxes of all its targets, which need each other's predictions; [`StereoTracker`] is told nothing
-//! beforehand and is given pairs of views.
+//! * [`GradientTracker`]: one target, behind the trait [`Tracker`]: begins with a frame and the target's box
+//!   in it, then takes frame by frame.
+//! * [`ParticleTracker`]: several targets that may look alike; takes all their boxes, since they need each
+//!   other's predictions.
+//! * [`StereoTracker`]: all moving objects before a pair of cameras; takes pairs of views, no boxes.
 
 pub mod gradient;
 mod grey_levels;
