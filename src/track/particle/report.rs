@@ -9,7 +9,7 @@ use super::tracker::ParticleTracker;
 use crate::types::{TargetBox, TrackState, TrackStatus};
 
 // Reasons of a status.
-const LEFT: &str = "the centre has left the picture";
+const LEFT: &str = "the centre leaves the picture";
 const LOST: &str = "hidden for more than 30 frames";
 const NOTHING_SHOWN: &str = "the frame shows nothing";
 const CUT: &str = "the scene was cut";
