@@ -44,7 +44,8 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     out["threads"] = None if out["threads"] is None else _integer("threads", out["threads"], MOST["threads"])
     out["scale"] = None if out["scale"] is None else _real("scale", out["scale"])
     out["ess_threshold"] = _real("ess_threshold", out["ess_threshold"])
-    out["likelihoods"] = _names(out["likelihoods"])
+    out["likelihoods"] = None if out["likelihoods"] is None else _names("likelihoods", out["likelihoods"])
+    out["without"] = _names("without", out["without"])
     out["segmentation"] = _segmentation(out["segmentation"])
     return out
 
@@ -69,12 +70,10 @@ def _real(name: str, value: Any) -> float:
     return real_number(name, value)
 
 
-def _names(value: Any) -> list[str] | None:
-    """Names of likelihoods, no unit; None: the mode's."""
-    if value is None:
-        return None
-    if isinstance(value, str) or not all(isinstance(name, str) for name in value):
-        raise ValueError(f"likelihoods: expected a sequence of names, got {value!r}")
+def _names(name: str, value: Any) -> list[str]:
+    """Names of likelihoods or parts, no unit."""
+    if isinstance(value, str) or not all(isinstance(each, str) for each in value):
+        raise ValueError(f"{name}: expected a sequence of names, got {value!r}")
     return list(value)
 
 

@@ -70,7 +70,7 @@ class ParticleStep:
     """Which targets are near each other, (K, K), no unit."""
     status: tuple[str, ...]
     """K words: "tracking", "occluded" (near and covered, or colours unlike), "coasting" (hidden), "out" (the
-    centre has left the picture) or "lost" (hidden for more than 30 frames).
+    centre, carried on by one frame, leaves the picture) or "lost" (hidden for more than 30 frames).
     """
     reason: tuple[str, ...]
     """Why each status is what it is, K strings; empty if there is nothing to be said (no unit)."""
@@ -173,6 +173,8 @@ class ParticleTracker:
     likelihoods : sequence of "colour", "velocity", "distance", "tracks", "foreground"
         Factors of a particle's weight; default the mode's: the first two with "tracks" ("improved"), or with
         "distance" and "foreground" ("paper").
+    without : sequence of "camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery"
+        Parts of the improved mode that are left out, to see what each is worth; default none.
     resampling : "multinomial", "stratified", "systematic" or "residual"
         How particles are drawn.
     ess_threshold : float
@@ -221,6 +223,7 @@ class ParticleTracker:
         n_near: int = 2000,
         scale: float | None = None,
         likelihoods: Sequence[str] | None = None,
+        without: Sequence[str] = (),
         resampling: Literal["multinomial", "stratified", "systematic", "residual"] = "multinomial",
         ess_threshold: float = 1.0,
         foreground: Literal["ratio", "posterior", "literal", "affine"] = "ratio",

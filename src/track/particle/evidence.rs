@@ -3,7 +3,6 @@
 use super::corners::Track;
 use super::geometry::holds;
 use super::likelihood::{TrackEvidence, clutter_density, motion_density};
-use super::options::Noise;
 use super::seeing::Seeing;
 use super::target::{Moment, Target};
 
@@ -32,7 +31,7 @@ pub(super) struct Evidence<'a> {
 pub(super) fn track_evidence(evidence: &Evidence<'_>) -> Vec<TrackEvidence> {
     let Evidence { own, target, prediction, moment } = *evidence;
     let covariance = target.cloud.covariance(&target.cloud.mean());
-    let noise = Noise::of(moment.options.mode, moment.scale).position;
+    let noise = moment.options.noise(moment.scale).position;
     let reach = [0, 1].map(|i| {
         let spread = REACH_SPREAD.0 * covariance[i][i].sqrt() + REACH_SPREAD.1 * noise;
         REACH_BOX * target.estimate[4 + i] + spread

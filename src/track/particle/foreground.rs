@@ -4,7 +4,8 @@
 use super::cloud::Particle;
 use super::corners::Track;
 use super::geometry::distance;
-use super::options::{ForegroundModel, ParticleOptions, near_radius};
+use super::noise::near_radius;
+use super::options::{ForegroundModel, ParticleOptions};
 use crate::error::Result;
 use crate::mixture::{CovariancePrior, DirichletMixture, DirichletOptions, Points, fit_dirichlet};
 use crate::segment::Labels;

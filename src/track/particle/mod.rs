@@ -25,6 +25,7 @@ mod foreground;
 mod geometry;
 mod labels;
 mod likelihood;
+mod noise;
 mod options;
 mod persist;
 mod presence;
@@ -37,7 +38,7 @@ mod target;
 mod tracker;
 mod view;
 
-pub use options::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions};
+pub use options::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions, Parts};
 pub use record::{Particles, StepRecord};
 pub use step::{CornerTrack, ParticleStep, ParticleTarget};
 pub use tracker::ParticleTracker;

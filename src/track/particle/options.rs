@@ -1,5 +1,6 @@
 //! Options of the particle tracker, and the lengths that go with the size of the picture.
 
+use super::noise::Noise;
 use crate::error::{Error, Result};
 use crate::filter::particle::Resampling;
 use crate::parallel::Threads;
@@ -101,16 +102,70 @@ impl Likelihoods {
     /// [`Error::Argument`] named `likelihoods` for a name that is not known.
     pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self> {
         let mut on = [false; Self::NAMES.len()];
-        for name in names {
-            let known = Self::NAMES.iter().position(|known| *known == name.as_ref());
-            let at = known.ok_or_else(|| {
-                Error::argument("likelihoods", format!("names among {}", Self::NAMES.join(", ")), name.as_ref())
-            })?;
+        for at in positions("likelihoods", &Self::NAMES, names)? {
             on[at] = true;
         }
         let [colour, velocity, distance, tracks, foreground] = on;
         Ok(Self { colour, velocity, distance, tracks, foreground })
     }
+}
+
+/// Parts of the improved mode, each of which can be left out to see what it is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Parts {
+    /// Particles move with the background's affine motion.
+    pub camera: bool,
+    /// Tracks remember which target they belong to.
+    pub labels: bool,
+    /// Hidden targets are recognised.
+    pub hidden: bool,
+    /// Colours that are also frequent around the first box have a smaller weight.
+    pub contrast: bool,
+    /// Pixels without hue have bins of value.
+    pub values: bool,
+    /// Width and height change together.
+    pub aspect: bool,
+    /// Half of a new target's particles take the motion of tracks in its box.
+    pub quick_start: bool,
+    /// A hidden target takes over a group of tracks without an owner.
+    pub recovery: bool,
+}
+
+impl Parts {
+    /// Names of the parts, in the order of the fields.
+    pub const NAMES: [&'static str; 8] =
+        ["camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery"];
+
+    /// All parts, or none.
+    pub fn all(present: bool) -> Self {
+        Self::from_array([present; Self::NAMES.len()])
+    }
+
+    /// All parts but those with these names.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `without` for a name that is not known.
+    pub fn without<S: AsRef<str>>(names: &[S]) -> Result<Self> {
+        let mut present = [true; Self::NAMES.len()];
+        for at in positions("without", &Self::NAMES, names)? {
+            present[at] = false;
+        }
+        Ok(Self::from_array(present))
+    }
+
+    fn from_array(present: [bool; Self::NAMES.len()]) -> Self {
+        let [camera, labels, hidden, contrast, values, aspect, quick_start, recovery] = present;
+        Self { camera, labels, hidden, contrast, values, aspect, quick_start, recovery }
+    }
+}
+
+/// Places of some names among those that are known.
+fn positions<S: AsRef<str>>(argument: &'static str, known: &[&str], names: &[S]) -> Result<Vec<usize>> {
+    let place = |name: &S| {
+        let found = known.iter().position(|known| *known == name.as_ref());
+        found.ok_or_else(|| Error::argument(argument, format!("names among {}", known.join(", ")), name.as_ref()))
+    };
+    names.iter().map(place).collect()
 }
 
 /// Options of [`ParticleTracker`](super::ParticleTracker).
@@ -126,6 +181,8 @@ pub struct ParticleOptions {
     pub scale: Option<f64>,
     /// Factors of the likelihood; default `None`: those of the mode.
     pub likelihoods: Option<Likelihoods>,
+    /// Parts of the improved mode in use; default: all.
+    pub parts: Parts,
     /// Resampling scheme; default multinomial.
     pub resampling: Resampling,
     /// Particles are resampled if the effective sample size is below this share of their number; default 1:
@@ -153,6 +210,7 @@ impl Default for ParticleOptions {
             n_near: 2000,
             scale: None,
             likelihoods: None,
+            parts: Parts::all(true),
             resampling: Resampling::Multinomial,
             ess_threshold: 1.0,
             foreground: ForegroundModel::Ratio,
@@ -191,6 +249,17 @@ impl ParticleOptions {
         self.likelihoods.unwrap_or_else(|| Likelihoods::of(self.mode))
     }
 
+    /// The parts in use: none in paper mode.
+    pub(super) fn used_parts(&self) -> Parts {
+        if self.mode == ParticleMode::Improved { self.parts } else { Parts::all(false) }
+    }
+
+    /// Noise of the transition at a length scale.
+    pub(super) fn noise(&self, scale: f64) -> Noise {
+        let noise = Noise::of(self.mode, scale);
+        if self.used_parts().aspect { noise } else { Noise { aspect: None, ..noise } }
+    }
+
     /// Factor of all lengths for a picture of this many rows.
     pub fn length_scale(&self, rows: usize) -> f64 {
         self.scale.unwrap_or(rows as f64 / REFERENCE_ROWS)
@@ -200,60 +269,6 @@ impl ParticleOptions {
     pub(super) fn segmentation(&self, scale: f64) -> SegmentOptions {
         let min_size = self.segment_min_size.unwrap_or((SEGMENT_AREA * scale * scale).round() as usize);
         SegmentOptions { scale: self.segment_scale, sigma: self.segment_sigma, min_size }
-    }
-}
-
-/// Radius within which targets are near each other, in standard deviations of the position along each axis
-/// (equation (7) of the paper).
-const NEAR: f64 = 6.0;
-
-/// Noise of the transition and the start, in a picture of 480 rows: lengths in px, times in frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Noise {
-    /// Of the position, px.
-    pub position: f64,
-    /// Of the velocity, px/frame.
-    pub velocity: f64,
-    /// Of the logarithm of the size, common to both sides.
-    pub size: f64,
-    /// Of the logarithm of the aspect; `None`: the sides are independent.
-    pub aspect: Option<f64>,
-}
-
-impl Noise {
-    /// The noise of a mode at a length scale.
-    pub fn of(mode: ParticleMode, scale: f64) -> Self {
-        match mode {
-            ParticleMode::Paper => Self { position: 6.5 * scale, velocity: 0.2 * scale, size: 0.01, aspect: None },
-            ParticleMode::Improved => {
-                Self { position: 4.0 * scale, velocity: 0.35 * scale, size: 0.01, aspect: Some(0.003) }
-            }
-        }
-    }
-}
-
-impl Noise {
-    /// All of it multiplied by a factor.
-    pub fn times(self, factor: f64) -> Self {
-        Self {
-            position: factor * self.position,
-            velocity: factor * self.velocity,
-            size: factor * self.size,
-            aspect: self.aspect.map(|aspect| factor * aspect),
-        }
-    }
-}
-
-/// Distance up to which targets are near each other, and parts of the foreground belong to a target, px.
-pub(super) fn near_radius(scale: f64) -> f64 {
-    NEAR * std::f64::consts::SQRT_2 * Noise::of(ParticleMode::Paper, scale).position
-}
-
-/// Weight of the colour similarity in the log-likelihood, no unit.
-pub(super) fn colour_gain(mode: ParticleMode) -> f64 {
-    match mode {
-        ParticleMode::Paper => 12.0,
-        ParticleMode::Improved => 15.0,
     }
 }
 
@@ -283,6 +298,9 @@ mod tests {
             Likelihoods::from_names(&["colour", "velocity", "tracks"]).unwrap(),
             Likelihoods::of(ParticleMode::Improved)
         );
+        let without = Parts::without(&["hidden", "labels"]).unwrap();
+        assert_eq!(without, Parts { hidden: false, labels: false, ..Parts::all(true) });
+        assert!(Parts::without(&["size"]).unwrap_err().to_string().starts_with("without: "));
         assert!(Likelihoods::from_names(&["color"]).unwrap_err().to_string().starts_with("likelihoods: "));
     }
 }

@@ -4,7 +4,7 @@
 //! bins, the pyramid) is made again.
 
 use super::corners::{Corners, Track};
-use super::options::{ParticleMode, ParticleOptions};
+use super::options::ParticleOptions;
 use super::record::{Particles, StepRecord};
 use super::report::REASONS;
 use super::step::ParticleStep;
@@ -146,7 +146,7 @@ impl ParticleTracker {
         let last = saved.last.restore()?;
         let (size, options) = (last.size(), saved.options);
         options.check()?;
-        let view = options.threads.install(|| View::new(&last, saved.gain, options.mode == ParticleMode::Improved));
+        let view = options.threads.install(|| View::new(&last, saved.gain, options.used_parts().values));
         let pyramid = options.threads.install(|| Corners::pyramid(view.grey));
         let scale = options.length_scale(size.1);
         let mut corners = Corners::new(scale);

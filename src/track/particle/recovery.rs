@@ -35,7 +35,8 @@ pub(super) struct Recovery {
 /// Looks for the target in the densest group of tracks without an owner.
 pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Option<Recovery> {
     let seeing = &moment.seeing[own];
-    if seeing.hidden < HIDDEN_FRAMES || !moment.factors.tracks || !moment.factors.colour {
+    let on = moment.factors.tracks && moment.factors.colour && moment.options.used_parts().recovery;
+    if seeing.hidden < HIDDEN_FRAMES || !on {
         return None;
     }
     // Two hidden targets in one place cannot be distinguished.

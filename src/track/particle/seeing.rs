@@ -5,7 +5,8 @@ use super::camera::CameraMotion;
 use super::corners::Track;
 use super::geometry::{covered_share, distance, holds};
 use super::labels::{Labelled, review};
-use super::options::{ParticleMode, ParticleOptions, near_radius};
+use super::noise::near_radius;
+use super::options::{ParticleMode, ParticleOptions};
 use super::presence::COVER;
 use super::target::Target;
 
@@ -31,7 +32,7 @@ pub(super) struct Seeing {
     pub usual_velocity: [f64; 2],
     /// Frames since it became hidden.
     pub hidden: usize,
-    /// Whether it left the picture.
+    /// Whether it is out of the picture.
     pub is_out: bool,
     /// Which others are near.
     pub near: Vec<usize>,
@@ -54,6 +55,11 @@ pub(super) fn look(
 ) -> Vec<Seeing> {
     let mut seeing: Vec<Seeing> = targets.iter().map(|target| predicted(target, camera)).collect();
     find_near(&mut seeing, targets, options, scale);
+    let judges_hidden = options.factors().tracks && options.used_parts().hidden;
+    if !judges_hidden {
+        // A cut hides every target for one frame, whatever the mode.
+        targets.iter_mut().for_each(|target| target.presence.hidden = 0);
+    }
     if !options.factors().tracks {
         return seeing;
     }
@@ -74,7 +80,7 @@ pub(super) fn look(
         let target = &mut targets[own];
         let count = tracks.iter().filter(|track| track.owner == Some(target.id)).count();
         seeing[own].labelled = count;
-        if target.is_out {
+        if target.is_out || !judges_hidden {
             continue;
         }
         let returning = returning_tracks(tracks, &seeing, own, scale);

@@ -9,7 +9,8 @@ use super::evidence::{Evidence, track_evidence};
 use super::foreground::ForegroundMap;
 use super::geometry::distance;
 use super::likelihood::{DistanceFactor, Factors, TrackFactor, VelocityFactor};
-use super::options::{Likelihoods, Noise, ParticleMode, ParticleOptions, colour_gain};
+use super::noise::colour_gain;
+use super::options::{Likelihoods, ParticleOptions};
 use super::presence::Presence;
 use super::recovery::{Recovery, recover};
 use super::seeing::Seeing;
@@ -31,7 +32,7 @@ pub(super) struct Target {
     pub cloud: Cloud,
     pub estimate: Particle,
     pub presence: Presence,
-    /// Whether its centre has left the picture: it is not followed any more.
+    /// Whether its centre, carried on by one frame, leaves the picture: it is no longer followed.
     pub is_out: bool,
     /// Whether no frame has come since it was added.
     pub is_new: bool,
@@ -60,12 +61,12 @@ impl Target {
         let (bins, frame) = moment;
         let scale = options.length_scale(bins.height());
         let [x, y, w, h] = bounds;
-        let start = Start { mean: [x, y, 0.0, 0.0, w, h], noise: Noise::of(options.mode, scale), scale };
+        let start = Start { mean: [x, y, 0.0, 0.0, w, h], noise: options.noise(scale), scale };
         let cloud = Cloud::begin(&start, options.n_particles, stream(options.seed, id, frame, Purpose::Start));
         Self {
             id,
             first_size: [w, h],
-            appearance: Appearance::learn(bins, bounds, options.mode == ParticleMode::Improved),
+            appearance: Appearance::learn(bins, bounds, options.used_parts().contrast),
             effective_sample_size: options.n_particles as f64,
             cloud,
             estimate: start.mean,
@@ -101,10 +102,10 @@ impl Target {
         let (selection, transition) = (rng(Purpose::Selection), rng(Purpose::Transition));
         let count = if seeing.near.is_empty() { moment.options.n_particles } else { moment.options.n_near };
         self.cloud.select(moment.options.resampling, moment.options.ess_threshold, count, selection);
-        if self.is_new && moment.factors.tracks {
+        if self.is_new && moment.factors.tracks && moment.options.used_parts().quick_start {
             self.quick_start(moment.tracks, rng(Purpose::QuickStart));
         }
-        let noise = Noise::of(moment.options.mode, moment.scale).times(self.presence.noise());
+        let noise = moment.options.noise(moment.scale).times(self.presence.noise());
         self.cloud.predict(&moment.camera, &noise, self.first_size, transition);
         let mut prediction = seeing.place;
         if seeing.entered_low {
@@ -113,7 +114,7 @@ impl Target {
         if let Some(Recovery { place, velocity }) = recover(self, own, moment) {
             let [_, _, w, h] = seeing.bounds;
             let mean = [place[0], place[1], velocity[0], velocity[1], w, h];
-            let start = Start { mean, noise: Noise::of(moment.options.mode, moment.scale), scale: moment.scale };
+            let start = Start { mean, noise: moment.options.noise(moment.scale), scale: moment.scale };
             self.cloud = Cloud::begin(&start, count, rng(Purpose::Start));
             self.presence.hidden = 0;
             self.estimate = mean;
@@ -131,7 +132,7 @@ impl Target {
     /// The frame shows nothing: particles move on without being weighed.
     pub fn coast(&mut self, options: &ParticleOptions, scale: f64, frame: usize) {
         let rng = stream(options.seed, self.id, frame, Purpose::Transition);
-        self.cloud.predict(&CameraMotion::NONE, &Noise::of(options.mode, scale), self.first_size, rng);
+        self.cloud.predict(&CameraMotion::NONE, &options.noise(scale), self.first_size, rng);
         self.estimate = self.cloud.mean();
         self.effective_sample_size = self.cloud.effective_sample_size();
         self.degenerate = false;
