@@ -1,16 +1,21 @@
-//! Time of a frame in the gradient tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and a target of 80 px in 720 x 480.
+//! Time of a frame in the trackers. Particle tracker: two targets that look alike in 720 x 480. Gradient tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and a target of 80 px in 720 x 480.
 //!
 //! One thread. `python benchmarks/tracking.py` times the same beside OpenCV's trackers.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use jacoflow::parallel::Threads;
+use jacoflow::synth::targets::{TargetScene, TargetSceneOptions};
 use jacoflow::track::Tracker;
 use jacoflow::track::gradient::{GradientOptions, GradientTracker, Mode, Start};
-use jacoflow::types::{Frame, TargetBox};
+use jacoflow::track::particle::{ParticleMode, ParticleOptions, ParticleTracker};
+use jacoflow::types::{AnyColourFrame, Frame, TargetBox};
 use std::hint::black_box;
 use std::time::Duration;
 
 /// Frames of a lap, after which the scene is where it began.
 const LAP: usize = 50;
+/// Frames of the scene of the particle tracker.
+const PARTICLE_FRAMES: usize = 20;
 
 /// A scene: an even square on a lap over a smooth background that a camera may sway over.
 struct Scene {
@@ -72,5 +77,33 @@ fn track(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, track);
+/// Two people who walk towards each other before a handheld camera, 720 x 480.
+fn particles(criterion: &mut Criterion) {
+    let scene_options =
+        TargetSceneOptions { scale: 1.0, frames: Some(PARTICLE_FRAMES), ..TargetSceneOptions::default() };
+    let scene = TargetScene::new("people_handheld", scene_options).expect("a known scene");
+    let frames: Vec<_> = (0..PARTICLE_FRAMES).map(|t| AnyColourFrame::U8(scene.frame(t))).collect();
+    let targets: Vec<_> = (0..scene.target_count()).map(|k| (k as u64, scene.target_box(0, k))).collect();
+    let mut group = criterion.benchmark_group("720x480, two people, particle filters");
+    group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
+    for mode in ParticleMode::ALL {
+        let options =
+            ParticleOptions { mode, threads: Threads::new(Some(1)).expect("one thread"), ..ParticleOptions::default() };
+        let begun = ParticleTracker::new(&frames[0], &targets, &options).expect("boxes in the picture");
+        let mut tracker = begun.clone();
+        let mut next = 0;
+        group.bench_function(BenchmarkId::from_parameter(mode.name()), |bencher| {
+            bencher.iter(|| {
+                next += 1;
+                if next == PARTICLE_FRAMES {
+                    (tracker, next) = (begun.clone(), 1);
+                }
+                black_box(tracker.update(&frames[next]).expect("frames of one size").frame)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, track, particles);
 criterion_main!(benches);

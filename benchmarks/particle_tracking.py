@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import datetime
 import os
+import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -20,17 +21,20 @@ import numpy as np
 
 import particle_recordings
 from jacoflow import scenes
+from jacoflow.track import ParticleTracker
 from particle_rivals import RIVALS, Contestant, Sequence, Settings, rivals
 from particle_scores import FOUND, ended_at_truth, multiple_object, overlaps, success
 
 Row = dict[str, object]
 Tables = dict[str, list[Row]]
-NAMES = ("likelihoods", "readings", "parts", "scenes", "recordings")
+NAMES = ("likelihoods", "readings", "parts", "scenes", "recordings", "speed")
 PAPER_SCENES = ("people_handheld", "cars_handheld", "people_static")
 """Scenes of the paper: both handheld ones and the static one."""
 HARD_SCENES = ("slow_cross", "stop_and_go", "pillar")
 PAPER, IMPROVED = ("colour", "velocity", "distance", "foreground"), ("colour", "velocity", "tracks")
 """Factors of the likelihood in each mode."""
+PIECES = ("camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery")
+"""Parts of the improved mode that are no factors of the likelihood."""
 RECORDINGS, RUNS, SEEDS = (10, 11), 3, (0, 1, 2)
 """Seeds of the scenes and runs of the tracker on them, and its seeds on recordings, by default."""
 IMPROVED_MODE, PAPER_MODE = Settings("improved mode", "improved"), Settings("paper mode", "paper")
@@ -51,10 +55,12 @@ READINGS = (
 PARTS = (
     IMPROVED_MODE,
     *(without("improved", IMPROVED, factor) for factor in IMPROVED),
+    *(Settings(f"improved mode without {part}", "improved", {"without": (part,)}) for part in PIECES),
     Settings("improved mode with distance", "improved", {"likelihoods": (*IMPROVED, "distance")}),
     Settings("improved mode with foreground", "improved", {"likelihoods": (*IMPROVED, "foreground")}),
     Settings("improved mode, systematic, below N/2", "improved", {"resampling": "systematic", "ess_threshold": 0.5}),
     Settings("improved mode, 300 and 600 particles", "improved", {"n_particles": 300, "n_near": 600}),
+    Settings("improved mode, 100 and 200 particles", "improved", {"n_particles": 100, "n_near": 200}),
 )
 
 
@@ -117,6 +123,24 @@ def single(data: Path, contestants: list[Contestant]) -> list[Row]:
     return rows
 
 
+def speed(threads: int = 2, rounds: int = 3) -> list[Row]:
+    """Time of a frame of 720 x 480 with two targets that cross, 1000 particles each and 2000 while they are near, beside CSRT, in one run."""
+    made = scenes.TargetScene("people_handheld", seed=SEEDS[0], scale=1.0)
+    frames, boxes = made.frames(), made.boxes()
+    times: dict[str, list[float]] = {}
+    for mode in ("improved", "paper") * rounds:
+        tracker = ParticleTracker(frames[0], boxes[0], mode=mode, threads=threads)
+        for frame in frames[1:]:
+            start = time.perf_counter()
+            tracker.update(frame)
+            times.setdefault(f"{mode} mode", []).append(1e3 * (time.perf_counter() - start))
+    for each in rivals(("CSRT", "KCF")):
+        start = time.perf_counter()
+        each.follow(Sequence("speed", frames, boxes), 0)
+        times[f"{each.name}, one thread"] = [1e3 * (time.perf_counter() - start) / (len(frames) - 1)]
+    return [{"tracker": name, "mean, ms": round(float(np.mean(each)), 1), "median, ms": round(float(np.median(each)), 1)} for name, each in times.items()]
+
+
 def sections(
     data: Path | None,
     *,
@@ -145,6 +169,7 @@ def sections(
         "readings": {"Particle tracker, readings of the paper": lambda: on(PAPER_SCENES, among(READINGS))},
         "parts": {"Particle tracker, parts of the improved mode": lambda: on(HARD_SCENES, among(PARTS))},
         "scenes": {"Particle tracker, ten scenes": lambda: on(tuple(scenes.target_scenes()), among(beyond, others))},
+        "speed": {"Particle tracker, time of a frame of 720 x 480, two targets, two threads": speed},
         "recordings": {
             f"Particle tracker, {particle_recordings.CAMPUS}": lambda: [] if data is None else campus(data, among(modes), among((), others)),
             "Particle tracker, other recordings": lambda: [] if data is None else single(data, among(modes, others)),
