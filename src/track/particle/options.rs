@@ -112,6 +112,7 @@ impl Likelihoods {
 
 /// Parts of the improved mode, each of which can be left out to see what it is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[allow(clippy::struct_excessive_bools, reason = "each part is left out by itself")]
 pub struct Parts {
     /// Particles move with the background's affine motion.
     pub camera: bool,

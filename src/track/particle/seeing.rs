@@ -58,7 +58,9 @@ pub(super) fn look(
     let judges_hidden = options.factors().tracks && options.used_parts().hidden;
     if !judges_hidden {
         // A cut hides every target for one frame, whatever the mode.
-        targets.iter_mut().for_each(|target| target.presence.hidden = 0);
+        for target in targets.iter_mut() {
+            target.presence.hidden = 0;
+        }
     }
     if !options.factors().tracks {
         return seeing;
