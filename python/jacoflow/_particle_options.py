@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -72,9 +72,11 @@ def _real(name: str, value: Any) -> float:
 
 def _names(name: str, value: Any) -> list[str]:
     """Names of likelihoods or parts, no unit."""
-    if isinstance(value, str) or not all(isinstance(each, str) for each in value):
+    # An iterator is read once: reading it for the check alone would leave no names.
+    names: list[Any] = [None] if isinstance(value, str) or not isinstance(value, Iterable) else list(value)
+    if not all(isinstance(each, str) for each in names):
         raise ValueError(f"{name}: expected a sequence of names, got {value!r}")
-    return list(value)
+    return names
 
 
 def _segmentation(value: Any) -> tuple[float, float, int | None]:
