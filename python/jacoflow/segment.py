@@ -23,6 +23,9 @@ from ._jacoflow import _felzenszwalb, _region_means
 
 __all__ = ["felzenszwalb", "region_means"]
 
+MOST_PIXELS = 2**30
+"""Most pixels of an image, px: any larger `min_size` means one region."""
+
 
 def felzenszwalb(
     image: ArrayLike, scale: float = 1, sigma: float = 0.8, min_size: int = 20, *, threads: int | None = None
@@ -63,7 +66,11 @@ def felzenszwalb(
     ValueError names an argument that is negative, not finite or empty, or the shape; TypeError the type of
     the samples.
     """
-    return _felzenszwalb(image, scale, sigma, operator.index(min_size), threads)
+    try:
+        smallest = operator.index(min_size)
+    except TypeError:
+        raise TypeError(f"min_size: expected an integer, got {min_size!r}") from None
+    return _felzenszwalb(image, scale, sigma, max(-MOST_PIXELS, min(smallest, MOST_PIXELS)), threads)
 
 
 def region_means(labels: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
