@@ -12,7 +12,7 @@ const REACH_BOX: f64 = 0.65;
 const REACH_SPREAD: (f64, f64) = (6.0, 3.0);
 /// Weight of background tracks as evidence against a moving target.
 const BACKGROUND_PENALTY: f64 = 0.7;
-/// Speed at which they have half of it is in px/frame at 480 rows: up to this it grows with the speed.
+/// Target speed from which the penalty is full, px/frame at 480 rows; below, it grows with the speed.
 const FULL_PENALTY_SPEED: f64 = 1.0;
 /// Weight of tracks inside another target's box.
 const SHARED: f64 = 0.3;
