@@ -309,6 +309,27 @@ def test_a_cut_lets_all_targets_coast(apart):
     assert (step.n_tracks == 0).all() and (step.tracks.owner == -1).all()
 
 
+def test_a_known_camera_counts_through_frames_that_show_nothing(apart):
+    # The camera turns left by 3 px a frame; one frame is lost on the way.
+    frames = [np.roll(frame, 3 * t, axis=1).astype(np.float32) for t, frame in enumerate(apart.frames)]
+    camera = [[1, 0, 3], [0, 1, 0]]
+    tracker = ParticleTracker(frames[0], apart.boxes[0], **FEW)
+    for t in range(1, 6):
+        frame = np.full_like(frames[t], np.nan) if t == 3 else frames[t]
+        step = tracker.update(frame, camera=camera)
+        if t == 4:
+            np.testing.assert_allclose(step.camera, [[1, 0, 6], [0, 1, 0]], atol=1e-12)
+    background = step.tracks.p < 0.5
+    assert np.abs(np.median(step.tracks.residuals[background], axis=0)).max() < 0.1
+
+
+def test_nothing_shown_for_long_is_lost(apart):
+    tracker = ParticleTracker(apart.frames[0].astype(np.float32), apart.boxes[0], **FEW)
+    nothing = np.full(apart.frames[0].shape, np.nan, np.float32)
+    statuses = [tracker.update(nothing).status[0] for _ in range(40)]
+    assert statuses[0] == "coasting" and set(statuses[30:]) <= {"lost", "out"}
+
+
 @pytest.mark.parametrize("options", [{}, {"mode": "paper"}, {"without": ("hidden",)}, {"likelihoods": ("colour", "velocity")}])
 def test_a_cut_ends_when_the_scene_comes_back(apart, options):
     other = Clip("cars_handheld", 0, 1, seed=4).frames[0]
@@ -524,7 +545,7 @@ def test_boxes_that_cannot_be_followed_are_named(boxes, message):
         ({"n_particles": 0}, "n_particles: expected at least 8 particles, got 0"),
         ({"n_near": -1}, "n_near: expected an integer from 0 to 100000000, got -1"),
         ({"n_particles": 10**30}, "n_particles: expected an integer from 0 to 100000000, got 1000"),
-        ({"scale": 0.0}, "scale: expected a positive number, got 0"),
+        ({"scale": 0.0}, "scale: expected a positive number up to 100, got 0"),
         ({"likelihoods": ("colour", "speed")}, "likelihoods: expected names among colour, velocity, distance, tracks, foreground, got speed"),
         ({"likelihoods": "colour"}, "likelihoods: expected a sequence of names, got 'colour'"),
         ({"likelihoods": 3}, "likelihoods: expected a sequence of names, got 3"),

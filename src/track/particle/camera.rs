@@ -52,6 +52,16 @@ impl CameraMotion {
         [0, 1].map(|i| self.shift[i] + self.jacobian[i][0] * dx + self.jacobian[i][1] * dy)
     }
 
+    /// This motion and then another one.
+    pub fn then(&self, next: &Self) -> Self {
+        let ([a, b], [c, d]) = (self.to_affine(), next.to_affine());
+        let row = |next: [f64; 3]| {
+            let at = |k: usize| next[0] * a[k] + next[1] * b[k];
+            [at(0), at(1), at(2) + next[2]]
+        };
+        Self::from_affine([row(c), row(d)])
+    }
+
     /// Where something at a place of the frame before is that moves relative to the background.
     pub fn carry(&self, place: [f64; 2], velocity: [f64; 2]) -> [f64; 2] {
         let c = self.at(place);
@@ -295,6 +305,16 @@ mod tests {
             fit_background(&vec![[3.0, 3.0]; 30], &flow, None, CounterRng::new(1)).motion.at([3.0, 3.0])[0],
             0.5
         );
+    }
+
+    #[test]
+    fn two_motions_one_after_the_other() {
+        let (.., first) = tracks(1, 0.0);
+        let second = CameraMotion { origin: [9.0, -2.0], shift: [1.0, 0.5], jacobian: [[0.1, 0.2], [-0.3, 0.05]] };
+        let place = [30.0, 70.0];
+        let want = second.carry(first.carry(place, [0.0; 2]), [0.0; 2]);
+        let got = first.then(&second).carry(place, [0.0; 2]);
+        assert!((got[0] - want[0]).hypot(got[1] - want[1]) < 1e-10, "{got:?} {want:?}");
     }
 
     #[test]

@@ -14,6 +14,8 @@ const QUALITY: f64 = 0.005;
 const MIN_DISTANCE: f64 = 6.0;
 /// Distance between corners in any picture, px.
 const LEAST_DISTANCE: f64 = 3.0;
+/// Largest side of the window of the point flow, px.
+const MAX_WINDOW: usize = 255;
 /// Levels of the pyramid of the point flow.
 const LEVELS: usize = 3;
 /// Greatest distance between a corner and where its flow leads forward and back, px.
@@ -67,7 +69,7 @@ impl Corners {
             min_distance: LEAST_DISTANCE.max(MIN_DISTANCE * scale),
             ..CornerOptions::default()
         };
-        let window = 2 * (8.0 * scale).ceil() as usize + 3;
+        let window = (2 * (8.0 * scale).ceil() as usize + 3).min(MAX_WINDOW);
         let flow = PointFlowOptions {
             levels: LEVELS,
             window,

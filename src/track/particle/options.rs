@@ -8,6 +8,8 @@ use crate::segment::SegmentOptions;
 
 /// Rows of the pictures that the lengths below are given for; others multiply them by rows / 480.
 const REFERENCE_ROWS: f64 = 480.0;
+/// Largest factor of all lengths: pictures of 48,000 rows.
+const MAX_SCALE: f64 = 100.0;
 /// Colour distance at which the segmentation lets regions grow, grey levels.
 const SEGMENT_SCALE: f64 = 150.0;
 /// Smoothing before the segmentation, px.
@@ -235,8 +237,8 @@ impl ParticleOptions {
                 return Err(Error::argument(name, format!("at least {MIN_PARTICLES} particles"), count));
             }
         }
-        if let Some(scale) = self.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
-            return Err(Error::argument("scale", "a positive number", scale));
+        if let Some(scale) = self.scale.filter(|scale| !(*scale > 0.0 && *scale <= MAX_SCALE)) {
+            return Err(Error::argument("scale", format!("a positive number up to {MAX_SCALE}"), scale));
         }
         if !(0.0..=1.0).contains(&self.ess_threshold) {
             return Err(Error::argument("ess_threshold", "a share from 0 to 1", self.ess_threshold));

@@ -39,6 +39,7 @@ struct SavedTracker {
     last: SavedFrame,
     step: SavedStep,
     next_id: u64,
+    missed: Vec<Option<[[f64; 3]; 2]>>,
 }
 
 /// A step, and the reasons of its targets as their places in a list.
@@ -133,6 +134,7 @@ impl ParticleTracker {
             last: SavedFrame::of(&self.last),
             step: SavedStep::of(&self.step),
             next_id: self.next_id,
+            missed: self.missed.clone(),
         };
         sealed(TRACKER_MARK, &saved)
     }
@@ -165,6 +167,7 @@ impl ParticleTracker {
             last: Arc::new(last),
             step: saved.step.restore()?,
             next_id: saved.next_id,
+            missed: saved.missed,
         })
     }
 }

@@ -132,7 +132,9 @@ impl Target {
     /// The frame shows nothing: particles move on without being weighed.
     pub fn coast(&mut self, options: &ParticleOptions, scale: f64, frame: usize) {
         let rng = stream(options.seed, self.id, frame, Purpose::Transition);
-        self.cloud.predict(&CameraMotion::NONE, &options.noise(scale), self.first_size, rng);
+        self.presence.hide();
+        let noise = options.noise(scale).times(self.presence.noise());
+        self.cloud.predict(&CameraMotion::NONE, &noise, self.first_size, rng);
         self.estimate = self.cloud.mean();
         self.effective_sample_size = self.cloud.effective_sample_size();
         self.degenerate = false;

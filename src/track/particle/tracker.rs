@@ -54,6 +54,8 @@ pub struct ParticleTracker {
     pub(super) last: Arc<AnyColourFrame>,
     pub(super) step: ParticleStep,
     pub(super) next_id: u64,
+    /// Known motion of the background in each frame that showed nothing, since the last one that did.
+    pub(super) missed: Vec<Option<[[f64; 3]; 2]>>,
 }
 
 impl ParticleTracker {
@@ -99,6 +101,7 @@ impl ParticleTracker {
             last: Arc::new(frame.clone()),
             step,
             next_id: 0,
+            missed: Vec::new(),
         };
         for (id, bounds) in targets {
             tracker.add(Some(*id), *bounds).map_err(|error| of_boxes(error, *id))?;
@@ -250,9 +253,13 @@ impl ParticleTracker {
         let view = View::new(frame, self.gain, self.options.used_parts().values);
         if view.is_empty() {
             self.frame += 1;
+            self.missed.push(known.map(CameraMotion::to_affine));
             self.coast();
             return Ok(());
         }
+        // Corners are followed from the last frame that showed something: the camera must cover the same time.
+        let missed = std::mem::take(&mut self.missed).into_iter().map(|camera| camera.map(CameraMotion::from_affine));
+        let known = missed.chain([known]).reduce(|first, next| Some(first?.then(&next?))).flatten();
         let pyramid = Corners::pyramid(view.grey.clone());
         let was_cut = self.corners.follow(&self.pyramid, &pyramid)?;
         let camera = self.measure_background(known)?;
