@@ -18,7 +18,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Frames of a scene without targets, unless another number is asked for.
+/// Frames of a scene without targets, unless another number is given.
 const USUAL_FRAMES: usize = 10;
 
 /// Options of `synth`.

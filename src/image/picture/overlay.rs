@@ -91,7 +91,7 @@ impl TrackOverlay {
         self.draw_cross(picture, state.position, colour);
         if let Some(label) = corners.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1])]) {
             let [x, y] = self.on_picture(label);
-            // The number is what tells targets apart, so it is larger there.
+            // The number identifies the target, so it is larger there.
             let size = if by_target { 2 * self.enlargement } else { self.enlargement };
             draw_number(picture, target, x, y, size.clamp(1, if by_target { 4 } else { 3 }), colour);
         }

@@ -57,7 +57,7 @@ pub(super) fn look(
     find_near(&mut seeing, targets, options, scale);
     let judges_hidden = options.factors().tracks && options.used_parts().hidden;
     if !judges_hidden {
-        // A cut hides every target for one frame, whatever the mode.
+        // A cut hides every target for one frame, in every mode.
         for target in targets.iter_mut() {
             target.presence.hidden = 0;
         }
