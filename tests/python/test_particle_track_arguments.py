@@ -97,7 +97,7 @@ def test_other_arguments_are_named():
     with pytest.raises(ValueError, match="^frame: expected a picture of at least 8 x 8 px, got 7 x 30 px"):
         ParticleTracker(np.zeros((30, 7, 3), np.uint8), [])
     tracker = ParticleTracker(FRAME, [BOX], n_particles=8, n_near=8)
-    for camera in (np.eye(3), [1, 2], "left", np.full((2, 3), np.nan)):
+    for camera in (np.eye(3), [1, 2], "left", np.full((2, 3), np.nan), np.zeros((2, 3)), [[-1, 0, 0], [0, 1, 0]], np.full((2, 3), 1e300)):
         with pytest.raises(ValueError, match="^camera: expected an affine map"):
             tracker.update(FRAME, camera)
     for box in ([1, 2], [np.nan] * 4, [50, 50, 4, 4], None, "box"):

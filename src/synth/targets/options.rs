@@ -3,6 +3,9 @@
 use super::list::{SCENES, TargetSceneKind};
 use crate::error::{Error, Result};
 
+/// Largest number of frames: the paths of camera and targets are kept in memory.
+const MAX_FRAMES: usize = 1_000_000;
+
 /// Smallest and largest scale: below, a limb is thinner than a pixel; above, a frame has more than 6000
 /// columns.
 const SCALES: (f64, f64) = (0.1, 8.0);
@@ -47,8 +50,8 @@ impl TargetSceneOptions {
         if !(self.noise.is_finite() && self.noise >= 0.0) {
             return Err(Error::argument("noise", "a finite number of grey levels, 0 or more", self.noise));
         }
-        if self.frames == Some(0) {
-            return Err(Error::argument("frames", "a positive integer", 0));
+        if let Some(frames) = self.frames.filter(|frames| !(1..=MAX_FRAMES).contains(frames)) {
+            return Err(Error::argument("frames", format!("a positive integer up to {MAX_FRAMES}"), frames));
         }
         if !(0.0..=1.0).contains(&self.colour_cast) {
             return Err(Error::argument("colour_cast", "0 to 1", self.colour_cast));

@@ -20,6 +20,8 @@ use crate::types::{AnyColourFrame, Frame, TargetBox};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Growth of areas between two frames that a given camera may have.
+const CAMERA_AREAS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Smallest side of the pictures that are tracked in, px.
 const MIN_SIDE: usize = 8;
 /// The stream of random numbers of the background's motion: no target's number.
@@ -187,9 +189,10 @@ impl ParticleTracker {
             let expected = format!("a frame like the first one, {}", words(self.size, self.dtype));
             return Err(Error::argument("frame", expected, words(frame.size(), frame.dtype())));
         }
-        if let Some(camera) = camera.filter(|camera| !camera.as_flattened().iter().all(|value| value.is_finite())) {
+        if let Some(camera) = camera.filter(|camera| !is_camera(camera)) {
             let got = crate::error::numbers(camera.as_flattened());
-            return Err(Error::argument("camera", "an affine map (2, 3) of finite numbers", got));
+            let expected = "an affine map (2, 3) of finite numbers that does not mirror, nor shrink or enlarge areas more than 100 times";
+            return Err(Error::argument("camera", expected, got));
         }
         let threads = self.options.threads;
         threads.install(|| self.advance(frame, camera.map(CameraMotion::from_affine)))?;
@@ -380,4 +383,10 @@ fn of_boxes(error: Error, id: u64) -> Error {
         }
         other => other,
     }
+}
+
+/// Whether an affine map can be a camera's motion between two frames.
+fn is_camera(map: &[[f64; 3]; 2]) -> bool {
+    let [[a, b, _], [c, d, _]] = *map;
+    map.as_flattened().iter().all(|value| value.is_finite()) && CAMERA_AREAS.contains(&(a * d - b * c))
 }
