@@ -54,7 +54,7 @@ def frames(
     limit: int | None = None,
     step: int = 1,
 ) -> FrameReader:
-    """Iterates over the frames of a source, in their own dtype and levels; memory stays bounded whatever its length.
+    """Iterates over the frames of a source, in their own dtype and levels; memory stays bounded for any length.
 
     `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as "frames/*.png", one image, a .txt list of images, a
     .y4m file, "-" (Y4M on standard input), a .npy stack (T, H, W) or (T, H, W, 3), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`).

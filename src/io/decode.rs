@@ -35,7 +35,7 @@ pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<()>
     Err(Error::format(path, format!("a frame of {width} x {height} px (expected 1 to {MAX_SIDE} px each way)")))
 }
 
-/// Reads the picture in an image file, whatever its extension says: a grey frame with a policy of type [`Colour`](super::Colour), a colour
+/// Reads the picture in an image file by its content, not its extension: a grey frame with a policy of type [`Colour`](super::Colour), a colour
 /// frame with one of type [`Grey`](super::Grey).
 ///
 /// # Errors

@@ -18,7 +18,7 @@ pub(super) const KIND: Kind = Kind {
 /// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier ones.
 const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0"]];
 
-/// Conversion to what [`Y4mSource`] takes colour for, whatever matrix and depth the file has. Limited range, since older programs say nothing of the range.
+/// Conversion to what [`Y4mSource`] takes colour for, from any matrix and depth of the file. Limited range, since older programs say nothing of the range.
 const COLOUR: [&str; 2] = ["-vf", "scale=out_color_matrix=bt601:out_range=tv,format=yuv444p"];
 
 /// Frames of a video file. Grey ones are the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]); colour ones have 8 bit, converted by the program.
