@@ -1,9 +1,11 @@
 //! Time of the dense flow filter, per form, precision, instruction set and number of threads.
 //!
-//! Throughput is in pixel-steps: one prediction and one update of one pixel. The frames are 640 x 128, so that the states of a single-precision run (30 MB)
-//! do not fit into a cache, as those of a full frame would not.
+//! Throughput is in pixel-steps: one prediction and one update of one pixel. The frames are 640 x 128, so
+//! that the states of a single-precision run (30 MB) do not fit into a cache, as those of a full frame would
+//! not.
 //!
-//! Then the parts of a particle filter's cycle, in particles; `python benchmarks/particle_filter.py` times it beside NumPy and filterpy.
+//! Then the parts of a particle filter's cycle, in particles; `python benchmarks/particle_filter.py` times it
+//! beside NumPy and filterpy.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use jacoflow::filter::particle::{ParticleFilter, Resampling};

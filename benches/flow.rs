@@ -1,11 +1,12 @@
-//! Jets, instantaneous flow, corners and flow at points, 640x480, f32, one thread, at each instruction set of this processor.
+//! Jets, instantaneous flow, corners and flow at points, 640x480, f32, one thread, at each instruction set of
+//! this processor.
 //!
 //! The frames are a noise texture in affine motion with noise and rounding, as a camera would deliver it.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use jacoflow::flow::instantaneous::InstantaneousOptions;
 use jacoflow::flow::points::{PointFlowOptions, PointPyramid, track_points};
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::image::{CORNER_WINDOW, CornerOptions, corner_score_into, select_corners};
 use jacoflow::jet::{JetStencil, Neighbourhood, TimeScheme};
 use jacoflow::parallel::Threads;
@@ -54,7 +55,7 @@ fn instantaneous(c: &mut Criterion) {
         for level in Level::available() {
             let neighbourhood = Neighbourhood::square(side);
             let options = InstantaneousOptions { scheme, neighbourhood, ..InstantaneousOptions::default() };
-            let common = Common { threads: one_thread(), simd: Some(level), ..Common::default() };
+            let common = EstimatorOptions { threads: one_thread(), simd: Some(level), ..EstimatorOptions::default() };
             let estimator = Estimator::new(Method::Instantaneous(options), common).expect("the options are valid");
             let mut field = estimator.estimate(&three, 0).expect("the frames are valid");
             // A stream reuses its field; the second form makes a new one each time.
@@ -70,8 +71,13 @@ fn instantaneous(c: &mut Criterion) {
     }
     for (name, covariance, diagnostics) in [("3x3_covariance", true, false), ("3x3_diagnostics", false, true)] {
         for level in Level::available() {
-            let common =
-                Common { threads: one_thread(), simd: Some(level), covariance, diagnostics, ..Common::default() };
+            let common = EstimatorOptions {
+                threads: one_thread(),
+                simd: Some(level),
+                covariance,
+                diagnostics,
+                ..EstimatorOptions::default()
+            };
             let method = Method::Instantaneous(InstantaneousOptions::default());
             let estimator = Estimator::new(method, common).expect("the options are valid");
             let mut field = estimator.estimate(&three, 0).expect("the frames are valid");

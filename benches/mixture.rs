@@ -1,7 +1,9 @@
-//! Time of a round of the weighted variational mixture: 12 components, 5000 points in 2, 3, 6 and 10 dimensions, on one thread; first seeds apart.
-//! Then whole fits of Dirichlet-process mixtures to 1600 points in the plane, as the particle tracker needs two a frame.
+//! Time of a round of the weighted variational mixture: 12 components, 5000 points in 2, 3, 6 and 10
+//! dimensions, on one thread; first seeds apart. Then whole fits of Dirichlet-process mixtures to 1600 points
+//! in the plane, as the particle tracker needs two a frame.
 //!
-//! `python benchmarks/mixture.py` and `python benchmarks/dirichlet_mixture.py` time the same beside scikit-learn's.
+//! `python benchmarks/mixture.py` and `python benchmarks/dirichlet_mixture.py` time the same beside
+//! scikit-learn's.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::math::random::CounterRng;
@@ -74,7 +76,8 @@ fn flow() -> Vec<f64> {
     (0..CORNERS as u64).flat_map(vector).collect()
 }
 
-/// Positions all over a picture of 720 x 480 px, where no number of Gaussians is the right one, and their weights.
+/// Positions all over a picture of 720 x 480 px, where no number of Gaussians is the right one, and their
+/// weights.
 fn positions() -> (Vec<f64>, Vec<f64>) {
     let rng = CounterRng::new(4);
     let place = |n: u64| [720.0 * rng.stream(1).uniform(n), 480.0 * rng.stream(2).uniform(n)];

@@ -1,4 +1,5 @@
-//! Time of 3-D motion from the flow of 1000 and 100 000 points, on two threads: maximum likelihood, smoothed weights, robust search.
+//! Time of 3-D motion from the flow of 1000 and 100 000 points, on two threads: maximum likelihood, smoothed
+//! weights, robust search.
 //!
 //! `python benchmarks/motion3d.py --only speed` times the same beside OpenCV's essential matrices.
 

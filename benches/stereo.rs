@@ -1,7 +1,9 @@
-//! Time of matching two views and of a step of the stereo tracker, 640 x 480, on one thread and on two: direction classes beside semi-global matching, the paper's mode beside the
-//! improved one, whose mixture begins where the last one ended.
+//! Time of matching two views and of a step of the stereo tracker, 640 x 480, on one thread and on two:
+//! direction classes beside semi-global matching, the paper's mode beside the improved one, whose mixture
+//! begins where the last one ended.
 //!
-//! `JACOFLOW_SIMD=scalar` times the scalar twins of the kernels. `python benchmarks/stereo.py` and `stereo_tracking.py` give the quality that goes with the times.
+//! `JACOFLOW_SIMD=scalar` times the scalar twins of the kernels. `python benchmarks/stereo.py` and
+//! `stereo_tracking.py` give the quality that goes with the times.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::image::GaussianSmoother;

@@ -1,4 +1,6 @@
-//! Time of a frame in the trackers. Particle tracker: two targets that look alike in 720 x 480. Gradient tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and a target of 80 px in 720 x 480.
+//! Time of a frame in the trackers. Particle tracker: two targets that look alike in 720 x 480. Gradient
+//! tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and
+//! a target of 80 px in 720 x 480.
 //!
 //! One thread. `python benchmarks/tracking.py` times the same beside OpenCV's trackers.
 

@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use jacoflow::flow::windowed::{RowSet, WindowedOptions};
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::parallel::Threads;
 use jacoflow::types::{FlowField, Frame};
 use std::hint::black_box;
@@ -27,7 +27,7 @@ fn windowed(c: &mut Criterion) {
     for rows in RowSet::EVERY {
         for covariance in [false, true] {
             let threads = Threads::new(Some(1)).expect("one thread");
-            let common = Common { covariance, threads, ..Common::default() };
+            let common = EstimatorOptions { covariance, threads, ..EstimatorOptions::default() };
             let options = WindowedOptions { rows, ..WindowedOptions::default() };
             let estimator = Estimator::new(Method::Windowed(options), common).expect("default options");
             let mut field: FlowField<f32> = estimator.estimate(&refs, 0).expect("three frames of one size");

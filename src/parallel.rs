@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex};
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
 
-/// Values of a buffer up to which work outside every pool is not handed to one: waking its threads takes longer than the work.
+/// Values of a buffer up to which work outside every pool is not handed to one: waking its threads takes
+/// longer than the work.
 const SMALL: usize = 1 << 16;
 
 /// The environment variable that sets the number of threads.
@@ -23,10 +24,12 @@ pub const USEFUL: usize = 4;
 pub struct Threads(Option<usize>);
 
 impl Threads {
-    /// `None`: the number in the environment variable `JACOFLOW_THREADS`; where that is unset or empty, every processor.
+    /// `None`: the number in the environment variable `JACOFLOW_THREADS`; where that is unset or empty, every
+    /// processor.
     ///
     /// # Errors
-    /// [`Error::Argument`] for zero, or naming `JACOFLOW_THREADS` where that decides and is no positive number.
+    /// [`Error::Argument`] for zero, or naming `JACOFLOW_THREADS` where that decides and is no positive
+    /// number.
     pub fn new(count: Option<usize>) -> Result<Self> {
         if count == Some(0) {
             return Err(Error::argument("threads", "a positive integer", 0));
@@ -34,7 +37,8 @@ impl Threads {
         Self(count).check()
     }
 
-    /// The same, once it is certain that the environment does not ask for nonsense: a mistake there must not go unnoticed.
+    /// The same, once it is certain that the environment does not ask for nonsense: a mistake there must not
+    /// go unnoticed.
     ///
     /// # Errors
     /// As [`Threads::new`].
@@ -45,7 +49,8 @@ impl Threads {
         Ok(self)
     }
 
-    /// The number of threads this resolves to: what was asked for, but never more than [`USEFUL`] for each processor.
+    /// The number of threads this resolves to: what was asked for, but never more than [`USEFUL`] for each
+    /// processor.
     ///
     /// More would only cost memory, and thousands can bring a machine to its knees.
     pub fn count(self) -> usize {
@@ -90,8 +95,9 @@ fn pool(count: usize) -> Arc<rayon::ThreadPool> {
 
 /// A static value that a forked process makes anew instead of inheriting it.
 ///
-/// Of all threads only the one that called `fork` lives on in the child. A pool there has no threads, and a lock that another thread
-/// held is never released. So the parent's value is left alone, never locked and never dropped, at the price of its memory.
+/// Of all threads only the one that called `fork` lives on in the child. A pool there has no threads, and a
+/// lock that another thread held is never released. So the parent's value is left alone, never locked and
+/// never dropped, at the price of its memory.
 pub(crate) struct PerProcess<T>(AtomicPtr<Owned<T>>);
 
 struct Owned<T> {
@@ -131,9 +137,11 @@ impl<T: Default + Send + Sync> PerProcess<T> {
     }
 }
 
-/// Calls `work(band, rows, band_slice)` for every band of [`BAND_ROWS`] rows of a row-major buffer with `row_len` values a row.
+/// Calls `work(band, rows, band_slice)` for every band of [`BAND_ROWS`] rows of a row-major buffer with
+/// `row_len` values a row.
 ///
-/// Call it inside [`Threads::install`]; outside, small buffers are worked on by the caller and others by as many threads as by default.
+/// Call it inside [`Threads::install`]; outside, small buffers are worked on by the caller and others by as
+/// many threads as by default.
 pub fn for_each_band<T: Send>(
     buffer: &mut [T],
     row_len: usize,

@@ -1,22 +1,23 @@
-//! The instantaneous estimator on the reference scene of WO2010/098160 (embodiment 2) and at the edges of its domain.
+//! The instantaneous estimator on the reference scene of WO2010/098160 (embodiment 2) and at the edges of its
+//! domain.
 
 // Printed on purpose: the figures reached are part of the answer.
 #![allow(clippy::print_stdout)]
 
 use jacoflow::flow::instantaneous::InstantaneousOptions;
 use jacoflow::flow::model::ModelKind;
-use jacoflow::flow::{Common, Estimator, Method, RankPolicy};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method, RankPolicy};
 use jacoflow::image::{GaussianSmoother, Quantiser};
 use jacoflow::jet::{Neighbourhood, TimeScheme};
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::synth::{AffineTexture, RotatingRamp, Scene, Sensor};
-use jacoflow::types::{FlowField, Frame, Mask, Rect, Sites, Status};
+use jacoflow::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status};
 use std::f64::consts::PI;
 
 const W: f64 = PI / 100.0;
 
-fn estimator(options: InstantaneousOptions, common: Common) -> Estimator {
+fn estimator(options: InstantaneousOptions, common: EstimatorOptions) -> Estimator {
     Estimator::new(Method::Instantaneous(options), common).unwrap()
 }
 
@@ -48,9 +49,9 @@ fn bits(field: &FlowField<f32>) -> (Vec<u32>, Vec<Status>) {
 fn clean_ramp_backward_gives_the_known_digits_at_every_time() {
     let want = [-2.542467, 1.845170, -4.934396e-4, 3.1410759e-2, -3.1410759e-2, -4.934396e-4];
     let (scene, at) = ramp(2);
-    let common = Common { sites: Sites::Points(vec![at]), ..Common::default() };
+    let common = EstimatorOptions { sites: SamplingGrid::Points(vec![at]), ..EstimatorOptions::default() };
     let points = estimator(scheme(TimeScheme::Backward), common);
-    let dense = estimator(scheme(TimeScheme::Backward), Common::default());
+    let dense = estimator(scheme(TimeScheme::Backward), EstimatorOptions::default());
     for t in 2..400u32 {
         let frames: Vec<Frame<f64>> = (t - 2..=t).map(|t| scene.frame(f64::from(t))).collect();
         let field = points.estimate(&three(&frames), t as usize - 2).unwrap();
@@ -68,8 +69,10 @@ fn clean_ramp_backward_gives_the_known_digits_at_every_time() {
 fn clean_ramp_central_is_within_five_ten_thousandths_everywhere() {
     let scene = RotatingRamp::reference(120, 110);
     let frames: Vec<Frame<f64>> = (0..3).map(|t| scene.frame(f64::from(t))).collect();
-    let central = estimator(scheme(TimeScheme::Central), Common::default()).estimate(&three(&frames), 0).unwrap();
-    let backward = estimator(scheme(TimeScheme::Backward), Common::default()).estimate(&three(&frames), 0).unwrap();
+    let central =
+        estimator(scheme(TimeScheme::Central), EstimatorOptions::default()).estimate(&three(&frames), 0).unwrap();
+    let backward =
+        estimator(scheme(TimeScheme::Backward), EstimatorOptions::default()).estimate(&three(&frames), 0).unwrap();
     assert_eq!(central.layout.frame_index, 1);
     let error = |field: &FlowField<f64>, x: usize, y: usize| {
         let truth = scene.motion(x as f64, y as f64, 1.0).unwrap().to_array();
@@ -96,7 +99,11 @@ fn quantised_and_smoothed_ramp_is_useless_as_the_patent_shows() {
     let mut frames: Vec<Frame<f64>> = Vec::new();
     let estimator = estimator(
         scheme(TimeScheme::Backward),
-        Common { sites: Sites::Points(vec![at]), threads: Threads::new(Some(1)).unwrap(), ..Common::default() },
+        EstimatorOptions {
+            sites: SamplingGrid::Points(vec![at]),
+            threads: Threads::new(Some(1)).unwrap(),
+            ..EstimatorOptions::default()
+        },
     );
     let mut errors = Vec::new();
     for t in 0..402u32 {
@@ -123,7 +130,7 @@ fn u8_u16_and_unit_floats_give_the_same_flow() {
     let eight = texture(3);
     let run = |gain: f64| {
         let frames: Vec<Frame<f32>> = eight.iter().map(|f| f.map(|v| (v * gain) as f32)).collect();
-        estimator(InstantaneousOptions::default(), Common::default()).estimate(&three(&frames), 0).unwrap()
+        estimator(InstantaneousOptions::default(), EstimatorOptions::default()).estimate(&three(&frames), 0).unwrap()
     };
     let want = run(1.0);
     assert!(want.status.iter().filter(|s| **s == Status::Ok).count() > 2500);
@@ -143,10 +150,10 @@ fn every_instruction_set_and_precision_agrees() {
     for side in [3, 5] {
         let options = InstantaneousOptions { neighbourhood: Neighbourhood::square(side), ..Default::default() };
         // Diagnostics force the careful path: the oracle.
-        let careful = Common { diagnostics: true, ..Common::default() };
+        let careful = EstimatorOptions { diagnostics: true, ..EstimatorOptions::default() };
         let want = estimator(options.clone(), careful).estimate(&three(&frames), 0).unwrap();
         for level in Level::available() {
-            let common = || Common { simd: Some(level), ..Common::default() };
+            let common = || EstimatorOptions { simd: Some(level), ..EstimatorOptions::default() };
             let double = estimator(options.clone(), common()).estimate(&three(&frames), 0).unwrap();
             let fast = estimator(options.clone(), common()).estimate(&three(&single), 0).unwrap();
             assert_eq!((&double.status, &fast.status), (&want.status, &want.status), "{level:?}");
@@ -167,7 +174,8 @@ fn one_and_two_threads_give_the_same_bits() {
     let frames: Vec<Frame<f32>> = texture(5).iter().map(|f| f.map(|v| *v as f32)).collect();
     for covariance in [false, true] {
         let run = |n| {
-            let common = Common { covariance, threads: Threads::new(Some(n)).unwrap(), ..Common::default() };
+            let common =
+                EstimatorOptions { covariance, threads: Threads::new(Some(n)).unwrap(), ..EstimatorOptions::default() };
             bits(&estimator(InstantaneousOptions::default(), common).estimate(&three(&frames), 0).unwrap())
         };
         assert_eq!(run(1), run(2));
@@ -177,20 +185,20 @@ fn one_and_two_threads_give_the_same_bits() {
 #[test]
 fn grids_regions_and_points_are_the_dense_field_at_their_pixels() {
     let frames: Vec<Frame<f32>> = texture(6).iter().map(|f| f.map(|v| *v as f32)).collect();
-    let run = |sites: Sites| {
-        let common = Common { sites, ..Common::default() };
+    let run = |sites: SamplingGrid| {
+        let common = EstimatorOptions { sites, ..EstimatorOptions::default() };
         estimator(InstantaneousOptions::default(), common).estimate(&three(&frames), 0).unwrap()
     };
-    let dense = run(Sites::default());
+    let dense = run(SamplingGrid::default());
     let region = |x, y, width, height| Some(Rect { x, y, width, height });
     let shapes = [
-        Sites::Grid { region: None, stride: 3 },
-        Sites::Grid { region: None, stride: 59 },
-        Sites::Grid { region: region(7, 9, 20, 31), stride: 1 },
-        Sites::Grid { region: region(40, 30, 20, 20), stride: 4 },
-        Sites::Grid { region: region(59, 10, 1, 5), stride: 1 },
-        Sites::Grid { region: region(10, 10, 3, 3), stride: 1 },
-        Sites::Points(vec![(30, 20), (0, 0), (58, 48), (59, 49), (30, 20)]),
+        SamplingGrid::Grid { region: None, stride: 3 },
+        SamplingGrid::Grid { region: None, stride: 59 },
+        SamplingGrid::Grid { region: region(7, 9, 20, 31), stride: 1 },
+        SamplingGrid::Grid { region: region(40, 30, 20, 20), stride: 4 },
+        SamplingGrid::Grid { region: region(59, 10, 1, 5), stride: 1 },
+        SamplingGrid::Grid { region: region(10, 10, 3, 3), stride: 1 },
+        SamplingGrid::Points(vec![(30, 20), (0, 0), (58, 48), (59, 49), (30, 20)]),
     ];
     for sites in shapes {
         let field = run(sites.clone());
@@ -209,8 +217,8 @@ fn grids_regions_and_points_are_the_dense_field_at_their_pixels() {
 #[test]
 fn a_field_can_be_filled_again() {
     let (a, b) = (texture(7), texture(8));
-    let common = Common { diagnostics: true, covariance: true, ..Common::default() };
-    for common in [Common::default(), common] {
+    let common = EstimatorOptions { diagnostics: true, covariance: true, ..EstimatorOptions::default() };
+    for common in [EstimatorOptions::default(), common] {
         let estimator = estimator(InstantaneousOptions::default(), common);
         let want = estimator.estimate(&three(&b), 5).unwrap();
         let mut field = estimator.estimate(&three(&a), 0).unwrap();
@@ -233,7 +241,7 @@ fn a_bad_block_and_a_mask_damage_only_what_touches_them() {
     for side in [3usize, 5] {
         let r = side / 2;
         let options = InstantaneousOptions { neighbourhood: Neighbourhood::square(side), ..Default::default() };
-        let common = Common { mask: Some(mask.clone()), ..Common::default() };
+        let common = EstimatorOptions { mask: Some(mask.clone()), ..EstimatorOptions::default() };
         let field = estimator(options, common).estimate(&three(&frames), 0).unwrap();
         for y in 0..50usize {
             for x in 0..60usize {
@@ -259,7 +267,7 @@ fn a_bad_block_and_a_mask_damage_only_what_touches_them() {
 #[test]
 fn unusable_frames_are_refused_by_name_and_constant_ones_are_not() {
     let estimator_of = |common| estimator(InstantaneousOptions::default(), common);
-    let e = estimator_of(Common::default());
+    let e = estimator_of(EstimatorOptions::default());
     let frame = |w: usize, h: usize| Frame::filled(w, h, 0.7f32);
     let (a, b, small) = (frame(8, 8), frame(8, 9), frame(2, 8));
     for (bad, word) in [
@@ -272,13 +280,15 @@ fn unusable_frames_are_refused_by_name_and_constant_ones_are_not() {
         assert!(message.starts_with("frames") && message.contains(word), "{message}");
     }
     let mask = Some(Mask::filled(3, 3, true));
-    let wrong = estimator_of(Common { mask, ..Common::default() }).estimate(&[&a, &a, &a], 0).unwrap_err();
+    let wrong =
+        estimator_of(EstimatorOptions { mask, ..EstimatorOptions::default() }).estimate(&[&a, &a, &a], 0).unwrap_err();
     assert!(wrong.to_string().starts_with("mask"));
     let smallest = e.estimate(&[&frame(3, 3), &frame(3, 3), &frame(3, 3)], 0).unwrap();
     assert_eq!(smallest.status.iter().filter(|s| **s == Status::Unobservable).count(), 1);
     for level in Level::available() {
         let flat = frame(40, 20);
-        let common = Common { simd: Some(level), diagnostics: level == Level::SCALAR, ..Common::default() };
+        let common =
+            EstimatorOptions { simd: Some(level), diagnostics: level == Level::SCALAR, ..EstimatorOptions::default() };
         let field = estimator_of(common).estimate(&[&flat, &flat, &flat], 0).unwrap();
         assert_eq!((field.status[0], field.status[41]), (Status::Border, Status::Unobservable));
         assert!(field.motion.iter().all(|v| v.is_nan()));
@@ -291,8 +301,11 @@ fn a_translating_ramp_is_unobservable_in_either_precision_and_has_a_least_norm()
     let make = |t: f64| Frame::from_fn(20, 12, |x, y| 90.3 + 0.7 * (x as f64 - 0.31 * t) + 0.4 * y as f64);
     let frames: Vec<Frame<f64>> = (0..3).map(|t| make(f64::from(t))).collect();
     let single: Vec<Frame<f32>> = frames.iter().map(|f| f.map(|v| *v as f32)).collect();
-    let e = estimator(InstantaneousOptions::default(), Common { diagnostics: true, ..Common::default() });
-    let quick = estimator(InstantaneousOptions::default(), Common::default());
+    let e = estimator(
+        InstantaneousOptions::default(),
+        EstimatorOptions { diagnostics: true, ..EstimatorOptions::default() },
+    );
+    let quick = estimator(InstantaneousOptions::default(), EstimatorOptions::default());
     let (a, b) = (e.estimate(&three(&frames), 0).unwrap(), e.estimate(&three(&single), 0).unwrap());
     let (c, d) = (quick.estimate(&three(&frames), 0).unwrap(), quick.estimate(&three(&single), 0).unwrap());
     for y in 1..11 {
@@ -303,7 +316,7 @@ fn a_translating_ramp_is_unobservable_in_either_precision_and_has_a_least_norm()
         }
     }
     let options = InstantaneousOptions { rank_deficient: RankPolicy::MinNorm, ..Default::default() };
-    let m = estimator(options, Common::default()).estimate(&three(&frames), 0).unwrap();
+    let m = estimator(options, EstimatorOptions::default()).estimate(&three(&frames), 0).unwrap();
     assert_eq!(m.status[45], Status::MinNorm);
     let flow = m.affine(45);
     assert!((flow.u * 0.7 + flow.v * 0.4 - 0.31 * 0.7).abs() < 1e-9 && (flow.u * 0.4 - flow.v * 0.7).abs() < 1e-9);
@@ -312,7 +325,8 @@ fn a_translating_ramp_is_unobservable_in_either_precision_and_has_a_least_norm()
 
 #[test]
 fn covariance_is_that_of_repeated_noise() {
-    // A quadratic patch in translation, small pixel noise: the spread of the estimates is what each of them predicts.
+    // A quadratic patch in translation, small pixel noise: the spread of the estimates is what each of them
+    // predicts.
     let at = (3, 3);
     let clean: Vec<Frame<f64>> = (0..3)
         .map(|t| {
@@ -324,7 +338,12 @@ fn covariance_is_that_of_repeated_noise() {
         .collect();
     let sd = 0.01;
     for given in [Some(sd), None] {
-        let common = Common { covariance: true, noise: given, sites: Sites::Points(vec![at]), ..Common::default() };
+        let common = EstimatorOptions {
+            covariance: true,
+            noise: given,
+            sites: SamplingGrid::Points(vec![at]),
+            ..EstimatorOptions::default()
+        };
         let e = estimator(InstantaneousOptions::default(), common);
         let runs = 3000u64;
         let (mut mean, mut square, mut claimed) = ([0.0; 6], [0.0; 6], [0.0; 6]);
@@ -360,7 +379,7 @@ fn other_models_run_through_the_same_door() {
         .collect();
     let run = |model| {
         let options = InstantaneousOptions { model, ..Default::default() };
-        let common = Common { sites: Sites::Points(vec![(4, 4)]), ..Common::default() };
+        let common = EstimatorOptions { sites: SamplingGrid::Points(vec![(4, 4)]), ..EstimatorOptions::default() };
         estimator(options, common).estimate(&three(&frames), 0).unwrap()
     };
     let accelerating = run(ModelKind::Accelerating);
@@ -376,7 +395,8 @@ fn other_models_run_through_the_same_door() {
 fn pixel_pitch_and_frame_period_scale_results_and_change_no_decision() {
     let frames = texture(10);
     let run = |pixel_pitch, covariance| {
-        let common = Common { pixel_pitch, covariance, frame_period: Some(0.04), ..Common::default() };
+        let common =
+            EstimatorOptions { pixel_pitch, covariance, frame_period: Some(0.04), ..EstimatorOptions::default() };
         estimator(InstantaneousOptions::default(), common).estimate(&three(&frames), 0).unwrap()
     };
     for covariance in [false, true] {

@@ -1,13 +1,14 @@
-//! The coarse-to-fine estimate on scenes with exact truth: large motions, pairs and triples, an edge between motions, holes, and its conventions.
+//! The coarse-to-fine estimate on scenes with exact truth: large motions, pairs and triples, an edge between
+//! motions, holes, and its conventions.
 
 // Printed on purpose: the figures reached are part of the answer.
 #![allow(clippy::print_stdout)]
 
 use jacoflow::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::parallel::Threads;
 use jacoflow::synth::{AffineTexture, Scene, Sensor, mean_truth};
-use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
+use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 
 const SIZE: usize = 160;
 /// Left out along each side, px: what enters the frame has no counterpart.
@@ -25,7 +26,7 @@ fn frames(scene: &dyn Scene, noise: f64, times: &[f64]) -> Vec<Frame<f32>> {
     times.iter().map(|&t| camera.apply(&scene.frame(t), (t + 9.0) as u64).map(|&value| value as f32)).collect()
 }
 
-fn estimate(options: CoarseToFineOptions, common: Common, frames: &[Frame<f32>]) -> FlowField<f32> {
+fn estimate(options: CoarseToFineOptions, common: EstimatorOptions, frames: &[Frame<f32>]) -> FlowField<f32> {
     let estimator = Estimator::new(Method::CoarseToFine(options), common).unwrap();
     estimator.estimate(&frames.iter().collect::<Vec<_>>(), 0).unwrap()
 }
@@ -55,7 +56,7 @@ fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
         let (most_flow, most_jacobian) = if preset == Preset::Fast { (0.025, 0.0008) } else { (0.012, 0.0005) };
         for (number, times) in [(2, &[0.0, 1.0][..]), (3, &[-1.0, 0.0, 1.0])] {
             let options = CoarseToFineOptions { preset, frames: number, ..CoarseToFineOptions::default() };
-            let field = estimate(options, Common::default(), &frames(&scene, 1.0, times));
+            let field = estimate(options, EstimatorOptions::default(), &frames(&scene, 1.0, times));
             let (flow, jacobian) = errors(&field, &truth);
             println!("{} from {number} frames: flow {flow:.4} px, Jacobian {jacobian:.5}", preset.name());
             let name = preset.name();
@@ -74,7 +75,7 @@ fn three_frames_tell_the_step_to_the_next_or_the_mean_of_both() {
     let frames = frames(&scene, 1.0, &[-1.0, 0.0, 1.0]);
     for (central, own, other) in [(false, (0.0, 1.0), (-1.0, 1.0)), (true, (-1.0, 1.0), (0.0, 1.0))] {
         let options = CoarseToFineOptions { central, ..CoarseToFineOptions::default() };
-        let field = estimate(options, Common::default(), &frames);
+        let field = estimate(options, EstimatorOptions::default(), &frames);
         let [own, other] = [own, other].map(|between| errors(&field, &mean_truth(&scene, 0.0, between).unwrap()));
         assert!(own.0 < 0.012 && own.1 < 0.0005, "{central}: {own:?}");
         // Half the acceleration, .12 px.
@@ -94,7 +95,7 @@ fn disc(t: f64, place: usize) -> Frame<f32> {
 
 #[test]
 fn what_goes_out_of_sight_is_told() {
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &[disc(0.0, 80), disc(1.0, 86)]);
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &[disc(0.0, 80), disc(1.0, 86)]);
     let share = |keep: &dyn Fn(f64, f64) -> bool| {
         let sites = (0..SIZE * SIZE).filter(|at| keep((at % SIZE) as f64 - 80.0, (at / SIZE) as f64 - 80.0));
         let told: Vec<bool> = sites.map(|at| field.status[at] == Status::Inconsistent).collect();
@@ -108,11 +109,12 @@ fn what_goes_out_of_sight_is_told() {
     assert!(field.motion.iter().all(|plane| plane.is_finite()));
 }
 
-/// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a steady flow.
+/// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a
+/// steady flow.
 #[test]
 fn things_that_accelerate_are_where_they_will_be() {
     let frames = [(-1.0, 79), (0.0, 80), (1.0, 83)].map(|(t, place)| disc(t, place));
-    let field = estimate(CoarseToFineOptions::default(), Common::default(), &frames);
+    let field = estimate(CoarseToFineOptions::default(), EstimatorOptions::default(), &frames);
     let mean = |keep: &dyn Fn(f64) -> bool| {
         let sites = (0..SIZE * SIZE).map(|at| (at, (at / SIZE) as f64 - 80.0, (at % SIZE) as f64 - 80.0));
         let inner = sites.filter(|&(_, y, x)| y.abs() < 56.0 && x.abs() < 56.0 && keep(x.hypot(y)));
@@ -128,7 +130,7 @@ fn errors_are_about_as_large_as_the_covariance_says() {
     let scene = scene([3.3, -2.2, 0.01, 0.02, -0.02, 0.01]);
     let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();
     for noise in [1.0, 4.0] {
-        let common = Common { covariance: true, ..Common::default() };
+        let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
         let field = estimate(CoarseToFineOptions::pair(), common, &frames(&scene, noise, &[0.0, 1.0]));
         let spread: Vec<Vec<f32>> =
             ["u", "v", "u_x", "v_x", "u_y", "v_y"].iter().map(|name| field.standard_deviation(name).unwrap()).collect();
@@ -150,7 +152,8 @@ fn errors_are_about_as_large_as_the_covariance_says() {
     }
 }
 
-/// Two textures, each with its own translation, on either side of `x = 80` in the second frame's coordinates of the left one.
+/// Two textures, each with its own translation, on either side of `x = 80` in the second frame's coordinates
+/// of the left one.
 fn parted() -> Vec<Frame<f32>> {
     let (left, right) = (scene([1.5, 0.5, 0.0, 0.0, 0.0, 0.0]), scene([-1.0, -1.5, 0.0, 0.0, 0.0, 0.0]));
     [0.0, 1.0]
@@ -165,7 +168,7 @@ fn parted() -> Vec<Frame<f32>> {
 
 #[test]
 fn two_motions_stay_apart_at_the_edge_between_them() {
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &parted());
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &parted());
     let worst = |columns: std::ops::Range<usize>, want: [f32; 2]| {
         let sites = columns.flat_map(|x| (MARGIN..SIZE - MARGIN).map(move |y| y * SIZE + x));
         let mut all: Vec<f32> =
@@ -180,17 +183,18 @@ fn two_motions_stay_apart_at_the_edge_between_them() {
 #[test]
 fn results_do_not_depend_on_threads_and_sites_are_those_of_the_whole_field() {
     let pair = frames(&scene(FAST), 1.0, &[0.0, 1.0]);
-    let with = |threads: usize, sites: Sites| {
+    let with = |threads: usize, sites: SamplingGrid| {
         let threads = Threads::new(Some(threads)).unwrap();
-        let common = Common { threads, sites, covariance: true, diagnostics: true, ..Common::default() };
+        let common =
+            EstimatorOptions { threads, sites, covariance: true, diagnostics: true, ..EstimatorOptions::default() };
         estimate(CoarseToFineOptions::pair(), common, &pair)
     };
-    let (one, two) = (with(1, Sites::default()), with(2, Sites::default()));
+    let (one, two) = (with(1, SamplingGrid::default()), with(2, SamplingGrid::default()));
     assert_eq!((&one.motion, &one.covariance, &one.residual), (&two.motion, &two.covariance, &two.residual));
     let region = Some(Rect { x: 11, y: 20, width: 51, height: 40 });
-    let part = with(2, Sites::Grid { region, stride: 3 });
+    let part = with(2, SamplingGrid::Grid { region, stride: 3 });
     assert_eq!(part.affine(part.width + 2).to_array(), one.affine(23 * SIZE + 17).to_array());
-    let points = with(1, Sites::Points(vec![(17, 23), (150, 3)]));
+    let points = with(1, SamplingGrid::Points(vec![(17, 23), (150, 3)]));
     for (k, want) in one.affine(23 * SIZE + 17).to_array().into_iter().enumerate() {
         assert!((points.affine(0).to_array()[k] - want).abs() < 1e-5);
     }
@@ -199,8 +203,8 @@ fn results_do_not_depend_on_threads_and_sites_are_those_of_the_whole_field() {
 #[test]
 fn memory_kept_from_other_frames_changes_no_bit() {
     let (options, frames) = (CoarseToFineOptions::pair(), frames(&scene(FAST), 1.0, &[0.0, 1.0]));
-    let fresh = estimate(options.clone(), Common::default(), &frames);
-    let estimator = Estimator::new(Method::CoarseToFine(options), Common::default()).unwrap();
+    let fresh = estimate(options.clone(), EstimatorOptions::default(), &frames);
+    let estimator = Estimator::new(Method::CoarseToFine(options), EstimatorOptions::default()).unwrap();
     let other = |width, height| Frame::from_fn(width, height, |x, y| ((x * x + 3 * y) as f32 * 0.37).sin() * 1e5);
     for (width, height) in [(SIZE, SIZE), (240, 90), (17, 301)] {
         let (a, b) = (other(width, height), other(width, height).map(|v| -v));
@@ -216,7 +220,7 @@ fn holes_get_their_status_and_their_surroundings_an_estimate() {
     for y in 70..80 {
         pair[0].row_mut(y)[60..75].fill(f32::NAN);
     }
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &pair);
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &pair);
     assert_eq!(field.status[75 * SIZE + 66], Status::NonFinite);
     assert!(field.affine(75 * SIZE + 66).u.is_nan());
     let beside = field.affine(75 * SIZE + 50);
@@ -232,7 +236,7 @@ fn nothing_but_noise_is_told_apart_from_motion() {
     let frames = [noisy(1), noisy(2)];
     for preset in Preset::EVERY {
         let options = CoarseToFineOptions { preset, ..CoarseToFineOptions::pair() };
-        let field = estimate(options, Common { covariance: true, ..Common::default() }, &frames);
+        let field = estimate(options, EstimatorOptions { covariance: true, ..EstimatorOptions::default() }, &frames);
         let (u, spread) = (field.plane("u").unwrap(), field.standard_deviation("u").unwrap());
         let wrong =
             u.iter().zip(&spread).filter(|(u, spread)| u.abs() > 3.0 * **spread).count() as f64 / u.len() as f64;
@@ -244,7 +248,7 @@ fn nothing_but_noise_is_told_apart_from_motion() {
 #[test]
 fn wide_frames_and_single_levels_find_small_motions() {
     let scene = AffineTexture::moving((200, 20), [1.0, 0.5, 0.0, 0.0, 0.0, 0.0], 5).unwrap();
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &frames(&scene, 1.0, &[0.0, 1.0]));
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &frames(&scene, 1.0, &[0.0, 1.0]));
     let (u, v) = (field.plane("u").unwrap(), field.plane("v").unwrap());
     let mean = |plane: &[f32]| plane.iter().map(|v| f64::from(*v)).sum::<f64>() / plane.len() as f64;
     assert!((mean(u) - 1.0).abs() < 0.05 && (mean(v) - 0.5).abs() < 0.05, "{} {}", mean(u), mean(v));
@@ -253,10 +257,10 @@ fn wide_frames_and_single_levels_find_small_motions() {
 #[test]
 fn constant_frames_are_unobservable_and_small_ones_no_error() {
     let flat = vec![Frame::filled(20, 16, 7.0_f32), Frame::filled(20, 16, 7.0)];
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &flat);
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &flat);
     assert!(field.status.iter().all(|s| *s == Status::Unobservable) && field.motion.iter().all(|v| v.is_nan()));
     let tiny: Vec<Frame<f32>> = (0..2).map(|t| Frame::from_fn(3, 4, |x, y| ((x * y + t) as f32).sin())).collect();
-    let field = estimate(CoarseToFineOptions::pair(), Common::default(), &tiny);
+    let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &tiny);
     for (at, status) in field.status.iter().enumerate() {
         assert_eq!(field.affine(at).u.is_finite(), *status == Status::Ok);
         assert!(matches!(status, Status::Ok | Status::Unobservable));
@@ -265,7 +269,8 @@ fn constant_frames_are_unobservable_and_small_ones_no_error() {
 
 #[test]
 fn options_that_mean_nothing_are_refused_by_name() {
-    let refused = |options| Estimator::new(Method::CoarseToFine(options), Common::default()).unwrap_err().to_string();
+    let refused =
+        |options| Estimator::new(Method::CoarseToFine(options), EstimatorOptions::default()).unwrap_err().to_string();
     assert!(refused(CoarseToFineOptions { frames: 4, ..Default::default() }).contains("frames"));
     assert!(refused(CoarseToFineOptions { levels: Some(0), ..Default::default() }).contains("levels"));
     assert!(Preset::parse("quick").unwrap_err().to_string().contains("preset"));

@@ -1,7 +1,7 @@
 //! What x, y, u, v and the Jacobian's order mean, shown on motions with one parameter only.
 
 use jacoflow::flow::derived::{Quantity, plane};
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::types::{FlowField, Frame, MOTION_NAMES};
 
 /// A quadratic carried by the motion `m` about pixel (4, 4), at frames -1, 0, 1, to second order in time.
@@ -20,7 +20,7 @@ fn field(m: [f64; 6]) -> FlowField<f64> {
             })
         })
         .collect();
-    let estimator = Estimator::new(Method::parse("instantaneous").unwrap(), Common::default()).unwrap();
+    let estimator = Estimator::new(Method::parse("instantaneous").unwrap(), EstimatorOptions::default()).unwrap();
     estimator.estimate(&[&frames[0], &frames[1], &frames[2]], 0).unwrap()
 }
 
@@ -41,7 +41,8 @@ fn a_pure_stretch_along_x_gives_only_u_x_and_so_for_each_parameter() {
 
 #[test]
 fn u_is_along_columns_and_v_along_rows() {
-    // A blob that moves one column to the right and half a row down per frame, told by where its brightness goes.
+    // A blob that moves one column to the right and half a row down per frame, told by where its brightness
+    // goes.
     let blob = |t: f64| {
         Frame::from_fn(21, 21, |x, y| {
             let (dx, dy) = (x as f64 - 10.0 - t, y as f64 - 10.0 - 0.5 * t);
@@ -49,7 +50,7 @@ fn u_is_along_columns_and_v_along_rows() {
         })
     };
     let frames = [-0.1, 0.0, 0.1].map(blob);
-    let estimator = Estimator::new(Method::parse("instantaneous").unwrap(), Common::default()).unwrap();
+    let estimator = Estimator::new(Method::parse("instantaneous").unwrap(), EstimatorOptions::default()).unwrap();
     let field = estimator.estimate(&[&frames[0], &frames[1], &frames[2]], 0).unwrap();
     let m = field.affine(13 * 21 + 7);
     assert!((m.u - 0.1).abs() < 0.02 && (m.v - 0.05).abs() < 0.02, "{m:?}");

@@ -1,4 +1,5 @@
-//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test filter_forms -- --nocapture` prints the figures.
+//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test filter_forms --
+//! --nocapture` prints the figures.
 
 // The figures are printed so that the pages can name a command that shows them.
 #![allow(clippy::print_stdout)]
@@ -6,7 +7,7 @@
 use jacoflow::image::{GaussianSmoother, Quantiser};
 use jacoflow::synth::{RotatingRamp, Scene};
 use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, SquareRoot, Transition};
-use jacoflow::types::{Frame, Sites};
+use jacoflow::types::{Frame, SamplingGrid};
 use std::f64::consts::PI;
 
 type State = ([f64; 12], [[f64; 12]; 12]);
@@ -25,7 +26,7 @@ fn frames(smooth: bool) -> Vec<Frame<f64>> {
 
 /// The states after every frame.
 fn run(frames: &[Frame<f64>], options: FlowFilterOptions) -> Vec<State> {
-    let options = FlowFilterOptions { sites: Sites::Points(vec![(32, 32)]), ..options };
+    let options = FlowFilterOptions { sites: SamplingGrid::Points(vec![(32, 32)]), ..options };
     let mut filter = FlowFilter::<f64>::new((65, 65), options).unwrap();
     let step = |frame| {
         filter.push(frame).unwrap();
@@ -80,8 +81,8 @@ fn thirteen_points_are_the_twenty_five_with_the_motion_first() {
     }
 }
 
-/// What the order of the square root does: rms errors of (u, v), and the largest distance from 25 points with the brightness first,
-/// over all frames and over the last 200.
+/// What the order of the square root does: rms errors of (u, v), and the largest distance from 25 points with
+/// the brightness first, over all frames and over the last 200.
 fn compare(name: &str, profile: &FlowFilterOptions, smooth: bool) -> Vec<([f64; 2], [f64; 2])> {
     let frames = frames(smooth);
     let reference = run(&frames, form(FilterForm::NonAugmented, None, profile));

@@ -1,4 +1,5 @@
-//! The dense flow filter against recorded runs of filterpy, the patent's reference experiment, and its own promises.
+//! The dense flow filter against recorded runs of filterpy, the patent's reference experiment, and its own
+//! promises.
 
 use jacoflow::image::{GaussianSmoother, Quantiser};
 use jacoflow::jet::Neighbourhood;
@@ -6,7 +7,7 @@ use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::synth::{RotatingRamp, Scene};
 use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};
-use jacoflow::types::{Frame, Mask, Rect, Sites, Status};
+use jacoflow::types::{Frame, Mask, Rect, SamplingGrid, Status};
 use std::f64::consts::PI;
 
 #[path = "flow_filter/equivalence.rs"]
@@ -30,7 +31,7 @@ fn reference_frames(count: usize, smooth: bool) -> Vec<Frame<f64>> {
 }
 
 fn at_centre(options: FlowFilterOptions) -> FlowFilterOptions {
-    FlowFilterOptions { sites: Sites::Points(vec![(32, 32)]), ..options }
+    FlowFilterOptions { sites: SamplingGrid::Points(vec![(32, 32)]), ..options }
 }
 
 /// Means after every frame.
@@ -84,7 +85,8 @@ fn agrees_with_filterpy_over_400_frames() {
             for k in 0..12 {
                 let want = |what: &str| record[name][what][row][k].as_f64().unwrap();
                 let (m, v) = (want("means"), want("variances"));
-                // Relative to the state's size: components near zero are compared with their standard deviation.
+                // Relative to the state's size: components near zero are compared with their standard
+                // deviation.
                 assert!(
                     (mean[k] - m).abs() <= 1e-6 * m.abs().max(v.sqrt()),
                     "{name} frame {t} mean {k}: {} {m}",

@@ -1,4 +1,5 @@
-//! Frames in and results out: the recorded sequences with truth, where they are there, and files handed from one room to another.
+//! Frames in and results out: the recorded sequences with truth, where they are there, and files handed from
+//! one room to another.
 
 // Printed on purpose: a skipped recording is said.
 #![allow(clippy::print_stdout)]
@@ -12,7 +13,8 @@ use jacoflow::io::{
 use jacoflow::types::AnyFrame;
 use std::path::{Path, PathBuf};
 
-/// The folder of recorded sequences: `JACOFLOW_DATA`, or `../shared/data` beside the package. `None`, with a note, when it is not there.
+/// The folder of recorded sequences: `JACOFLOW_DATA`, or `../shared/data` beside the package. `None`, with a
+/// note, when it is not there.
 fn data(part: &str) -> Option<PathBuf> {
     let root = std::env::var_os("JACOFLOW_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
@@ -152,7 +154,8 @@ fn recorded_truth_becomes_pictures() {
     }
 }
 
-/// A sequence written, read, and prepared as the pipeline does: quantised levels are whole, smoothing keeps the mean.
+/// A sequence written, read, and prepared as the pipeline does: quantised levels are whole, smoothing keeps
+/// the mean.
 #[test]
 fn frames_pass_from_sink_to_source_to_preprocessing() {
     let folder = tempfile::tempdir().unwrap();

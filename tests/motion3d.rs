@@ -1,4 +1,5 @@
-//! 3-D motion through the public interface: from frames over a field to motion and depths, six numbers a patch, promises.
+//! 3-D motion through the public interface: from frames over a field to motion and depths, six numbers a
+//! patch, promises.
 
 use jacoflow::math::random::CounterRng;
 use jacoflow::motion3d::{

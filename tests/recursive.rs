@@ -1,15 +1,16 @@
-//! Estimates of steady motion fused over time: how the error falls, what the covariance says of it, and what happens where motion changes or frames have holes.
+//! Estimates of steady motion fused over time: how the error falls, what the covariance says of it, and what
+//! happens where motion changes or frames have holes.
 
 // Printed on purpose: the figures reached are part of the answer.
 #![allow(clippy::print_stdout)]
 
 use jacoflow::flow::coarse_to_fine::CoarseToFineOptions;
 use jacoflow::flow::windowed::WindowedOptions;
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::pipeline::{EstimatorStage, Stage};
 use jacoflow::synth::{AffineTexture, Scene, Sensor};
 use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
-use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
+use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 use std::sync::Arc;
 
@@ -19,9 +20,14 @@ const SLOW: [f64; 6] = [0.1, 0.05, 0.003, 0.006, -0.006, 0.003];
 const REFERENCE: [f64; 6] = [0.3, -0.2, 0.01, 0.02, -0.02, 0.01];
 const FAST: [f64; 6] = [3.3, -2.2, 0.003, 0.006, -0.006, 0.003];
 
-fn common() -> Common {
+fn common() -> EstimatorOptions {
     let region = Some(Rect { x: 24, y: 24, width: 40, height: 40 });
-    Common { sites: Sites::Grid { region, stride: 5 }, covariance: true, systematic: true, ..Common::default() }
+    EstimatorOptions {
+        sites: SamplingGrid::Grid { region, stride: 5 },
+        covariance: true,
+        systematic: true,
+        ..EstimatorOptions::default()
+    }
 }
 
 fn windowed() -> Method {
@@ -76,7 +82,8 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
-/// Root mean square flow error after 1, 2, 4, 8 and 16 estimates, none of which shares a frame with another, over a few realisations.
+/// Root mean square flow error after 1, 2, 4, 8 and 16 estimates, none of which shares a frame with another,
+/// over a few realisations.
 fn law(method: &Method, motion: [f64; 6], noise: f64, realisations: u64) -> Vec<f64> {
     let estimator = Estimator::new(method.clone(), common()).unwrap();
     let needed = estimator.frames_needed();
@@ -97,7 +104,8 @@ fn law(method: &Method, motion: [f64; 6], noise: f64, realisations: u64) -> Vec<
     squares.into_iter().map(f64::sqrt).collect()
 }
 
-/// Frames with independent noise: the error falls with the root of their number, until the bias of an estimate is reached (none at rest).
+/// Frames with independent noise: the error falls with the root of their number, until the bias of an
+/// estimate is reached (none at rest).
 #[test]
 fn the_error_falls_with_the_root_of_the_frames() {
     // Wide windows leave few independent errors in a frame, so that their law needs more of them.
@@ -115,7 +123,8 @@ fn the_error_falls_with_the_root_of_the_frames() {
     }
 }
 
-/// Streams, whose estimates share frames: the error stays below the root law, down to a floor that the covariance tells, and the covariance is never too narrow.
+/// Streams, whose estimates share frames: the error stays below the root law, down to a floor that the
+/// covariance tells, and the covariance is never too narrow.
 #[test]
 fn a_stream_tells_its_errors_down_to_the_floor() {
     for (name, method, motion, noise) in [

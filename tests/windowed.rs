@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout)]
 
 use jacoflow::flow::windowed::{RowSet, WindowedOptions};
-use jacoflow::flow::{Common, Estimator, Method, RankPolicy};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method, RankPolicy};
 use jacoflow::image::GaussianSmoother;
 use jacoflow::jet::{JetStencil, Neighbourhood, TimeScheme};
 use jacoflow::math::Real;
@@ -12,7 +12,7 @@ use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::synth::texture::Noise;
 use jacoflow::synth::{AffineTexture, Scene, Sensor};
-use jacoflow::types::{FlowField, Frame, Rect, Sites, Status};
+use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 
 #[path = "windowed/calibration.rs"]
@@ -42,7 +42,8 @@ fn equations(rows: usize, jet: [f64; 6], first: [f64; 6], second: [f64; 6]) -> (
     (a, b)
 }
 
-/// The estimate at one pixel by summing equation after equation. `transport`: whether the unknowns are carried to each pixel of the window.
+/// The estimate at one pixel by summing equation after equation. `transport`: whether the unknowns are
+/// carried to each pixel of the window.
 fn naive<T: Real>(
     frames: &[&Frame<T>],
     options: &WindowedOptions,
@@ -106,11 +107,11 @@ fn raw() -> WindowedOptions {
     WindowedOptions { presmooth: None, rows: RowSet::Gradient, ..WindowedOptions::default() }
 }
 
-fn windowed(options: WindowedOptions, common: Common) -> Estimator {
+fn windowed(options: WindowedOptions, common: EstimatorOptions) -> Estimator {
     Estimator::new(Method::Windowed(options), common).unwrap()
 }
 
-fn estimate<T: Precision>(frames: &[Frame<T>], options: &WindowedOptions, common: &Common) -> FlowField<T> {
+fn estimate<T: Precision>(frames: &[Frame<T>], options: &WindowedOptions, common: &EstimatorOptions) -> FlowField<T> {
     T::run(frames, &windowed(options.clone(), common.clone()))
 }
 
@@ -160,9 +161,9 @@ fn equals_the_naive_sum_everywhere() {
     cases.push(WindowedOptions { neighbourhood: points, ..raw() });
     for options in cases {
         let frames = &frames[..options.frames];
-        let field = estimate(frames, &options, &Common::default());
+        let field = estimate(frames, &options, &EstimatorOptions::default());
         let refs: Vec<&Frame<f64>> = frames.iter().collect();
-        let coarse = estimate(&single(frames), &options, &Common::default());
+        let coarse = estimate(&single(frames), &options, &EstimatorOptions::default());
         for (x, y) in [(30, 20), (2, 2), (58, 44), (2, 44), (17, 23), (40, 3)] {
             let want = naive(&refs, &options, &|_, _| true, (x, y), true);
             let index = y * 61 + x;
@@ -176,7 +177,8 @@ fn equals_the_naive_sum_everywhere() {
     }
 }
 
-/// Root mean square error of flow (px) and Jacobian (mean over its entries, 1/frame), over the sites `border` px inside.
+/// Root mean square error of flow (px) and Jacobian (mean over its entries, 1/frame), over the sites `border`
+/// px inside.
 struct Errors {
     flow: f64,
     jacobian: f64,
@@ -198,8 +200,8 @@ impl Errors {
     }
 }
 
-/// Four estimators on a texture of 2 px, clean and as a noisy camera saw it: each figure within a quarter of the published one, the
-/// transported twelve rows best in both columns.
+/// Four estimators on a texture of 2 px, clean and as a noisy camera saw it: each figure within a quarter of
+/// the published one, the transported twelve rows best in both columns.
 ///
 /// Statistics: frames of 96 x 96, a border of 10 px left out, several textures.
 #[test]
@@ -224,12 +226,12 @@ fn table_of_estimators() {
             let all = WindowedOptions { rows: RowSet::All, truncate: 4.0, ..raw() };
             let one = WindowedOptions { rows: RowSet::Brightness, ..all.clone() };
             let fields = [
-                Estimator::new(Method::parse("instantaneous").unwrap(), Common::default())
+                Estimator::new(Method::parse("instantaneous").unwrap(), EstimatorOptions::default())
                     .unwrap()
                     .estimate(&refs, 0)
                     .unwrap(),
-                estimate(frames, &one, &Common::default()),
-                estimate(frames, &all, &Common::default()),
+                estimate(frames, &one, &EstimatorOptions::default()),
+                estimate(frames, &all, &EstimatorOptions::default()),
             ];
             for y in border..side - border {
                 for x in border..side - border {
@@ -280,7 +282,7 @@ fn each_parameter_is_what_its_name_says() {
             let mut motion = [0.0; 6];
             motion[k] = if k < 2 { 0.2 } else { 0.01 };
             let options = WindowedOptions { rows, ..raw() };
-            let got = estimate(&soft(motion), &options, &Common::default()).affine(32 * 64 + 32).to_array();
+            let got = estimate(&soft(motion), &options, &EstimatorOptions::default()).affine(32 * 64 + 32).to_array();
             // The centre of the frame lies between four pixels: the flow there differs by half a derivative.
             let near = 0.1 * motion[k];
             for (j, got) in got.iter().enumerate() {
@@ -298,7 +300,7 @@ fn gain_and_sample_type_never_change_the_flow() {
     let bytes: Vec<Frame<f64>> =
         texture((50, 40), REFERENCE, 6, &TRIPLE).iter().enumerate().map(|(k, f)| camera.apply(f, k as u64)).collect();
     let options = WindowedOptions { presmooth: Some(1.0), ..raw() };
-    let common = Common { covariance: true, ..Common::default() };
+    let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
     let as_is = estimate(&single(&bytes), &options, &common);
     let doubled: Vec<_> = single(&bytes).iter().map(|f| f.map(|v| v * 256.0)).collect();
     let same = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -328,9 +330,9 @@ fn damage_stays_where_windows_touch_it() {
     let mask = Frame::from_fn(96, 90, |x, y| !((30..50).contains(&y) && (40..60).contains(&x)));
     for presmooth in [None, Some(1.0)] {
         let options = WindowedOptions { presmooth, sigma: 3.0, ..raw() };
-        let common = Common { covariance: true, ..Common::default() };
+        let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
         let whole = estimate(&clean, &options, &common);
-        let masked_common = Common { mask: Some(mask.clone()), ..common.clone() };
+        let masked_common = EstimatorOptions { mask: Some(mask.clone()), ..common.clone() };
         let own = 1 + presmooth.map_or(0, |s| (4.0 * s + 0.5) as usize);
         let window = options.radius() + own;
         for (field, word) in [
@@ -377,21 +379,21 @@ fn sites_threads_and_levels_agree() {
     let frames = single(&texture((150, 170), REFERENCE, 9, &TRIPLE));
     for (rows, presmooth) in [(RowSet::Gradient, Some(1.0)), (RowSet::All, None), (RowSet::Brightness, None)] {
         let options = WindowedOptions { rows, presmooth, sigma: 2.0, ..raw() };
-        let common = Common { covariance: true, diagnostics: true, ..Common::default() };
-        let threads = |n| Common { threads: Threads::new(Some(n)).unwrap(), ..common.clone() };
+        let common = EstimatorOptions { covariance: true, diagnostics: true, ..EstimatorOptions::default() };
+        let threads = |n| EstimatorOptions { threads: Threads::new(Some(n)).unwrap(), ..common.clone() };
         let dense = estimate(&frames, &options, &threads(1));
         assert_eq!(bits(&dense), bits(&estimate(&frames, &options, &threads(2))));
         let plane = |f: &FlowField<f32>, k: usize, i: usize| f.motion[k * f.len() + i].to_bits();
         let scattered: Vec<(usize, usize)> = (0..4).map(|k| (7 + 40 * k, 3 + 50 * k)).collect();
         let crowded: Vec<(usize, usize)> = (0..600).map(|k| (60 + k % 30, 70 + k / 30)).collect();
         for sites in [
-            Sites::Grid { region: None, stride: 7 },
-            Sites::Grid { region: Some(Rect { x: 31, y: 90, width: 33, height: 50 }), stride: 3 },
-            Sites::Points(scattered),
-            Sites::Points(crowded),
-            Sites::Points(Vec::new()),
+            SamplingGrid::Grid { region: None, stride: 7 },
+            SamplingGrid::Grid { region: Some(Rect { x: 31, y: 90, width: 33, height: 50 }), stride: 3 },
+            SamplingGrid::Points(scattered),
+            SamplingGrid::Points(crowded),
+            SamplingGrid::Points(Vec::new()),
         ] {
-            let part = estimate(&frames, &options, &Common { sites: sites.clone(), ..common.clone() });
+            let part = estimate(&frames, &options, &EstimatorOptions { sites: sites.clone(), ..common.clone() });
             for i in 0..part.len() {
                 let (x, y) = sites.pixel(i % part.width, i / part.width);
                 let j = y * 150 + x;
@@ -403,7 +405,7 @@ fn sites_threads_and_levels_agree() {
         }
         let fine: Vec<Frame<f64>> = frames.iter().map(|f| f.map(|v| f64::from(*v))).collect();
         for level in Level::available() {
-            let common = Common { simd: Some(level), ..common.clone() };
+            let common = EstimatorOptions { simd: Some(level), ..common.clone() };
             let (coarse, fine) = (estimate(&frames, &options, &common), estimate(&fine, &options, &common));
             for (a, b) in coarse.motion.iter().zip(&fine.motion) {
                 assert!((f64::from(*a) - b).abs() < 1e-3 || (a.is_nan() && b.is_nan()), "{level:?}: {a} {b}");
@@ -426,7 +428,7 @@ fn bits(field: &FlowField<f32>) -> Vec<u32> {
 
 #[test]
 fn what_cannot_be_seen_is_said() {
-    let common = Common { diagnostics: true, covariance: true, ..Common::default() };
+    let common = EstimatorOptions { diagnostics: true, covariance: true, ..EstimatorOptions::default() };
     let flat = vec![Frame::filled(40, 30, 77.7f32); 3];
     let stripes: Vec<Frame<f32>> =
         (0..3).map(|t| Frame::from_fn(40, 30, |x, _| 50.0 * ((x as f32 - 0.2 * t as f32) * 0.6).sin())).collect();
@@ -453,7 +455,7 @@ fn what_cannot_be_seen_is_said() {
 #[test]
 fn options_are_checked_by_name() {
     let refused = |options: WindowedOptions| {
-        Estimator::new(Method::Windowed(options), Common::default()).unwrap_err().to_string()
+        Estimator::new(Method::Windowed(options), EstimatorOptions::default()).unwrap_err().to_string()
     };
     let base = raw;
     assert!(refused(WindowedOptions { sigma: 0.0, ..base() }).starts_with("sigma"));
@@ -469,8 +471,8 @@ fn options_are_checked_by_name() {
     }
     // Frames smaller than the window, and a pair.
     let tiny = texture((5, 4), REFERENCE, 2, &TRIPLE);
-    let field = estimate(&tiny, &base(), &Common { covariance: true, ..Common::default() });
+    let field = estimate(&tiny, &base(), &EstimatorOptions { covariance: true, ..EstimatorOptions::default() });
     assert_eq!((field.width, field.height), (5, 4));
-    let pair = estimate(&tiny[..2], &WindowedOptions { frames: 2, ..base() }, &Common::default());
+    let pair = estimate(&tiny[..2], &WindowedOptions { frames: 2, ..base() }, &EstimatorOptions::default());
     assert_eq!(pair.layout.frame_index, 0);
 }

@@ -7,7 +7,7 @@ use super::report::{Report, print};
 use super::run::{Telling, report, run_pipeline};
 use crate::error::{Error, Result};
 use crate::flow::windowed::WindowedOptions;
-use crate::flow::{Common, Estimator, Method};
+use crate::flow::{Estimator, EstimatorOptions, Method};
 use crate::io::{FieldFormat, MemorySource, open_sink};
 use crate::parallel::Threads;
 use crate::pipeline::{
@@ -72,7 +72,13 @@ impl DemoCommand {
             fields: None,
         })?;
         let options = WindowedOptions::default();
-        let common = Common { covariance: true, threads, simd, frame_period: Some(1.0 / RATE), ..Common::default() };
+        let common = EstimatorOptions {
+            covariance: true,
+            threads,
+            simd,
+            frame_period: Some(1.0 / RATE),
+            ..EstimatorOptions::default()
+        };
         let estimator = Estimator::new(Method::Windowed(options), common)?;
         let frames = self.write_frames(&*scene, threads, replace, watch)?;
         let kept = Collect::<f32>::default();
@@ -143,7 +149,8 @@ fn truth_name(index: usize) -> String {
     format!("truth_{index:06}.npz")
 }
 
-/// Whether a folder holds what an earlier (or stopped) run of this command left there, and nothing else: then the next run may replace it.
+/// Whether a folder holds what an earlier (or stopped) run of this command left there, and nothing else: then
+/// the next run may replace it.
 fn is_own_work(folder: &Path) -> bool {
     let frames = |name: &str| (0..FRAMES).any(|k| name == format!("frame_{k:06}.png"));
     let results = |name: &str| {

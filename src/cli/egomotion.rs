@@ -38,7 +38,8 @@ use std::path::{Path, PathBuf};
 pub struct EgomotionCommand {
     #[command(flatten)]
     pub input: InputArguments,
-    /// The camera: focal lengths and principal point FX,FY,CX,CY, and skew if there is any, in px; or a text file with the 9 numbers of K or the 12 of a projection matrix
+    /// The camera: focal lengths and principal point FX,FY,CX,CY, and skew if there is any, in px; or a text
+    /// file with the 9 numbers of K or the 12 of a projection matrix
     #[arg(long, value_name = "FX,FY,CX,CY[,SKEW]|FILE", required = true, help_heading = "Camera")]
     pub intrinsics: String,
     #[command(flatten)]
@@ -51,13 +52,15 @@ pub struct EgomotionCommand {
     /// Take all points for parts of one rigid scene, instead of looking for those that are
     #[arg(long, help_heading = "Motion")]
     pub no_robust: bool,
-    /// Distance of the points, px [default: twice the length over which errors of the flow go together, at least 8, less where --region would have fewer than 30 points, not below that length]
+    /// Distance of the points, px [default: twice the length over which errors of the flow go together, at
+    /// least 8, less where --region would have fewer than 30 points, not below that length]
     #[arg(long, value_name = "PX", value_parser = parse_positive, help_heading = "Motion")]
     pub spacing: Option<f64>,
     /// Most points of a field
     #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(5..), help_heading = "Motion")]
     pub max_points: Option<usize>,
-    /// Take what is in --region for a thing that moves by itself, which turns by so much (standard deviation about each axis) beside the rotation of the rest of the picture: 0.001 for a car
+    /// Take what is in --region for a thing that moves by itself, which turns by so much (standard deviation
+    /// about each axis) beside the rotation of the rest of the picture: 0.001 for a car
     #[arg(long, value_name = "RAD/FRAME", value_parser = parse_positive, requires = "region", help_heading = "Motion")]
     pub turning: Option<f64>,
     /// Seed of the random choices
@@ -66,13 +69,17 @@ pub struct EgomotionCommand {
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
-    /// A .csv file for other motions that explain the flow about as well, as those of a status ambiguous: frame, time_s, number (the best first), direction, rotation, how much less likely it is (squared units of noise), focus of expansion
+    /// A .csv file for other motions that explain the flow about as well, as those of a status ambiguous:
+    /// frame, time_s, number (the best first), direction, rotation, how much less likely it is (squared units
+    /// of noise), focus of expansion
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub alternatives: Option<PathBuf>,
-    /// Draw what comes near in red, and the focus of expansion, over every frame: a folder for egomotion_000000.png, ...
+    /// Draw what comes near in red, and the focus of expansion, over every frame: a folder for
+    /// egomotion_000000.png, ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub picture: Option<PathBuf>,
-    /// Times to contact at every pixel (frames) with their standard deviations and residuals (in units of noise: far from 0 on what moves by itself): a folder for contact_000000.npz, ...
+    /// Times to contact at every pixel (frames) with their standard deviations and residuals (in units of
+    /// noise: far from 0 on what moves by itself): a folder for contact_000000.npz, ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub maps: Option<PathBuf>,
     /// Replace files that exist
@@ -191,7 +198,8 @@ impl EgomotionCommand {
     }
 }
 
-/// `FX,FY,CX,CY[,SKEW]`, or a file with the 9 numbers of K or the 12 of a projection matrix; words in it (as `P0:`) are skipped, and only its first line counts where that has enough numbers.
+/// `FX,FY,CX,CY[,SKEW]`, or a file with the 9 numbers of K or the 12 of a projection matrix; words in it (as
+/// `P0:`) are skipped, and only its first line counts where that has enough numbers.
 fn intrinsics(text: &str) -> Result<Intrinsics> {
     read_intrinsics(text).map_err(|error| match error {
         // The core calls the matrix K.

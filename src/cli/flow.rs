@@ -8,11 +8,11 @@ use super::open::{Opened, compute, in_double, open_input, preprocess_for, read_m
 use super::report::Report;
 use super::run::{Telling, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
-use crate::flow::{Common, Estimator, Method};
+use crate::flow::{Estimator, EstimatorOptions, Method};
 use crate::io::Element;
 use crate::pipeline::{EstimatorStage, OutputPlan, OutputWish, Pipeline, TableTarget};
 use crate::simd::SimdReal;
-use crate::types::Sites;
+use crate::types::SamplingGrid;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -49,7 +49,7 @@ pub struct Prepared {
     /// The estimator.
     pub estimator: Estimator,
     /// Where it estimates.
-    pub sites: Sites,
+    pub sites: SamplingGrid,
     /// How fields are made, for metadata and summary.
     pub description: Value,
 }
@@ -66,7 +66,7 @@ pub fn prepare(
     let places = sites.sites()?;
     places.shape(opened.first.size)?;
     let (threads, simd) = compute(compute_arguments)?;
-    let common = Common {
+    let common = EstimatorOptions {
         sites: places.clone(),
         mask: read_mask(sites.mask.as_deref(), opened.first.size)?,
         pixel_pitch: method.pixel_pitch.unwrap_or((1.0, 1.0)),
@@ -88,8 +88,13 @@ pub fn prepare(
 }
 
 /// Where results go: the user's words, or CSV on standard output for points without any.
-pub fn plan_output(output: &OutputArguments, sites: &Sites, json: bool, fields: Option<usize>) -> Result<OutputPlan> {
-    let points = matches!(sites, Sites::Points(_));
+pub fn plan_output(
+    output: &OutputArguments,
+    sites: &SamplingGrid,
+    json: bool,
+    fields: Option<usize>,
+) -> Result<OutputPlan> {
+    let points = matches!(sites, SamplingGrid::Points(_));
     let standard_output = points && output.output.is_none() && !json;
     let path = if standard_output { Some(Path::new("-")) } else { output.output.as_deref() };
     let csv = vec!["csv".to_string()];
@@ -107,7 +112,8 @@ pub fn plan_output(output: &OutputArguments, sites: &Sites, json: bool, fields: 
     Ok(plan)
 }
 
-/// Refuses to compute what nobody would see: without a place for results only the summary of `--json` is left, or what `besides` is there for.
+/// Refuses to compute what nobody would see: without a place for results only the summary of `--json` is
+/// left, or what `besides` is there for.
 pub fn expect_output(plan: &OutputPlan, json: bool, besides: bool) -> Result<()> {
     if plan.writes_nothing() && !json && !besides {
         let wanted =

@@ -1,4 +1,5 @@
-//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once, without its temporary files.
+//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once,
+//! without its temporary files.
 
 use crate::error::{Error, Result};
 use crate::io::write::remove_temporaries;

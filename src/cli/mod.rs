@@ -1,10 +1,11 @@
 //! The command line: the binary `jacoflow` and the Python entry point call the same [`run`].
 //!
-//! Exit codes: 0 success; 1 a run-time failure (files, formats, numbers); 2 an unusable argument; 3 a missing program
-//! (`ffmpeg`); 130 stopped by Ctrl-C or a termination signal.
+//! Exit codes: 0 success; 1 a run-time failure (files, formats, numbers); 2 an unusable argument; 3 a missing
+//! program (`ffmpeg`); 130 stopped by Ctrl-C or a termination signal.
 //!
-//! Results go to files, or to standard output where the help says so; everything else (progress, summary, errors) goes to standard
-//! error. With `--json`, standard output holds exactly one JSON object, in failure too.
+//! Results go to files, or to standard output where the help says so; everything else (progress, summary,
+//! errors) goes to standard error. With `--json`, standard output holds exactly one JSON object, in failure
+//! too.
 
 mod arguments;
 mod command;
@@ -48,7 +49,8 @@ struct Cli {
     command: Command,
 }
 
-/// Runs the command line `arguments` (the program's name first) and returns the exit code described at the [module](self).
+/// Runs the command line `arguments` (the program's name first) and returns the exit code described at the
+/// [module](self).
 ///
 /// Prints to standard output and standard error. The first call installs a handler for Ctrl-C in the process.
 pub fn run<I, S>(arguments: I) -> i32

@@ -81,7 +81,8 @@ pub fn preprocess(arguments: &InputArguments, mask: Option<&Mask>) -> Result<Pre
     })
 }
 
-/// What is done to frames before this estimator has them. The windowed one smooths on its own, and reads the noise from the frames before that.
+/// What is done to frames before this estimator has them. The windowed one smooths on its own, and reads the
+/// noise from the frames before that.
 pub fn preprocess_for(estimator: &Estimator, arguments: &InputArguments) -> Result<Preprocess> {
     let mut steps = preprocess(arguments, estimator.common().mask.as_ref())?;
     if matches!(estimator.method(), Method::Windowed(_)) {
@@ -98,7 +99,8 @@ pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)>
     ))
 }
 
-/// Whether to compute in double precision for frames of this type; `demanding` work does so unless told otherwise.
+/// Whether to compute in double precision for frames of this type; `demanding` work does so unless told
+/// otherwise.
 pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
     match precision {
         Precision::Auto => demanding || first.dtype == "float64",

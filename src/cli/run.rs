@@ -59,7 +59,8 @@ pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -
     Report { summary: object, failure }
 }
 
-/// Where the results are: the place asked for; of a run that was stopped the other name that one file has then, and nothing where it left none.
+/// Where the results are: the place asked for; of a run that was stopped the other name that one file has
+/// then, and nothing where it left none.
 fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>, complete: bool) -> Option<&'a Path> {
     let one_file = |asked: &&Path| *asked != Path::new("-") && !is_folder(asked);
     match asked.filter(one_file) {
@@ -99,7 +100,8 @@ pub fn input_details(opened: &Opened, sites: &SiteArguments) -> Value {
     })
 }
 
-/// Where a table goes: to a `.csv` file that may be written, or to standard output, unless the report as JSON goes there.
+/// Where a table goes: to a `.csv` file that may be written, or to standard output, unless the report as JSON
+/// goes there.
 pub(super) fn table_target(output: Option<&Path>, force: bool, json: bool) -> Result<TableTarget> {
     match output {
         Some(path) if path != Path::new("-") => {

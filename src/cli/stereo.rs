@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MatchingArguments {
-    /// How views are matched: sgm (gradients along chains of edge pixels, fractions of a px) or classes (directions in a window, whole px)
+    /// How views are matched: sgm (gradients along chains of edge pixels, fractions of a px) or classes
+    /// (directions in a window, whole px)
     #[arg(long, value_name = "NAME", default_value = "sgm")]
     pub method: String,
     #[command(flatten)]
@@ -48,7 +49,8 @@ pub struct MatchingArguments {
     jacoflow stereo film.y4m --layout side-by-side -o out/ --method classes"
 )]
 pub struct StereoCommand {
-    /// The left and the right view: folders, images, videos, .y4m or .npy files; one of them that holds both with --layout
+    /// The left and the right view: folders, images, videos, .y4m or .npy files; one of them that holds both
+    /// with --layout
     #[arg(required = true, value_name = "VIEW", num_args = 1..=2, help_heading = "Input")]
     pub input: Vec<String>,
     #[command(flatten, next_help_heading = "Input")]
@@ -63,7 +65,8 @@ pub struct StereoCommand {
     /// Formats in a folder: npz (everything), pfm, kitti [default: npz]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Output")]
     pub format: Vec<String>,
-    /// Draw disparities in colour over every left view, blue far to red near: a folder for stereo_000000.png, ...
+    /// Draw disparities in colour over every left view, blue far to red near: a folder for stereo_000000.png,
+    /// ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub picture: Option<PathBuf>,
     /// Replace files that exist

@@ -40,7 +40,8 @@ pub struct SynthCommand {
     /// List the scenes, what they can carry and what they can be given
     #[arg(long)]
     pub list: bool,
-    /// A folder (with / at the end where a new one has a dot in its name), a .npy or a .y4m file, or - for Y4M on standard output
+    /// A folder (with / at the end where a new one has a dot in its name), a .npy or a .y4m file, or - for
+    /// Y4M on standard output
     #[arg(long, short, value_name = "OUT", required_unless_present = "list")]
     pub output: Option<PathBuf>,
     /// Number of frames [default: 10; of a scene of targets all]

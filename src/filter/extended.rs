@@ -1,4 +1,5 @@
-//! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes and Filtering Theory", 1970, chapter 8).
+//! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes
+//! and Filtering Theory", 1970, chapter 8).
 
 use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::Result;
@@ -7,9 +8,10 @@ use std::ops::{Deref, DerefMut};
 
 /// A batch of extended Kalman filters: `x' = f(x) + w`, `z = h(x) + v`.
 ///
-/// Callbacks receive states as rows, `(rows, n)`, and fill `(rows, n)` or `(rows, m)` values; Jacobian callbacks receive the `B` means and fill
-/// `(B, n, n)` or `(B, m, n)`. Errors of a callback are passed on and leave the filter unchanged.
-/// The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
+/// Callbacks receive states as rows, `(rows, n)`, and fill `(rows, n)` or `(rows, m)` values; Jacobian
+/// callbacks receive the `B` means and fill `(B, n, n)` or `(B, m, n)`. Errors of a callback are passed on
+/// and leave the filter unchanged. The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...)
+/// are reached directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedFilter {
     /// The batch of Gaussians and the noise.
@@ -30,7 +32,8 @@ impl ExtendedFilter {
     /// `x <- f(x)`, `P <- F P F^T + Q` with `F = df/dx` at the old mean from `jacobian`.
     ///
     /// # Errors
-    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or callback results that are not finite.
+    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or
+    /// callback results that are not finite.
     pub fn predict(
         &mut self,
         mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
@@ -47,7 +50,8 @@ impl ExtendedFilter {
         self.state.propagate_covariance(&f)
     }
 
-    /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2 n` rows for each state.
+    /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2
+    /// n` rows for each state.
     ///
     /// # Errors
     /// As [`predict`](Self::predict).
@@ -60,11 +64,12 @@ impl ExtendedFilter {
         })
     }
 
-    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian; a state with a NaN among its numbers is left as it is.
+    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian; a state with a NaN among its
+    /// numbers is left as it is.
     ///
     /// # Errors
-    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) as for `predict`; [`Error::Numerical`](crate::Error::Numerical) when `S` is
-    /// not positive definite.
+    /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) as for `predict`;
+    /// [`Error::Numerical`](crate::Error::Numerical) when `S` is not positive definite.
     pub fn update(
         &mut self,
         z: &[f64],

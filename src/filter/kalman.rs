@@ -33,8 +33,9 @@ impl KalmanFilter {
     /// `x <- F x`, `P <- F P F^T + Q`.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for arrays of wrong length, numbers that are not finite and matrices that are no covariances;
-    /// [`Error::Numerical`](crate::Error::Numerical) when the state outgrows all numbers.
+    /// [`Error::Argument`](crate::Error::Argument) for arrays of wrong length, numbers that are not finite
+    /// and matrices that are no covariances; [`Error::Numerical`](crate::Error::Numerical) when the state
+    /// outgrows all numbers.
     pub fn predict(&mut self) -> Result<()> {
         self.check()?;
         let n = self.dim_x;
@@ -52,7 +53,8 @@ impl KalmanFilter {
     /// Takes in the measurements `z` `(B, m)`; a state with a NaN among its numbers is left as it is.
     ///
     /// # Errors
-    /// As [`predict`](Self::predict); also [`Error::Numerical`](crate::Error::Numerical) when `S` is not positive definite.
+    /// As [`predict`](Self::predict); also [`Error::Numerical`](crate::Error::Numerical) when `S` is not
+    /// positive definite.
     pub fn update(&mut self, z: &[f64]) -> Result<()> {
         self.check()?;
         let (n, m) = (self.dim_x, self.dim_z);

@@ -1,14 +1,17 @@
-//! Scaled sigma points (R. van der Merwe, "Sigma-point Kalman filters for probabilistic inference in dynamic state-space models", 2004).
+//! Scaled sigma points (R. van der Merwe, "Sigma-point Kalman filters for probabilistic inference in dynamic
+//! state-space models", 2004).
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// The constants of the scaled unscented transform, with a Cholesky factor as matrix square root.
 ///
-/// For `n` dimensions `lambda = alpha^2 (n + kappa) - n` and the points are `x` and `x +- column_k(L) sqrt(n + lambda)` with `P = L L^T`.
-/// Weights: mean `lambda / (n + lambda)` and `1 / (2 (n + lambda))`; for the covariance the first one gains `1 - alpha^2 + beta`.
+/// For `n` dimensions `lambda = alpha^2 (n + kappa) - n` and the points are `x` and `x +- column_k(L) sqrt(n
+/// + lambda)` with `P = L L^T`. Weights: mean `lambda / (n + lambda)` and `1 / (2 (n + lambda))`; for the
+/// covariance the first one gains `1 - alpha^2 + beta`.
 ///
-/// The default, `alpha = 1, beta = 2, kappa = 0`, gives the points `x +- sqrt(n) column_k(L)` and, in the mean, no weight to the centre.
+/// The default, `alpha = 1, beta = 2, kappa = 0`, gives the points `x +- sqrt(n) column_k(L)` and, in the
+/// mean, no weight to the centre.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SigmaPoints {
     /// Spread of the points around the mean, > 0.
@@ -74,7 +77,8 @@ impl SigmaPoints {
         weights
     }
 
-    /// The points of mean `x` `(n)` and Cholesky factor `l` `(n, n)`, lower: `(2 n + 1, n)` values, centre first, then every `+`, then every `-`.
+    /// The points of mean `x` `(n)` and Cholesky factor `l` `(n, n)`, lower: `(2 n + 1, n)` values, centre
+    /// first, then every `+`, then every `-`.
     pub(super) fn draw(&self, x: &[f64], l: &[f64], out: &mut [f64]) {
         let n = x.len();
         let scale = self.spread(n).sqrt();
@@ -93,7 +97,8 @@ impl SigmaPoints {
     /// The sigma points `(2 n + 1, n)` of mean `x` `(n)` and covariance `p` `(n, n)`.
     ///
     /// # Errors
-    /// [`Error::Argument`] for wrong sizes and a mean that is not finite, [`Error::Numerical`] when `p` is not positive definite.
+    /// [`Error::Argument`] for wrong sizes and a mean that is not finite, [`Error::Numerical`] when `p` is
+    /// not positive definite.
     pub fn sigma_points(&self, x: &[f64], p: &[f64]) -> Result<Vec<f64>> {
         let n = x.len();
         if n == 0 || p.len() != n * n {

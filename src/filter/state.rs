@@ -6,7 +6,8 @@ use crate::math::dense::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A batch of `B` independent Gaussian states with `n` dimensions, measured by `m` numbers each. Row-major arrays.
+/// A batch of `B` independent Gaussian states with `n` dimensions, measured by `m` numbers each. Row-major
+/// arrays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GaussianState {
     /// `B`, the number of states.
@@ -39,7 +40,8 @@ impl GaussianState {
     /// `batch` states of `dim_x` dimensions with zero mean and identity covariances.
     ///
     /// # Errors
-    /// [`Error::Argument`] when a dimension is zero or above 4096, or when the memory that `batch` states take in a step cannot be had.
+    /// [`Error::Argument`] when a dimension is zero or above 4096, or when the memory that `batch` states
+    /// take in a step cannot be had.
     pub fn new(batch: usize, dim_x: usize, dim_z: usize) -> Result<Self> {
         check_dimension("dim_x", dim_x)?;
         check_dimension("dim_z", dim_z)?;
@@ -61,7 +63,8 @@ impl GaussianState {
         })
     }
 
-    /// Checks the public arrays, which a caller may have replaced: sizes, and that they are means and covariances.
+    /// Checks the public arrays, which a caller may have replaced: sizes, and that they are means and
+    /// covariances.
     pub(super) fn check(&self) -> Result<()> {
         let (b, n, m) = (self.batch, self.dim_x, self.dim_z);
         expect("x", &self.x, &[b * n])?;
@@ -74,7 +77,8 @@ impl GaussianState {
         check_covariances("R", &self.R, m)
     }
 
-    /// Mends the covariance of one state after a step if it is none any more, and counts that; refuses numbers that have become infinite.
+    /// Mends the covariance of one state after a step if it is none any more, and counts that; refuses
+    /// numbers that have become infinite.
     fn keep_sound(&mut self, item: usize) -> Result<()> {
         let n = self.dim_x;
         let (x, p) = (&self.x[item * n..(item + 1) * n], &mut self.P[item * n * n..(item + 1) * n * n]);
@@ -105,8 +109,9 @@ impl GaussianState {
         Ok(all)
     }
 
-    /// The update of one state by the residual `y` through the (statistically linearised) measurement matrix `h` `(m, n)` with noise `r` `(m, m)`,
-    /// in Joseph's form `P = (I - K H) P (I - K H)^T + K R K^T`, which cannot lose positive definiteness to cancellation.
+    /// The update of one state by the residual `y` through the (statistically linearised) measurement matrix
+    /// `h` `(m, n)` with noise `r` `(m, m)`, in Joseph's form `P = (I - K H) P (I - K H)^T + K R K^T`, which
+    /// cannot lose positive definiteness to cancellation.
     pub(super) fn joseph_update(&mut self, item: usize, y: &[f64], h: &[f64], r: &[f64]) -> Result<()> {
         let (n, m) = (self.dim_x, self.dim_z);
         let p = &mut self.P[item * n * n..(item + 1) * n * n];
@@ -185,7 +190,8 @@ pub(crate) fn check_dimension(name: &'static str, n: usize) -> Result<()> {
     Err(Error::argument(name, format!("an integer from 1 to {LARGEST_DIMENSION}"), n))
 }
 
-/// Refuses a number of states for which there is no memory: about what an unscented step takes is asked for and given back.
+/// Refuses a number of states for which there is no memory: about what an unscented step takes is asked for
+/// and given back.
 fn check_batch(batch: usize, n: usize, m: usize) -> Result<()> {
     if batch == 0 {
         return Err(Error::argument("batch", "a positive integer", 0));
@@ -210,7 +216,8 @@ pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
     }
 }
 
-/// Refuses `(n, n)` matrices, one after another, that are no covariances: finite, symmetric, no negative eigenvalue but by rounding.
+/// Refuses `(n, n)` matrices, one after another, that are no covariances: finite, symmetric, no negative
+/// eigenvalue but by rounding.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `name` and what is wrong.

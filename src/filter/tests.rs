@@ -1,4 +1,5 @@
-//! Tests of the filters against each other, against statistics, and against numbers recorded from filterpy (`tests/golden/filters.py`).
+//! Tests of the filters against each other, against statistics, and against numbers recorded from filterpy
+//! (`tests/golden/filters.py`).
 
 // Callbacks return a result whether they can fail or not.
 #![allow(clippy::unnecessary_wraps)]

@@ -9,17 +9,19 @@ use std::ops::{Deref, DerefMut};
 
 /// A batch of unscented Kalman filters: `x' = f(x) + w` (or `f(x, w)`), `z = h(x) + v`.
 ///
-/// A callback receives sigma points as rows, `(B (2 n + 1), n)`: those of one state follow each other, the mean first, then `+`, then `-` in the order of
-/// the Cholesky factor's columns; it fills as many rows of `n` or `m` values. Errors of a callback are passed on and leave `x` and `P` as they were.
-/// The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
+/// A callback receives sigma points as rows, `(B (2 n + 1), n)`: those of one state follow each other, the
+/// mean first, then `+`, then `-` in the order of the Cholesky factor's columns; it fills as many rows of `n`
+/// or `m` values. Errors of a callback are passed on and leave `x` and `P` as they were. The fields of
+/// [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UnscentedFilter {
     /// The batch of Gaussians and the noise.
     pub state: GaussianState,
     /// Constants of the sigma points.
     pub points: SigmaPoints,
-    /// Draw new sigma points for the measurement, from `x` and `P` after the prediction (default). Otherwise the propagated ones are measured, as
-    /// `filterpy` 1 did, which leaves `Q` out of the innovation covariance of additive-noise filters.
+    /// Draw new sigma points for the measurement, from `x` and `P` after the prediction (default). Otherwise
+    /// the propagated ones are measured, as `filterpy` 1 did, which leaves `Q` out of the innovation
+    /// covariance of additive-noise filters.
     pub redraw: bool,
     /// The propagated points `(B, rows, n)` of the last prediction; empty before the first.
     pub sigmas: Vec<f64>,
@@ -39,7 +41,8 @@ impl UnscentedFilter {
     /// Additive noise: the `2 n + 1` points go through `fx`, and `Q` is added to their covariance.
     ///
     /// # Errors
-    /// Those of `fx`; [`Error::Argument`] for arrays of wrong length or results that are not finite; [`Error::Numerical`] when `P` cannot be mended.
+    /// Those of `fx`; [`Error::Argument`] for arrays of wrong length or results that are not finite;
+    /// [`Error::Numerical`] when `P` cannot be mended.
     pub fn predict(&mut self, mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.check()?;
         self.points.check(self.dim_x)?;
@@ -51,8 +54,8 @@ impl UnscentedFilter {
         self.take_moments(sigmas, n, Some(&q))
     }
 
-    /// Augmented noise: `4 n + 1` points of the state with its noise `w ~ N(0, Q)`; `fx` receives the state rows and the noise rows,
-    /// `(B (4 n + 1), n)` each. `Q` may be zero in some directions.
+    /// Augmented noise: `4 n + 1` points of the state with its noise `w ~ N(0, Q)`; `fx` receives the state
+    /// rows and the noise rows, `(B (4 n + 1), n)` each. `Q` may be zero in some directions.
     ///
     /// # Errors
     /// As [`predict`](Self::predict); [`Error::Numerical`] when `Q` is not positive semidefinite.
@@ -86,11 +89,12 @@ impl UnscentedFilter {
         self.take_moments(sigmas, 2 * n, None)
     }
 
-    /// Takes in the measurements `z` `(B, m)` through `hx`; a state with a NaN among its numbers is left as it is.
+    /// Takes in the measurements `z` `(B, m)` through `hx`; a state with a NaN among its numbers is left as
+    /// it is.
     ///
     /// # Errors
-    /// Those of `hx`; [`Error::Argument`] for arrays of wrong length or results that are not finite; [`Error::Numerical`] when `P` cannot be mended or the
-    /// innovation covariance is not positive definite.
+    /// Those of `hx`; [`Error::Argument`] for arrays of wrong length or results that are not finite;
+    /// [`Error::Numerical`] when `P` cannot be mended or the innovation covariance is not positive definite.
     pub fn update(&mut self, z: &[f64], mut hx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.check()?;
         self.points.check(self.dim_x)?;
@@ -116,7 +120,8 @@ impl UnscentedFilter {
             let x = &self.x[item * n..(item + 1) * n];
             let cross = weighted_product(measured, &mean, points, x, &wc);
             let mut spread = weighted_product(measured, &mean, measured, &mean, &wc);
-            // The measurement seen as linear: H = P_zx P^-1, with what H does not explain as additional noise.
+            // The measurement seen as linear: H = P_zx P^-1, with what H does not explain as additional
+            // noise.
             let mut h = cross.clone();
             h.chunks_exact_mut(n).for_each(|row| solve(&factors[item * n * n..(item + 1) * n * n], n, row));
             for a in 0..m {
@@ -153,7 +158,8 @@ impl UnscentedFilter {
         out
     }
 
-    /// Sets `x` and `P` to the weighted moments of propagated points of `dims` dimensions, plus additive noise.
+    /// Sets `x` and `P` to the weighted moments of propagated points of `dims` dimensions, plus additive
+    /// noise.
     fn take_moments(&mut self, sigmas: Vec<f64>, dims: usize, noise: Option<&[f64]>) -> Result<()> {
         let n = self.dim_x;
         let rows = SigmaPoints::count(dims);

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, MOTION_NAMES, Rect, Sites};
+use crate::types::{FlowField, MOTION_NAMES, Rect, SamplingGrid};
 
 /// A covariance matrix of a point, px^2, rows and columns x, y.
 pub type PointCovariance = [[f64; 2]; 2];
@@ -28,19 +28,24 @@ struct Between {
 
 /// Moves points by a field: `p' = p + f(p)`, the motion of one frame.
 ///
-/// Between sites the flow is bilinear in what the four sites about the point say of it, each by its own affine motion:
-/// `f(p) = sum_k w_k (f_k + M_k (p - s_k))` with bilinear weights `w_k`; at a site it is the site's flow, and an affine field is exact everywhere.
+/// Between sites the flow is bilinear in what the four sites about the point say of it, each by its own
+/// affine motion: `f(p) = sum_k w_k (f_k + M_k (p - s_k))` with bilinear weights `w_k`; at a site it is the
+/// site's flow, and an affine field is exact everywhere.
 ///
-/// A covariance `C` becomes `(I + M) C (I + M)^T + C_f`: the error of the point, deformed as its surroundings are, and that of the flow itself, taken as independent.
-/// `M = sum_k w_k M_k`, or the slope of the interpolated flow for a model without derivatives. `C_f = sum_k w_k A_k C_k A_k^T` with the sites' covariances `C_k` of
-/// `(u, v, u_x, v_x, u_y, v_y)` and `A_k` the derivative of `f_k + M_k (p - s_k)` by them: exact where what the four sites say of the point errs alike, as that of neighbours does whose
-/// windows overlap, and too large, never too small, where it does not. It is zero for a field without covariance.
+/// A covariance `C` becomes `(I + M) C (I + M)^T + C_f`: the error of the point, deformed as its surroundings
+/// are, and that of the flow itself, taken as independent. `M = sum_k w_k M_k`, or the slope of the
+/// interpolated flow for a model without derivatives. `C_f = sum_k w_k A_k C_k A_k^T` with the sites'
+/// covariances `C_k` of `(u, v, u_x, v_x, u_y, v_y)` and `A_k` the derivative of `f_k + M_k (p - s_k)` by
+/// them: exact where what the four sites say of the point errs alike, as that of neighbours does whose
+/// windows overlap, and too large, never too small, where it does not. It is zero for a field without
+/// covariance.
 ///
-/// A point is NaN where it is outside the rectangle of sites (nothing is extrapolated), where a site that has a weight has no valid estimate, and where it was NaN.
+/// A point is NaN where it is outside the rectangle of sites (nothing is extrapolated), where a site that has
+/// a weight has no valid estimate, and where it was NaN.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `field` for a list of points instead of a grid, `pixel_pitch` unless a pixel is one unit in both directions, `covariance` for another
-/// number of matrices than of points.
+/// [`Error::Argument`] naming `field` for a list of points instead of a grid, `pixel_pitch` unless a pixel is
+/// one unit in both directions, `covariance` for another number of matrices than of points.
 pub fn advect<T: Real>(
     field: &FlowField<T>,
     points: &[[f64; 2]],
@@ -87,7 +92,7 @@ struct Lattice {
 impl Lattice {
     fn of<T: Real>(field: &FlowField<T>) -> Result<Self> {
         let layout = &field.layout;
-        let Sites::Grid { region, stride } = &layout.sites else {
+        let SamplingGrid::Grid { region, stride } = &layout.sites else {
             let got = format!("a list of {} points", field.len());
             return Err(Error::argument("field", "one on a grid of pixels, to interpolate in", got));
         };
@@ -124,7 +129,8 @@ impl Lattice {
         Some(sum)
     }
 
-    /// The slope of bilinear flow in a cell; along an axis with one site only, zero. Sites without a weight for the flow itself count only where they are valid.
+    /// The slope of bilinear flow in a cell; along an axis with one site only, zero. SamplingGrid without a weight
+    /// for the flow itself count only where they are valid.
     fn slope<T: Real>(
         &self,
         field: &FlowField<T>,
@@ -177,7 +183,8 @@ impl Between {
     }
 }
 
-/// The site at or before a place on an axis of `count` sites, and the rest; the last site belongs to the cell before it, so that it is reached from within.
+/// The site at or before a place on an axis of `count` sites, and the rest; the last site belongs to the cell
+/// before it, so that it is reached from within.
 fn cell(place: f64, count: usize) -> Option<(usize, f64)> {
     if count == 0 || !(place >= 0.0 && place <= (count - 1) as f64) {
         return None;

@@ -4,21 +4,22 @@ use super::baseline::{HornSchunck, LucasKanade};
 use super::coarse_to_fine::CoarseToFine;
 use super::instantaneous::Instantaneous;
 use super::model::{ModelKind, Parameter};
-use super::options::{Common, Method};
+use super::options::{EstimatorOptions, Method};
 use super::windowed::Windowed;
 use crate::error::{Error, Result};
 use crate::simd::{SimdReal, same, same_mut};
 use crate::types::{FieldLayout, FlowField, Frame};
 
-/// Largest standard deviation of the noise in single precision, grey levels: squares of larger ones times counts do not fit.
+/// Largest standard deviation of the noise in single precision, grey levels: squares of larger ones times
+/// counts do not fit.
 const MOST_NOISE: f64 = 1e12;
 
 /// A method made ready: options checked, stencils and kernels computed.
 ///
 /// ```
-/// use jacoflow::flow::{Common, Estimator, Method};
+/// use jacoflow::flow::{EstimatorOptions, Estimator, Method};
 /// use jacoflow::types::Frame;
-/// let estimator = Estimator::new(Method::parse("instantaneous")?, Common::default())?;
+/// let estimator = Estimator::new(Method::parse("instantaneous")?, EstimatorOptions::default())?;
 /// let frames: Vec<Frame<f64>> = (0..3)
 ///     .map(|t| Frame::from_fn(8, 8, |x, y| ((x as f64 - 0.25 * t as f64) * 0.7).sin() * 50.0 + ((y as f64) * 0.4).cos() * 40.0))
 ///     .collect();
@@ -30,7 +31,7 @@ const MOST_NOISE: f64 = 1e12;
 pub struct Estimator {
     engine: Engine,
     method: Method,
-    common: Common,
+    common: EstimatorOptions,
 }
 
 #[derive(Debug)]
@@ -47,7 +48,7 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option that cannot be used.
-    pub fn new(method: Method, common: Common) -> Result<Self> {
+    pub fn new(method: Method, common: EstimatorOptions) -> Result<Self> {
         common.check()?;
         let engine = match &method {
             Method::CoarseToFine(o) => Engine::CoarseToFine(CoarseToFine::new(o)?),
@@ -64,7 +65,7 @@ impl Estimator {
         &self.method
     }
     /// The shared options.
-    pub fn common(&self) -> &Common {
+    pub fn common(&self) -> &EstimatorOptions {
         &self.common
     }
 
@@ -99,11 +100,12 @@ impl Estimator {
         }
     }
 
-    /// Flow at the sites, from [`Estimator::frames_needed`] frames, oldest first; the first of them is frame `first_index` of its sequence.
+    /// Flow at the sites, from [`Estimator::frames_needed`] frames, oldest first; the first of them is frame
+    /// `first_index` of its sequence.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frames` when their number or sizes are wrong or they are smaller than 3x3; naming `mask`, `region` or
-    /// `points` when those do not fit the frames.
+    /// [`Error::Argument`] naming `frames` when their number or sizes are wrong or they are smaller than 3x3;
+    /// naming `mask`, `region` or `points` when those do not fit the frames.
     pub fn estimate<T: SimdReal>(&self, frames: &[&Frame<T>], first_index: usize) -> Result<FlowField<T>> {
         self.check(frames)?;
         let mut field = FlowField::unwritten(self.layout(frames[0].size(), first_index), self.common.covariance)?;
@@ -111,7 +113,8 @@ impl Estimator {
         Ok(field)
     }
 
-    /// As [`Estimator::estimate`], into a field that an earlier call made: nothing is allocated when its size fits, else it is replaced.
+    /// As [`Estimator::estimate`], into a field that an earlier call made: nothing is allocated when its size
+    /// fits, else it is replaced.
     ///
     /// # Errors
     /// As [`Estimator::estimate`]; the field's values are then unspecified.
@@ -178,7 +181,8 @@ impl Estimator {
         Ok(())
     }
 
-    /// Hands over to the instance for the precision at hand. Both are compiled here, once, and not again in every crate that calls this door.
+    /// Hands over to the instance for the precision at hand. Both are compiled here, once, and not again in
+    /// every crate that calls this door.
     fn fill<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
         if let Some(field) = same_mut::<_, FlowField<f32>>(field) {
             self.fill_single(&frames.iter().filter_map(|f| same(*f)).collect::<Vec<_>>(), field)

@@ -1,7 +1,9 @@
-//! Small dense least squares in double precision, without allocation: Householder QR, then a one-sided Jacobi singular value decomposition of R.
+//! Small dense least squares in double precision, without allocation: Householder QR, then a one-sided Jacobi
+//! singular value decomposition of R.
 //!
 //! The careful path of the per-pixel estimators. Normal equations square the condition number; this does not.
-//! (G. Golub, C. Van Loan, "Matrix Computations", 4th ed., 5.2 and 8.6; J. Demmel, K. Veselic 1992 for the relative accuracy of Jacobi.)
+//! (G. Golub, C. Van Loan, "Matrix Computations", 4th ed., 5.2 and 8.6; J. Demmel, K. Veselic 1992 for the
+//! relative accuracy of Jacobi.)
 
 /// Smallest singular value of the column-scaled system, relative to the largest, that counts as rank.
 pub(super) const RANK_TOLERANCE: f64 = 1e-9;
@@ -23,8 +25,9 @@ pub(super) struct Solution<const N: usize, const P: usize> {
 
 /// Solves `A x = b` in the least-squares sense and decides the rank of A.
 ///
-/// `floor`: standard deviation of the rounding noise in each entry of A, in the units of A. Columns and singular values that such noise explains count
-/// as zero; scaling A, b and `floor` together changes nothing, nor does scaling a column.
+/// `floor`: standard deviation of the rounding noise in each entry of A, in the units of A. Columns and
+/// singular values that such noise explains count as zero; scaling A, b and `floor` together changes nothing,
+/// nor does scaling a column.
 pub(super) fn solve<const N: usize, const P: usize>(a: &[[f64; P]; N], b: &[f64; N], floor: f64) -> Solution<N, P> {
     let noise = floor * (N as f64).sqrt();
     let mut scale = [0.0; P];

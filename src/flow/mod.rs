@@ -1,11 +1,13 @@
 //! Flow and its Jacobian from two or three frames.
 //!
-//! [`Estimator`] is the one door: a [`Method`] with its options, [`Common`] options, frames in, a
+//! [`Estimator`] is the one door: a [`Method`] with its options, [`EstimatorOptions`] options, frames in, a
 //! [`FlowField`](crate::types::FlowField) out.
 //!
-//! * [`instantaneous`]: per pixel, WO2010/098160 (34): flow and Jacobian from nothing but a 3x3x3 block of brightness. Its domain is images that are
-//!   locally quadratic and motion that makes them observable; on busy 8-bit texture use the windowed form.
-//! * [`coarse_to_fine`]: affine flow with a pyramid, warping and robust coupling: the one for everyday frames.
+//! * [`instantaneous`]: per pixel, WO2010/098160 (34): flow and Jacobian from nothing but a 3x3x3 block of
+//!   brightness. Its domain is images that are locally quadratic and motion that makes them observable; on
+//!   busy 8-bit texture use the windowed form.
+//! * [`coarse_to_fine`]: affine flow with a pyramid, warping and robust coupling: the one for everyday
+//!   frames.
 //! * [`windowed`]: the same equations over a window in which the motion is affine.
 //! * [`baseline`]: Lucas-Kanade and Horn-Schunck, for comparison.
 //! * [`model`]: the motion models; one file and one line each.
@@ -30,4 +32,4 @@ pub mod windowed;
 pub use advect::{Advected, PointCovariance, advect};
 pub use estimator::Estimator;
 pub use observability::{Condition, Observability, ObservabilityMap, classify, observability};
-pub use options::{Common, Method, RankPolicy};
+pub use options::{EstimatorOptions, Method, RankPolicy};

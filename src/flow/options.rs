@@ -7,7 +7,7 @@ use super::windowed::WindowedOptions;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, Sites};
+use crate::types::{Mask, SamplingGrid};
 
 /// What to report where the equations do not determine every unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,9 +43,9 @@ impl RankPolicy {
 
 /// Options that all methods share.
 #[derive(Debug, Clone)]
-pub struct Common {
+pub struct EstimatorOptions {
     /// Where estimates are wanted. Default: every pixel. Nothing else is computed.
-    pub sites: Sites,
+    pub sites: SamplingGrid,
     /// Pixels that may be used (`true`), of the frames' size. Default: all.
     pub mask: Option<Mask>,
     /// Physical size `(dx, dy)` of a pixel; flow comes in these units per frame. Default: 1 px.
@@ -54,11 +54,13 @@ pub struct Common {
     pub frame_period: Option<f64>,
     /// Whether to compute the covariance of the parameters. Default: no.
     pub covariance: bool,
-    /// Whether to tell the systematic part of the covariance apart, where the method can ([`FlowField::systematic`](crate::types::FlowField)). Default: no.
+    /// Whether to tell the systematic part of the covariance apart, where the method can
+    /// ([`FlowField::systematic`](crate::types::FlowField)). Default: no.
     pub systematic: bool,
     /// Whether to report residual, rank and condition number of each site. Default: no.
     pub diagnostics: bool,
-    /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the frames.
+    /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the
+    /// frames.
     pub noise: Option<f64>,
     /// Threads. Default: `JACOFLOW_THREADS`, else every processor.
     pub threads: Threads,
@@ -66,10 +68,10 @@ pub struct Common {
     pub simd: Option<Level>,
 }
 
-impl Default for Common {
+impl Default for EstimatorOptions {
     fn default() -> Self {
         Self {
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             mask: None,
             pixel_pitch: (1.0, 1.0),
             frame_period: None,
@@ -83,8 +85,9 @@ impl Default for Common {
     }
 }
 
-impl Common {
-    /// Refuses lengths, times and noise levels that are not positive and finite, naming the field, and a useless environment where that decides.
+impl EstimatorOptions {
+    /// Refuses lengths, times and noise levels that are not positive and finite, naming the field, and a
+    /// useless environment where that decides.
     pub(super) fn check(&self) -> Result<()> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let (dx, dy) = self.pixel_pitch;
@@ -97,7 +100,7 @@ impl Common {
         if let Some(noise) = self.noise.filter(|n| !(n.is_finite() && *n >= 0.0)) {
             return Err(Error::argument("noise", "a standard deviation of 0 grey levels or more", noise));
         }
-        if let Sites::Grid { stride: 0, .. } = self.sites {
+        if let SamplingGrid::Grid { stride: 0, .. } = self.sites {
             return Err(Error::argument("stride", "a positive integer", 0));
         }
         self.threads.check()?;
@@ -114,7 +117,8 @@ impl Common {
 /// The ways to estimate flow from two or three frames.
 #[derive(Debug, Clone)]
 pub enum Method {
-    /// Affine flow from coarse to fine: large motions, edges, untextured areas; the method for everyday frames.
+    /// Affine flow from coarse to fine: large motions, edges, untextured areas; the method for everyday
+    /// frames.
     CoarseToFine(CoarseToFineOptions),
     /// Per pixel, (34): flow and Jacobian from a 3x3x3 block of brightness.
     Instantaneous(InstantaneousOptions),
@@ -127,7 +131,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// The method called `name` (`coarse_to_fine`, `windowed`, `instantaneous`, `lucas_kanade`, `horn_schunck`) with its default options.
+    /// The method called `name` (`coarse_to_fine`, `windowed`, `instantaneous`, `lucas_kanade`,
+    /// `horn_schunck`) with its default options.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `method` for another word.
@@ -157,8 +162,9 @@ impl Method {
         }
     }
 
-    /// How far errors of neighbouring estimates go together, px (see [`FieldLayout::correlation_length`](crate::types::FieldLayout)): the
-    /// standard deviation of everything that an estimate is a weighted sum over.
+    /// How far errors of neighbouring estimates go together, px (see
+    /// [`FieldLayout::correlation_length`](crate::types::FieldLayout)): the standard deviation of everything
+    /// that an estimate is a weighted sum over.
     pub fn correlation_length(&self) -> f64 {
         match self {
             Self::CoarseToFine(options) => correlation_length(options.frames),

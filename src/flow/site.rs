@@ -2,7 +2,7 @@
 
 use crate::jet::Reach;
 use crate::parallel::BAND_ROWS;
-use crate::types::{FlowField, Mask, Sites, Status};
+use crate::types::{FlowField, Mask, SamplingGrid, Status};
 use std::ops::Range;
 
 /// Points of one task, where the sites are a list. Fixed, like [`BAND_ROWS`].
@@ -30,15 +30,16 @@ pub(super) struct FieldBand<'a, T> {
     pub window: Option<&'a mut [T]>,
 }
 
-/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), never depending on the number of threads.
+/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), never depending on
+/// the number of threads.
 pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
     let n = field.width * field.height;
     if n == 0 {
         return Vec::new();
     }
     let size = match field.layout.sites {
-        Sites::Points(_) => BAND_POINTS,
-        Sites::Grid { .. } => BAND_ROWS * field.width,
+        SamplingGrid::Points(_) => BAND_POINTS,
+        SamplingGrid::Grid { .. } => BAND_ROWS * field.width,
     };
     let mut motion: Vec<_> = field.motion.chunks_mut(n).map(|p| p.chunks_mut(size)).collect();
     let mut covariance: Vec<_> =
@@ -117,8 +118,8 @@ mod tests {
 
     #[test]
     fn bands_share_out_every_site_once() {
-        let points = Sites::Points((0..600).map(|k| (k % 40, k % 50)).collect());
-        for sites in [Sites::default(), points] {
+        let points = SamplingGrid::Points((0..600).map(|k| (k % 40, k % 50)).collect());
+        for sites in [SamplingGrid::default(), points] {
             let layout = FieldLayout {
                 frame_size: (40, 50),
                 sites,

@@ -5,7 +5,8 @@ use crate::simd::Lanes;
 /// Vectors summed side by side, so that one addition need not wait for the last.
 pub(super) const BLOCK: usize = 4;
 
-/// Runs the body with `x` and `N` such that every column of `0..width` is covered, `width >= LANES`: blocks, single vectors, and one last vector that overlaps.
+/// Runs the body with `x` and `N` such that every column of `0..width` is covered, `width >= LANES`: blocks,
+/// single vectors, and one last vector that overlaps.
 macro_rules! cover {
     ($width:expr, $V:ty, |$x:ident, $N:ident| $body:expr) => {{
         let mut $x = 0;

@@ -5,7 +5,8 @@ use crate::parallel::for_each_band;
 use crate::types::{Frame, Mask};
 use std::borrow::Cow;
 
-/// Which pixels of `frame` are finite and allowed by `usable`. A mask of another size allows everything: to refuse it is for others.
+/// Which pixels of `frame` are finite and allowed by `usable`. A mask of another size allows everything: to
+/// refuse it is for others.
 pub(crate) fn usable_pixels<T: Real>(frame: &Frame<T>, usable: Option<&Mask>) -> Mask {
     let mut mask = match usable {
         Some(usable) if usable.size() == frame.size() => usable.clone(),
@@ -17,11 +18,13 @@ pub(crate) fn usable_pixels<T: Real>(frame: &Frame<T>, usable: Option<&Mask>) ->
     mask
 }
 
-/// The frame with every pixel that is not finite or not allowed by `usable` replaced by a smooth continuation of those around it; all zero when there are none.
-/// A frame without such pixels is handed through. A mask of another size allows everything: to refuse it is for others.
+/// The frame with every pixel that is not finite or not allowed by `usable` replaced by a smooth continuation
+/// of those around it; all zero when there are none. A frame without such pixels is handed through. A mask of
+/// another size allows everything: to refuse it is for others.
 ///
-/// Averages of the usable pixels of 2 x 2 are taken until no hole is left; then the holes of each finer frame are filled from the coarser one, bilinearly
-/// (S. J. Gortler, R. Grzeszczuk, R. Szeliski, M. F. Cohen, "The lumigraph", 1996, section 3.4). Identical for any number of threads.
+/// Averages of the usable pixels of 2 x 2 are taken until no hole is left; then the holes of each finer frame
+/// are filled from the coarser one, bilinearly (S. J. Gortler, R. Grzeszczuk, R. Szeliski, M. F. Cohen, "The
+/// lumigraph", 1996, section 3.4). Identical for any number of threads.
 pub(crate) fn fill_holes<'a, T: Real>(frame: &'a Frame<T>, usable: Option<&Mask>) -> Cow<'a, Frame<T>> {
     let allowed = usable.is_none_or(|mask| mask.size() != frame.size() || all(mask));
     // Without a short circuit, so that the compiler may use lanes.

@@ -1,4 +1,5 @@
-//! Slopes of brightness: convolution with the derivatives of a Gaussian, vectorised along rows and parallel over row bands.
+//! Slopes of brightness: convolution with the derivatives of a Gaussian, vectorised along rows and parallel
+//! over row bands.
 
 use super::Border;
 use super::blocks::{cover, load, store};
@@ -24,11 +25,12 @@ impl<T: SimdReal> Weights<T> {
     }
 }
 
-/// Slopes of `frame` along x and along y, in its levels per px: convolutions with `G'(x) G(y)` and `G(x) G'(y)` of a Gaussian of `sigma` px, sampled up to
-/// `radius` px, the border replicated.
+/// Slopes of `frame` along x and along y, in its levels per px: convolutions with `G'(x) G(y)` and `G(x)
+/// G'(y)` of a Gaussian of `sigma` px, sampled up to `radius` px, the border replicated.
 ///
-/// They are the slopes of the plane that fits the neighbourhood best under Gaussian weights. A sample that is not finite damages every pixel whose kernel reaches it, and no
-/// other. Identical for any number of threads. `sigma` must be positive.
+/// They are the slopes of the plane that fits the neighbourhood best under Gaussian weights. A sample that is
+/// not finite damages every pixel whose kernel reaches it, and no other. Identical for any number of threads.
+/// `sigma` must be positive.
 pub(crate) fn gaussian_gradient<T: SimdReal>(
     level: Level,
     frame: &Frame<T>,
@@ -106,7 +108,8 @@ impl<T: SimdReal> Band<'_, T> {
 /// The rows at equal distance above and below.
 type RowPair<'a, T> = (&'a [T], &'a [T]);
 
-/// Sums of a column weighted with `G` and with `-G'`. The middle has weight 0 in the latter and is there so that a bad sample in it is not overlooked.
+/// Sums of a column weighted with `G` and with `-G'`. The middle has weight 0 in the latter and is there so
+/// that a bad sample in it is not overlooked.
 #[inline(always)]
 fn sum_down<V: Lanes, const N: usize>(
     centre: &[V::Scalar],

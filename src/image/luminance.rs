@@ -6,13 +6,15 @@ use crate::types::{Frame, Sample};
 /// Weights of red, green and blue in luma (ITU-R BT.601).
 const WEIGHTS: [f64; 3] = [0.299, 0.587, 0.114];
 
-/// Luma `Y = 0.299 R + 0.587 G + 0.114 B` (ITU-R BT.601) of interleaved samples, `[row][col][channel]`, in the samples' own type.
+/// Luma `Y = 0.299 R + 0.587 G + 0.114 B` (ITU-R BT.601) of interleaved samples, `[row][col][channel]`, in
+/// the samples' own type.
 ///
-/// `channels` is 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA); alpha is left out. Integer luma is rounded to the nearest level. A
-/// NaN in any colour channel makes its own pixel NaN and no other.
+/// `channels` is 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA); alpha is left out. Integer luma is rounded
+/// to the nearest level. A NaN in any colour channel makes its own pixel NaN and no other.
 ///
 /// # Errors
-/// [`Error::Argument`] for another number of channels, or when `data` does not hold `width * height * channels` samples.
+/// [`Error::Argument`] for another number of channels, or when `data` does not hold `width * height *
+/// channels` samples.
 pub fn luminance<S: Sample>(width: usize, height: usize, channels: usize, data: &[S]) -> Result<Frame<S>> {
     if !(1..=4).contains(&channels) {
         return Err(Error::argument("channels", "1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA)", channels));

@@ -4,7 +4,8 @@ use super::{GaussianSmoother, Quantiser};
 use crate::simd::SimdReal;
 use crate::types::{Frame, Mask};
 
-/// What is done to each frame before estimation: quantise, then smooth (WO2010/098160, figure 1). Nothing by default.
+/// What is done to each frame before estimation: quantise, then smooth (WO2010/098160, figure 1). Nothing by
+/// default.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preprocess {
     /// Rounding down to grey levels, as a camera does.
@@ -18,7 +19,8 @@ pub struct Preprocess {
 impl Preprocess {
     /// The frame after both steps; handed through untouched when there are none.
     ///
-    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of threads.
+    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of
+    /// threads.
     pub fn apply<T: SimdReal>(&self, frame: Frame<T>) -> Frame<T> {
         let frame = match &self.quantise {
             Some(quantiser) => quantiser.apply(&frame),

@@ -24,11 +24,13 @@ fn taps() -> Vec<f64> {
     GaussianSmoother { sigma: 1.0, truncate: RADIUS as f64, border: super::Border::Replicate }.kernel()
 }
 
-/// The frame smoothed by a Gaussian of 1 px, at every second pixel:
-/// `out(x, y) = sum_j sum_i w_i w_j in(2 x + i, 2 y + j)`, `w_i = exp(-i^2 / 2) / sum`, `|i| <= 3`, the border replicated: one step of the pyramid of
-/// P. J. Burt and E. H. Adelson, "The Laplacian pyramid as a compact image code", 1983, with sampled Gaussian weights.
+/// The frame smoothed by a Gaussian of 1 px, at every second pixel: `out(x, y) = sum_j sum_i w_i w_j in(2 x +
+/// i, 2 y + j)`, `w_i = exp(-i^2 / 2) / sum`, `|i| <= 3`, the border replicated: one step of the pyramid of
+/// P. J. Burt and E. H. Adelson, "The Laplacian pyramid as a compact image code", 1983, with sampled Gaussian
+/// weights.
 ///
-/// Each result is a direct sum, so a NaN damages only the pixels whose kernel reaches it. Identical for any number of threads.
+/// Each result is a direct sum, so a NaN damages only the pixels whose kernel reaches it. Identical for any
+/// number of threads.
 pub(crate) fn halve<T: SimdReal>(level: Level, frame: &Frame<T>) -> Frame<T> {
     let mut out = Frame::default();
     halve_into(level, frame, &mut out);
@@ -122,7 +124,8 @@ fn sum_down<V: Lanes, const N: usize>(rows: &[&[V::Scalar]; 2 * RADIUS + 1], x: 
     sums
 }
 
-/// Seven neighbours summed along, for the results from `x` on: result 0 lies at `even[2]`, which `odd[2]` follows.
+/// Seven neighbours summed along, for the results from `x` on: result 0 lies at `even[2]`, which `odd[2]`
+/// follows.
 #[inline(always)]
 fn sum_along<V: Lanes, const N: usize>(even: &[V::Scalar], odd: &[V::Scalar], x: usize, weights: &[V]) -> [V; N] {
     let pairs = [(odd, 1, 2), (even, 1, 3), (odd, 0, 3)];
@@ -136,8 +139,8 @@ fn sum_along<V: Lanes, const N: usize>(even: &[V::Scalar], odd: &[V::Scalar], x:
     sums
 }
 
-/// The mask that belongs to a halved frame: a pixel may be used when at least half of the pixels around `(2 x, 2 y)` may,
-/// weighted 1-2-1 along both axes, the border replicated.
+/// The mask that belongs to a halved frame: a pixel may be used when at least half of the pixels around `(2
+/// x, 2 y)` may, weighted 1-2-1 along both axes, the border replicated.
 pub(crate) fn halve_mask(mask: &Mask) -> Mask {
     let (width, height) = mask.size();
     let (out_width, out_height) = halved_size((width, height));

@@ -6,8 +6,8 @@ use crate::types::Frame;
 
 /// Rounds samples down to a multiple of a step: `floor(x / step) * step`.
 ///
-/// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in embodiment 2 of
-/// WO2010/098160. NaN and infinities stay as they are.
+/// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in
+/// embodiment 2 of WO2010/098160. NaN and infinities stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Quantiser {

@@ -8,16 +8,19 @@ use crate::types::Frame;
 pub enum Interpolation {
     /// From the four nearest pixels: continuous, exact for brightness that is linear in x and in y.
     Bilinear,
-    /// From the sixteen nearest pixels by cubic convolution with a = -1/2 (R. Keys, "Cubic convolution interpolation for digital
-    /// image processing", 1981): continuous slope, exact for quadratics. The default.
+    /// From the sixteen nearest pixels by cubic convolution with a = -1/2 (R. Keys, "Cubic convolution
+    /// interpolation for digital image processing", 1981): continuous slope, exact for quadratics. The
+    /// default.
     #[default]
     Bicubic,
 }
 
 impl Interpolation {
-    /// Brightness of `frame` at `(x, y)` px; NaN where the pixels it needs reach outside the frame or hold NaN.
+    /// Brightness of `frame` at `(x, y)` px; NaN where the pixels it needs reach outside the frame or hold
+    /// NaN.
     ///
-    /// Pixels that would get weight zero are not needed: at integer coordinates the pixel itself is returned, whatever is around it.
+    /// Pixels that would get weight zero are not needed: at integer coordinates the pixel itself is returned,
+    /// whatever is around it.
     pub fn at<T: Real>(self, frame: &Frame<T>, x: f64, y: f64) -> T {
         let (Some((x0, fx)), Some((y0, fy))) = (split(x, frame.width()), split(y, frame.height())) else {
             return T::nan();

@@ -10,11 +10,13 @@ use crate::types::Frame;
 /// Taps on one side beyond which smoothing is refused: far wider than any picture.
 const MAX_RADIUS: f64 = 16_384.0;
 
-/// Convolution with a sampled Gaussian, cut off and normalised: the conventions of `scipy.ndimage.gaussian_filter`.
+/// Convolution with a sampled Gaussian, cut off and normalised: the conventions of
+/// `scipy.ndimage.gaussian_filter`.
 ///
-/// `out(x, y) = sum_j sum_i w_i w_j in(x + i, y + j)`, `w_i = exp(-i^2 / (2 sigma^2)) / sum`, `|i| <= radius`, with `radius` the whole part of
-/// `truncate sigma + 1/2`. Each output is a direct sum over its own neighbourhood, so a NaN damages only the pixels whose kernel
-/// reaches it. Results are bit-identical for any number of threads.
+/// `out(x, y) = sum_j sum_i w_i w_j in(x + i, y + j)`, `w_i = exp(-i^2 / (2 sigma^2)) / sum`, `|i| <=
+/// radius`, with `radius` the whole part of `truncate sigma + 1/2`. Each output is a direct sum over its own
+/// neighbourhood, so a NaN damages only the pixels whose kernel reaches it. Results are bit-identical for any
+/// number of threads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct GaussianSmoother {
@@ -38,7 +40,8 @@ impl GaussianSmoother {
     /// A smoother with standard deviation `sigma` px, cut off at `truncate` sigma.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `smooth` or `truncate` for a negative or non-finite number or a kernel of more than 16384 px radius.
+    /// [`Error::Argument`] named `smooth` or `truncate` for a negative or non-finite number or a kernel of
+    /// more than 16384 px radius.
     pub fn with(sigma: f64, truncate: f64, border: Border) -> Result<Self> {
         if !(sigma >= 0.0 && sigma.is_finite()) {
             return Err(Error::argument("smooth", "a standard deviation in px, not negative and finite", sigma));
@@ -77,7 +80,8 @@ impl GaussianSmoother {
 
     /// The smoothed frame.
     ///
-    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of threads.
+    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of
+    /// threads.
     pub fn apply<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
         self.apply_at(Level::detect(), frame)
     }
@@ -149,7 +153,8 @@ pub(crate) fn convolve_separable<T: SimdReal>(
     });
 }
 
-/// One band of output rows: each row is summed down its columns into a scratch row, extended at both ends, then summed along.
+/// One band of output rows: each row is summed down its columns into a scratch row, extended at both ends,
+/// then summed along.
 struct BandConvolution<'a, T> {
     kernel: &'a SeparableKernel<T>,
     input: &'a [T],

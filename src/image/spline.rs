@@ -1,4 +1,5 @@
-//! Brightness between the pixels as a cubic spline: exact at the pixels, twice continuously differentiable, and fast to read.
+//! Brightness between the pixels as a cubic spline: exact at the pixels, twice continuously differentiable,
+//! and fast to read.
 
 mod prefilter;
 
@@ -10,11 +11,11 @@ const BEFORE: usize = 1;
 /// Coefficients before and after together: the last pixel's taps reach two further.
 const MARGIN: usize = BEFORE + 2;
 
-/// The cubic spline through the samples of a frame, which it continues by mirroring at the outermost pixel centres
-/// (M. Unser, "Splines: a perfect fit for signal and image processing", 1999).
+/// The cubic spline through the samples of a frame, which it continues by mirroring at the outermost pixel
+/// centres (M. Unser, "Splines: a perfect fit for signal and image processing", 1999).
 ///
-/// `f(x, y) = sum_j sum_i c_ij b(x - i) b(y - j)` with the cubic B-spline `b`; the coefficients `c` are such that `f` meets every sample. Finite samples
-/// are asked for: anything else spreads along its column and row.
+/// `f(x, y) = sum_j sum_i c_ij b(x - i) b(y - j)` with the cubic B-spline `b`; the coefficients `c` are such
+/// that `f` meets every sample. Finite samples are asked for: anything else spreads along its column and row.
 #[derive(Debug, Clone)]
 pub(crate) struct Spline<T> {
     width: usize,
@@ -59,7 +60,8 @@ impl<T: SimdReal> Spline<T> {
         (self.width, self.height)
     }
 
-    /// `out[i] = f(x[i], y[i])`, positions in px; those outside are moved to the nearest edge, NaN to the first pixel's. All NaN for an empty frame.
+    /// `out[i] = f(x[i], y[i])`, positions in px; those outside are moved to the nearest edge, NaN to the
+    /// first pixel's. All NaN for an empty frame.
     ///
     /// Panics when `x` or `y` are shorter than `out`.
     pub(crate) fn sample_row(&self, level: Level, x: &[T], y: &[T], out: &mut [T]) {
@@ -95,7 +97,8 @@ impl<T: SimdReal> Spline<T> {
     pub(crate) fn sample_in<V: Lanes<Scalar = T>>(&self, x: V, y: V) -> V {
         let (x, y) = (clamp(x, self.width), clamp(y, self.height));
         let (column, row) = (x.floor(), y.floor());
-        // The first tap of pixel (0, 0) is the coefficient at (0, 0): the margin makes up for its lying one further up and left.
+        // The first tap of pixel (0, 0) is the coefficient at (0, 0): the margin makes up for its lying one
+        // further up and left.
         let down = weights(y - row);
         let sums = V::sum_patches(&self.coefficients, self.stride, column, row, down);
         let across = weights(x - column);
@@ -104,7 +107,8 @@ impl<T: SimdReal> Spline<T> {
     }
 }
 
-/// Values a row: room for the margin, a whole number of cache lines, but not of pages, whose columns would fight for the same lines of a cache.
+/// Values a row: room for the margin, a whole number of cache lines, but not of pages, whose columns would
+/// fight for the same lines of a cache.
 fn stride<T>(width: usize) -> usize {
     let (line, page) = (64 / size_of::<T>(), 4096 / size_of::<T>());
     let stride = (width + MARGIN).next_multiple_of(line);
@@ -117,7 +121,8 @@ fn clamp<V: Lanes>(position: V, len: usize) -> V {
     position.max(V::zero()).min(V::constant(len as f64 - 1.0))
 }
 
-/// The cubic B-spline at `f + 1`, `f`, `1 - f` and `2 - f`: the weights of the pixels at -1, 0, 1 and 2 for a position `f` past pixel 0.
+/// The cubic B-spline at `f + 1`, `f`, `1 - f` and `2 - f`: the weights of the pixels at -1, 0, 1 and 2 for a
+/// position `f` past pixel 0.
 #[inline(always)]
 fn weights<V: Lanes>(f: V) -> [V; 4] {
     let (sixth, half, two_thirds) = (V::constant(1.0 / 6.0), V::constant(0.5), V::constant(2.0 / 3.0));

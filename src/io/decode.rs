@@ -17,7 +17,8 @@ pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pn
 pub(crate) const MAX_SIDE: usize = 65_536;
 /// Most memory one decoded picture may take, bytes.
 const MAX_BYTES: u64 = 2 << 30;
-/// Bytes of picture that one byte of file can stand for in the densest of the codings (long runs in LZW), with room to spare.
+/// Bytes of picture that one byte of file can stand for in the densest of the codings (long runs in LZW),
+/// with room to spare.
 const MAX_EXPANSION: u64 = 4096;
 /// Memory that any file may ask for: decoders keep buffers of their own.
 const FREE_BYTES: u64 = 16 << 20;
@@ -35,12 +36,12 @@ pub(crate) fn check_size(path: &Path, width: usize, height: usize) -> Result<()>
     Err(Error::format(path, format!("a frame of {width} x {height} px (expected 1 to {MAX_SIDE} px each way)")))
 }
 
-/// Reads the picture in an image file by its content, not its extension: a grey frame with a policy of type [`Colour`](super::Colour), a colour
-/// frame with one of type [`Grey`](super::Grey).
+/// Reads the picture in an image file by its content, not its extension: a grey frame with a policy of type
+/// [`Colour`](super::Colour), a colour frame with one of type [`Grey`](super::Grey).
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or too large, has several pages, or
-/// `policy` refuses it.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or
+/// too large, has several pages, or `policy` refuses it.
 pub fn read_image<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P) -> Result<P::Frame> {
     let path = path.as_ref();
     if is_tiff(path)? {

@@ -16,12 +16,13 @@ const STEPS: f64 = 256.0;
 /// How a disparity map is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DisparityFormat {
-    /// `.npz`: `disparity` and `score` (H, W) of float32, NaN where there is none, and `row_offset`. The only one that keeps everything.
+    /// `.npz`: `disparity` and `score` (H, W) of float32, NaN where there is none, and `row_offset`. The only
+    /// one that keeps everything.
     Npz,
     /// `.pfm`: float32, infinite where there is none (the convention of Middlebury's stereo benchmark).
     Pfm,
-    /// `.png` of 16 bit: `256 d`, 0 where there is none (A. Geiger et al., "Vision meets robotics: the KITTI dataset", 2013). It holds
-    /// disparities above 0 and below 256 px; others become unknown.
+    /// `.png` of 16 bit: `256 d`, 0 where there is none (A. Geiger et al., "Vision meets robotics: the KITTI
+    /// dataset", 2013). It holds disparities above 0 and below 256 px; others become unknown.
     Kitti,
 }
 

@@ -76,12 +76,12 @@ mod tests {
     use super::super::field_npz::tests::numbered;
     use super::super::{read_flo, read_kitti, read_npz, read_pfm};
     use super::*;
-    use crate::types::Sites;
+    use crate::types::SamplingGrid;
 
     #[test]
     fn every_format_holds_the_flow() {
         let folder = tempfile::tempdir().unwrap();
-        let field = numbered(Sites::default());
+        let field = numbered(SamplingGrid::default());
         for format in FieldFormat::ALL {
             assert_eq!(FieldFormat::parse(format.name()).unwrap(), format);
             let path = folder.path().join(format!("{}.{}", format.name(), format.extension()));
@@ -96,7 +96,9 @@ mod tests {
         }
         assert!(FieldFormat::parse("gif").unwrap_err().to_string().contains("npz, flo, kitti, pfm"));
         assert!(
-            FieldFormat::Flo.write(folder.path().join("p.flo"), &numbered(Sites::Points(vec![(0, 0)])), "").is_err()
+            FieldFormat::Flo
+                .write(folder.path().join("p.flo"), &numbered(SamplingGrid::Points(vec![(0, 0)])), "")
+                .is_err()
         );
     }
 }

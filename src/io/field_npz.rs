@@ -15,7 +15,7 @@ use super::npy::Element;
 use super::npz::{NpzReader, NpzWriter};
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField, Rect, Sites, Status};
+use crate::types::{FieldLayout, FlowField, Rect, SamplingGrid, Status};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -62,8 +62,8 @@ const FORMAT: &str = "jacoflow.field";
 impl Metadata {
     pub(super) fn new(layout: &FieldLayout, options: &str) -> Self {
         let (region, stride) = match &layout.sites {
-            Sites::Grid { region, stride } => (region.map(|r| [r.x, r.y, r.width, r.height]), Some(*stride)),
-            Sites::Points(_) => (None, None),
+            SamplingGrid::Grid { region, stride } => (region.map(|r| [r.x, r.y, r.width, r.height]), Some(*stride)),
+            SamplingGrid::Points(_) => (None, None),
         };
         Self {
             format: FORMAT.into(),
@@ -94,8 +94,8 @@ impl Metadata {
         FieldLayout {
             frame_size: (self.frame_size[0], self.frame_size[1]),
             sites: match (points, self.stride) {
-                (Some(points), _) => Sites::Points(points),
-                (None, stride) => Sites::Grid { region, stride: stride.unwrap_or(1) },
+                (Some(points), _) => SamplingGrid::Points(points),
+                (None, stride) => SamplingGrid::Grid { region, stride: stride.unwrap_or(1) },
             },
             model: self.model.clone(),
             parameters: self.parameters.clone(),
@@ -185,7 +185,7 @@ fn write_arrays<T: Real + Element, W: Write + Seek>(
     if let Some(window) = &field.window {
         npz.array("window", &[h, w], window)?;
     }
-    if let Sites::Points(points) = &field.layout.sites {
+    if let SamplingGrid::Points(points) = &field.layout.sites {
         let pairs: Vec<i64> = points.iter().flat_map(|&(x, y)| [x as i64, y as i64]).collect();
         npz.array("points", &[points.len(), 2], &pairs)?;
     }
@@ -204,7 +204,8 @@ fn optional_arrays<T>(field: &FlowField<T>) -> Vec<String> {
     present.into_iter().filter(|(_, present)| *present).map(|(name, _)| name.to_string()).collect()
 }
 
-/// The planes called `names`, interleaved site by site. Where the estimate is missing so are the parameters that the model assumes zero.
+/// The planes called `names`, interleaved site by site. Where the estimate is missing so are the parameters
+/// that the model assumes zero.
 pub(super) fn interleaved<T: Real>(field: &FlowField<T>, names: &[&str]) -> Vec<T> {
     let planes: Vec<Option<&[T]>> = names.iter().map(|name| field.plane(name)).collect();
     let mut out = Vec::with_capacity(names.len() * field.len());
@@ -222,7 +223,8 @@ pub(super) fn status_codes<T>(field: &FlowField<T>) -> Vec<u8> {
 /// Reads a field, in working precision.
 ///
 /// # Errors
-/// [`Error::Io`] when it cannot be read; [`Error::Format`] when it is no such file, damaged, or its arrays do not fit together.
+/// [`Error::Io`] when it cannot be read; [`Error::Format`] when it is no such file, damaged, or its arrays do
+/// not fit together.
 pub fn read_npz<T: Real>(path: impl AsRef<Path>) -> Result<StoredField<T>> {
     read_npz_from(&mut NpzReader::open(path)?)
 }

@@ -32,7 +32,8 @@ impl FilmWriter {
     /// Adds a picture.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `picture` for another size than the first one's; [`Error::Io`] with the path.
+    /// [`Error::Argument`] named `picture` for another size than the first one's; [`Error::Io`] with the
+    /// path.
     pub fn write(&mut self, picture: &Picture) -> Result<()> {
         let size @ (width, height) = (picture.width(), picture.height());
         let ((a, b), is_first) = (self.rate, self.size.is_none());

@@ -1,4 +1,5 @@
-//! `.flo`: the flow format of the Middlebury benchmark (S. Baker et al., "A database and evaluation methodology for optical flow", 2011).
+//! `.flo`: the flow format of the Middlebury benchmark (S. Baker et al., "A database and evaluation
+//! methodology for optical flow", 2011).
 //!
 //! Little-endian: float32 202021.25, int32 width, int32 height, then `u, v` interleaved row by row.
 

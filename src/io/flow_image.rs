@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField, Sites, Status};
+use crate::types::{FieldLayout, FlowField, SamplingGrid, Status};
 
 /// Flow `(u, v)` of every pixel of a grid, px/frame; NaN where it is unknown.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ impl FlowImage {
     /// # Errors
     /// [`Error::Argument`] named `sites` for a field of points, which is no picture.
     pub fn from_field<T: Real>(field: &FlowField<T>) -> Result<Self> {
-        if matches!(field.layout.sites, Sites::Points(_)) {
+        if matches!(field.layout.sites, SamplingGrid::Points(_)) {
             return Err(Error::argument(
                 "sites",
                 "a grid, for a picture of the flow (points go to CSV or .npz)",
@@ -51,14 +51,15 @@ impl FlowImage {
         Self::new(field.width, field.height, plane(0, dx), plane(1, dy))
     }
 
-    /// As a field of the translational model: every pixel a site, status `Unobservable` where the flow is unknown.
+    /// As a field of the translational model: every pixel a site, status `Unobservable` where the flow is
+    /// unknown.
     ///
     /// # Errors
     /// None for a well-formed image; passes on what [`FlowField::empty`] reports.
     pub fn to_field(&self) -> Result<FlowField<f32>> {
         let layout = FieldLayout {
             frame_size: (self.width, self.height),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "translational".into(),
             parameters: vec!["u".into(), "v".into()],
             frame_period: None,
@@ -101,7 +102,7 @@ impl FlowImage {
 mod tests {
     use super::*;
 
-    fn field(sites: Sites) -> FlowField<f64> {
+    fn field(sites: SamplingGrid) -> FlowField<f64> {
         let layout = FieldLayout {
             frame_size: (2, 1),
             sites,
@@ -117,7 +118,7 @@ mod tests {
 
     #[test]
     fn physical_units_become_pixels_again() {
-        let mut field = field(Sites::default());
+        let mut field = field(SamplingGrid::default());
         (field.motion[0], field.motion[2]) = (1.0, 1.0);
         let image = FlowImage::from_field(&field).unwrap();
         assert_eq!((image.u()[0], image.v()[0]), (2.0, 4.0));
@@ -135,7 +136,7 @@ mod tests {
 
     #[test]
     fn points_and_wrong_sizes_are_refused() {
-        let error = FlowImage::from_field(&field(Sites::Points(vec![(0, 0)]))).unwrap_err();
+        let error = FlowImage::from_field(&field(SamplingGrid::Points(vec![(0, 0)]))).unwrap_err();
         assert!(error.to_string().starts_with("sites"));
         assert!(FlowImage::new(2, 2, vec![0.0; 4], vec![0.0; 3]).unwrap_err().to_string().starts_with("v:"));
     }

@@ -1,7 +1,9 @@
-//! Frames in, results out: sources of grey and of colour frames, and readers and writers of flow, disparity, arrays, tables, tracks and pictures.
+//! Frames in, results out: sources of grey and of colour frames, and readers and writers of flow, disparity,
+//! arrays, tables, tracks and pictures.
 //!
-//! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader takes damaged and hostile files for what they
-//! are: an [`Error::Format`](crate::Error::Format) with the path, never a panic, and no allocation that the file's own length does not justify.
+//! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader
+//! takes damaged and hostile files for what they are: an [`Error::Format`](crate::Error::Format) with the
+//! path, never a panic, and no allocation that the file's own length does not justify.
 
 mod channels;
 mod decode;

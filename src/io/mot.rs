@@ -1,9 +1,11 @@
 //! Boxes of tracks as text in the form of the MOT challenge, and what is read back from it.
 //!
-//! A line is `frame,id,x,y,w,h,conf,-1,-1,-1`. Frames and pixels are counted from 1: `x`, `y` is the first pixel that the box covers. A box of ours that covers
-//! exactly the pixels `a ..= b` (from 0) reaches from `a - 1/2` to `b + 1/2`, since centres of pixels lie at integers; hence `x = box_x + 3/2`.
+//! A line is `frame,id,x,y,w,h,conf,-1,-1,-1`. Frames and pixels are counted from 1: `x`, `y` is the first
+//! pixel that the box covers. A box of ours that covers exactly the pixels `a ..= b` (from 0) reaches from `a
+//! - 1/2` to `b + 1/2`, since centres of pixels lie at integers; hence `x = box_x + 3/2`.
 //!
-//! Source: A. Milan, L. Leal-Taixe, I. Reid, S. Roth, K. Schindler, "MOT16: A Benchmark for Multi-Object Tracking", 2016.
+//! Source: A. Milan, L. Leal-Taixe, I. Reid, S. Roth, K. Schindler, "MOT16: A Benchmark for Multi-Object
+//! Tracking", 2016.
 
 use super::table::TableWriter;
 use super::text_boxes::{FIRST_PIXEL, numbers};
@@ -11,7 +13,8 @@ use crate::error::{Error, Result};
 use crate::types::{TargetBox, TrackState, TrackStatus};
 use std::path::Path;
 
-/// Writes boxes in the form of the MOT challenge, in thousandths of a pixel, to a file that appears when it is finished or to standard output.
+/// Writes boxes in the form of the MOT challenge, in thousandths of a pixel, to a file that appears when it
+/// is finished or to standard output.
 #[derive(Debug)]
 pub struct MotTable {
     table: TableWriter,
@@ -26,8 +29,9 @@ impl MotTable {
         Ok(Self { table: TableWriter::create_without_header(path, 10)? })
     }
 
-    /// Adds the line of target number `target` (from 1) at frame `frame` (from 0) of the input. The confidence is the visibility, and 0 where the target was not
-    /// measured. A target that is out of the picture or lost, and a box that is not known, have no line.
+    /// Adds the line of target number `target` (from 1) at frame `frame` (from 0) of the input. The
+    /// confidence is the visibility, and 0 where the target was not measured. A target that is out of the
+    /// picture or lost, and a box that is not known, have no line.
     ///
     /// # Errors
     /// [`Error::Io`] when it cannot be written.
@@ -86,15 +90,17 @@ pub struct MotBox {
     pub target: i64,
     /// The box, px.
     pub bounds: TargetBox,
-    /// The seventh number: confidence of results, in ground truth 0 for boxes that are not to be judged; 1 where the line has none.
+    /// The seventh number: confidence of results, in ground truth 0 for boxes that are not to be judged; 1
+    /// where the line has none.
     pub confidence: f64,
 }
 
-/// Reads a MOT challenge file (`gt.txt`, detections or results), in the order of its lines. Numbers may be separated by commas, tabs or blanks; what follows the
-/// seventh is not read.
+/// Reads a MOT challenge file (`gt.txt`, detections or results), in the order of its lines. Numbers may be
+/// separated by commas, tabs or blanks; what follows the seventh is not read.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] with the line for fewer than six numbers, a frame below 1 or a box without an extent.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] with the line for fewer than six numbers, a
+/// frame below 1 or a box without an extent.
 pub fn read_mot(path: impl AsRef<Path>) -> Result<Vec<MotBox>> {
     let path = path.as_ref();
     numbers(path)?

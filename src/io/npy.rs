@@ -1,7 +1,7 @@
 //! The `.npy` header and element types, shared by `.npy` files and the arrays inside `.npz` archives.
 //!
-//! Headers are parsed here rather than by a general parser of Python literals: a hostile header can neither nest deeply nor ask for a
-//! large allocation, and sizes are multiplied with care.
+//! Headers are parsed here rather than by a general parser of Python literals: a hostile header can neither
+//! nest deeply nor ask for a large allocation, and sizes are multiplied with care.
 
 use std::io::{self, Read, Write};
 
@@ -108,7 +108,8 @@ impl NpyHeader {
         self.count()?.checked_mul(self.element.size())
     }
 
-    /// Writes the header, version 1.0, padded so that the data start at a multiple of 64 and, when `reserve` is larger than needed, at byte `reserve`.
+    /// Writes the header, version 1.0, padded so that the data start at a multiple of 64 and, when `reserve`
+    /// is larger than needed, at byte `reserve`.
     ///
     /// # Errors
     /// Those of `out`.
@@ -129,10 +130,12 @@ impl NpyHeader {
         out.write_all(text.as_bytes())
     }
 
-    /// Reads a header (versions 1, 2 and 3) and leaves `input` at the first data byte; also returns the header's length in bytes.
+    /// Reads a header (versions 1, 2 and 3) and leaves `input` at the first data byte; also returns the
+    /// header's length in bytes.
     ///
     /// # Errors
-    /// Those of `input`; kind `InvalidData`, with the reason in words, for anything that is not such a header.
+    /// Those of `input`; kind `InvalidData`, with the reason in words, for anything that is not such a
+    /// header.
     pub fn read(input: &mut impl Read) -> io::Result<(Self, usize)> {
         let mut start = [0; 8];
         input.read_exact(&mut start).map_err(|_| bad("not a .npy file (shorter than its signature)"))?;

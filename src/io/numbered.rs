@@ -1,7 +1,8 @@
 //! One file a frame: names for outputs of streams of any length.
 //!
-//! A stream's results go to numbered files, each written whole. A single archive would have to know the number of frames before its first byte (the shape stands
-//! in front of an array) and would be lost as a whole when a long run is stopped.
+//! A stream's results go to numbered files, each written whole. A single archive would have to know the
+//! number of frames before its first byte (the shape stands in front of an array) and would be lost as a
+//! whole when a long run is stopped.
 
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};

@@ -18,7 +18,8 @@ pub fn write_picture(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
 /// Writes a frame as a grey PNG: 8 bit for uint8, 16 bit for uint16.
 ///
 /// # Errors
-/// [`Error::Type`] named `frame` for float samples, which PNG cannot hold; [`Error::Argument`] for an empty frame; [`Error::Io`] with the path.
+/// [`Error::Type`] named `frame` for float samples, which PNG cannot hold; [`Error::Argument`] for an empty
+/// frame; [`Error::Io`] with the path.
 pub fn write_frame_png(path: impl AsRef<Path>, frame: &AnyFrame) -> Result<()> {
     let path = path.as_ref();
     match frame {

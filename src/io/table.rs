@@ -7,7 +7,8 @@ use crate::types::{FieldLayout, FlowField};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A CSV table with a header (RFC 4180, lines end in `\n`): to a file, which appears under its name when the table is finished, or to standard output.
+/// A CSV table with a header (RFC 4180, lines end in `\n`): to a file, which appears under its name when the
+/// table is finished, or to standard output.
 pub struct TableWriter {
     csv: csv::Writer<Target>,
     path: PathBuf,
@@ -81,7 +82,8 @@ impl TableWriter {
     /// Adds a row.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `row` for another number of cells than the header has; [`Error::Io`] when it cannot be written.
+    /// [`Error::Argument`] named `row` for another number of cells than the header has; [`Error::Io`] when it
+    /// cannot be written.
     pub fn row<S: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = S>) -> Result<()> {
         let cells: Vec<S> = cells.into_iter().collect();
         if cells.len() != self.columns {
@@ -108,7 +110,8 @@ impl TableWriter {
         self.end(None)
     }
 
-    /// As [`TableWriter::finish`], under another name in the same folder: for the rows that an interrupted run has got so far.
+    /// As [`TableWriter::finish`], under another name in the same folder: for the rows that an interrupted
+    /// run has got so far.
     ///
     /// # Errors
     /// As [`TableWriter::finish`].
@@ -138,13 +141,15 @@ fn system_error(error: csv::Error) -> std::io::Error {
     }
 }
 
-/// A number as a table cell: the shortest digits that read back as the same value; `nan`, `inf` and `-inf` in words that numpy and pandas read.
+/// A number as a table cell: the shortest digits that read back as the same value; `nan`, `inf` and `-inf` in
+/// words that numpy and pandas read.
 pub fn cell<T: Real>(value: T) -> String {
     let wide = value.to_f64();
     if wide.is_nan() { "nan".into() } else { value.to_string() }
 }
 
-/// One row a site: frame, x, y, status, the motion parameters, and the standard deviation of each where the field has covariance.
+/// One row a site: frame, x, y, status, the motion parameters, and the standard deviation of each where the
+/// field has covariance.
 #[derive(Debug)]
 pub struct FieldTable {
     table: TableWriter,
@@ -169,7 +174,8 @@ impl FieldTable {
     /// Adds the sites of a field, in their order.
     ///
     /// # Errors
-    /// [`Error::Argument`] when the field has other columns than the table; [`Error::Io`] when the rows cannot be written.
+    /// [`Error::Argument`] when the field has other columns than the table; [`Error::Io`] when the rows
+    /// cannot be written.
     pub fn write<T: Real>(&mut self, field: &FlowField<T>) -> Result<()> {
         let (n, p) = (field.len(), field.layout.parameters.len());
         if p != self.parameters || field.covariance.is_some() != self.covariance {
@@ -225,7 +231,7 @@ impl FieldTable {
 mod tests {
     use super::super::field_npz::tests::numbered;
     use super::*;
-    use crate::types::{Sites, Status};
+    use crate::types::{SamplingGrid, Status};
 
     #[test]
     fn cells_are_quoted_where_needed_and_the_file_appears_at_the_end() {
@@ -252,7 +258,7 @@ mod tests {
     fn a_field_gives_a_row_a_site() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
-        let mut field = numbered(Sites::Points(vec![(6, 4), (1, 2)]));
+        let mut field = numbered(SamplingGrid::Points(vec![(6, 4), (1, 2)]));
         field.status[1] = Status::Unobservable;
         field.motion[1] = f32::NAN;
         let mut table = FieldTable::create(&path, &field.layout, true).unwrap();

@@ -1,17 +1,20 @@
-//! Boxes of one target a line, as the object tracking benchmark (OTB) keeps its ground truth; and the reading of such texts.
+//! Boxes of one target a line, as the object tracking benchmark (OTB) keeps its ground truth; and the reading
+//! of such texts.
 
 use crate::error::{Error, Result};
 use crate::types::TargetBox;
 use std::path::Path;
 
-/// From a side of our boxes, where pixel 0 reaches from -1/2 to 1/2, to the number of the first pixel counted from 1.
+/// From a side of our boxes, where pixel 0 reaches from -1/2 to 1/2, to the number of the first pixel counted
+/// from 1.
 pub(super) const FIRST_PIXEL: f64 = 1.5;
 
 /// Longest text that is read, bytes: hours of boxes.
 const LONGEST: u64 = 256 << 20;
 
-/// Reads ground truth of one target as the object tracking benchmark has it (`groundtruth_rect.txt`): a line `x,y,w,h` a frame, pixels counted from 1, separated by
-/// commas, tabs or blanks. `None` where the target is not in the picture: a box without an extent, or of NaN.
+/// Reads ground truth of one target as the object tracking benchmark has it (`groundtruth_rect.txt`): a line
+/// `x,y,w,h` a frame, pixels counted from 1, separated by commas, tabs or blanks. `None` where the target is
+/// not in the picture: a box without an extent, or of NaN.
 ///
 /// Source: Y. Wu, J. Lim, M.-H. Yang, "Object Tracking Benchmark", 2015.
 ///

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{NamedTempFile, TempDir};
 
-/// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it without that removes it.
+/// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it
+/// without that removes it.
 ///
-/// A target that exists and is no regular file (a device, a named pipe) is written directly; a symbolic link keeps pointing
-/// where it points.
+/// A target that exists and is no regular file (a device, a named pipe) is written directly; a symbolic link
+/// keeps pointing where it points.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
@@ -28,7 +29,8 @@ enum Inner {
 #[derive(Debug)]
 struct Temporary(Option<NamedTempFile>);
 
-/// A folder under a temporary name inside another one, for files that are to appear together; it goes, with what is left in it, when this is dropped.
+/// A folder under a temporary name inside another one, for files that are to appear together; it goes, with
+/// what is left in it, when this is dropped.
 #[derive(Debug)]
 pub(crate) struct TemporaryFolder(TempDir);
 
@@ -57,14 +59,16 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Names of the temporary files and folders that this process has now; those of the process it was forked from are not its to remove.
+/// Names of the temporary files and folders that this process has now; those of the process it was forked
+/// from are not its to remove.
 static TEMPORARIES: PerProcess<Mutex<Vec<PathBuf>>> = PerProcess::new();
 
 fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.get().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary file and folder of this process, for whoever ends it without unwinding (a second Ctrl-C).
+/// Removes every temporary file and folder of this process, for whoever ends it without unwinding (a second
+/// Ctrl-C).
 ///
 /// While the returned guard lives no other thread can begin or name a file: keep it to the end.
 #[must_use = "files made after the guard is dropped are not removed"]
@@ -141,7 +145,8 @@ impl AtomicFile {
     /// Gives the file its final name, replacing what was there.
     ///
     /// # Errors
-    /// [`Error::Io`] when the rest cannot be written or the name cannot be given; the temporary file is then gone.
+    /// [`Error::Io`] when the rest cannot be written or the name cannot be given; the temporary file is then
+    /// gone.
     pub fn commit(self) -> Result<()> {
         let Self { target, inner } = self;
         let inner = inner.into_inner().map_err(|e| Error::io(&target, e.into_error()))?;
@@ -153,7 +158,8 @@ impl AtomicFile {
 }
 
 impl AtomicFile {
-    /// As [`AtomicFile::commit`], under another name in the same folder: for what an interrupted run has got so far.
+    /// As [`AtomicFile::commit`], under another name in the same folder: for what an interrupted run has got
+    /// so far.
     ///
     /// # Errors
     /// As [`AtomicFile::commit`].
@@ -199,7 +205,8 @@ impl Seek for Inner {
     }
 }
 
-/// Writes a whole file: `write` fills it, then it gets its name. On an error nothing is left behind and what was there before is kept.
+/// Writes a whole file: `write` fills it, then it gets its name. On an error nothing is left behind and what
+/// was there before is kept.
 ///
 /// # Errors
 /// Whatever `write` returns, or [`Error::Io`] with `path`.

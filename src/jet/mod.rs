@@ -1,9 +1,11 @@
-//! The local 2-jet of brightness, `i = (I, Ix, Iy, Ixx, Ixy, Iyy)`: brightness and its five first and second derivatives at a pixel.
+//! The local 2-jet of brightness, `i = (I, Ix, Iy, Ixx, Ixy, Iyy)`: brightness and its five first and second
+//! derivatives at a pixel.
 //!
-//! It is the least-squares quadratic through a neighbourhood (WO2010/098160, (32), (33) for 3x3; paragraph 0081 for others). A rectangle of any
-//! size is computed separably, a free set of points directly. For white pixel noise of variance s2 the jet's covariance is
-//! `s2 (B^T B)^-1`, B holding a row `[1, ex, ey, ex^2/2, ex ey, ey^2/2]` for each offset `(ex, ey)`: with it the six numbers are a sufficient
-//! statistic of all the pixels.
+//! It is the least-squares quadratic through a neighbourhood (WO2010/098160, (32), (33) for 3x3; paragraph
+//! 0081 for others). A rectangle of any size is computed separably, a free set of points directly. For white
+//! pixel noise of variance s2 the jet's covariance is `s2 (B^T B)^-1`, B holding a row `[1, ex, ey, ex^2/2,
+//! ex ey, ey^2/2]` for each offset `(ex, ey)`: with it the six numbers are a sufficient statistic of all the
+//! pixels.
 //!
 //! ```
 //! use jacoflow::jet::{JetStencil, Neighbourhood};

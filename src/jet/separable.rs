@@ -1,8 +1,9 @@
 //! The least-squares quadratic over a rectangle, as products of one-dimensional filters.
 //!
-//! On each axis let `p0 = 1, p1 = x - a, p2 = x^2 - b x - c` be orthogonal under the weights of that axis (three-term recurrence, G. E. Forsythe 1957).
-//! The products `p_i(x) p_j(y)`, `i + j <= 2`, are then orthogonal over the rectangle, so each coefficient of the fit is one separable filter,
-//! and the jet at the site follows from the six coefficients.
+//! On each axis let `p0 = 1, p1 = x - a, p2 = x^2 - b x - c` be orthogonal under the weights of that axis
+//! (three-term recurrence, G. E. Forsythe 1957). The products `p_i(x) p_j(y)`, `i + j <= 2`, are then
+//! orthogonal over the rectangle, so each coefficient of the fit is one separable filter, and the jet at the
+//! site follows from the six coefficients.
 
 use super::neighbourhood::{side_offsets, weight};
 
@@ -29,7 +30,8 @@ impl Axis {
         };
         let one = |_: f64| 1.0;
         let n0 = dot(&one, &one);
-        // Offsets symmetric about the site have odd moments of exactly zero; summing them would leave rounding noise.
+        // Offsets symmetric about the site have odd moments of exactly zero; summing them would leave
+        // rounding noise.
         let symmetric = side % 2 == 1;
         let a = if symmetric { 0.0 } else { dot(&one, &|x| x) / n0 };
         let p1 = move |x: f64| x - a;
@@ -53,7 +55,8 @@ impl Axis {
     }
 }
 
-/// The coefficients' way into the jet: row `j` of the result gives component `j` from `(c00, c10, c01, c20, c11, c02)`.
+/// The coefficients' way into the jet: row `j` of the result gives component `j` from `(c00, c10, c01, c20,
+/// c11, c02)`.
 pub(super) fn taylor(x: &Axis, y: &Axis) -> [[f64; 6]; 6] {
     [
         [1.0, -x.a, -y.a, -x.c, x.a * y.a, -y.c],

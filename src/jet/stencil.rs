@@ -36,8 +36,8 @@ impl Reach {
 
 /// The linear map from a neighbourhood's brightness to the 2-jet `(I, Ix, Iy, Ixx, Ixy, Iyy)`.
 ///
-/// WO2010/098160, (32), (33) and paragraph 0081: `i = (B^T W B)^-1 B^T W z` with rows of B `[1, ex, ey, ex^2/2, ex ey, ey^2/2]`.
-/// Derivatives are per px, or per unit of the pixel pitch.
+/// WO2010/098160, (32), (33) and paragraph 0081: `i = (B^T W B)^-1 B^T W z` with rows of B `[1, ex, ey,
+/// ex^2/2, ex ey, ey^2/2]`. Derivatives are per px, or per unit of the pixel pitch.
 #[derive(Debug, Clone)]
 pub struct JetStencil {
     neighbourhood: Neighbourhood,
@@ -54,8 +54,8 @@ impl JetStencil {
     /// The stencil of `neighbourhood` for pixels of `pitch = (dx, dy)`.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `neighbourhood` when it is smaller than 3x3 or its design matrix (with its weights) has a rank below 6; naming
-    /// `pixel_pitch` when that is not positive and finite.
+    /// [`Error::Argument`] naming `neighbourhood` when it is smaller than 3x3 or its design matrix (with its
+    /// weights) has a rank below 6; naming `pixel_pitch` when that is not positive and finite.
     pub fn new(neighbourhood: &Neighbourhood, pitch: (f64, f64)) -> Result<Self> {
         neighbourhood.check()?;
         let positive = |p: f64| p.is_finite() && p > 0.0;
@@ -128,7 +128,8 @@ impl JetStencil {
         Some((x, y, map))
     }
 
-    /// The jet at pixel `(x, y)`; NaN where the neighbourhood leaves the frame or holds a sample that is not finite.
+    /// The jet at pixel `(x, y)`; NaN where the neighbourhood leaves the frame or holds a sample that is not
+    /// finite.
     ///
     /// Summed in double precision whatever `T` is.
     pub fn at<T: Real>(&self, frame: &Frame<T>, x: usize, y: usize) -> [T; 6] {
@@ -150,7 +151,8 @@ impl JetStencil {
             }
         }
         jet[0] += base;
-        // 0 * inf is NaN already; a weight of zero on one component must not let a bad sample pass in another.
+        // 0 * inf is NaN already; a weight of zero on one component must not let a bad sample pass in
+        // another.
         if jet.iter().all(|v| v.is_finite()) { jet } else { [f64::NAN; 6] }
     }
 
@@ -160,9 +162,9 @@ impl JetStencil {
         frame.get(x.wrapping_add_signed(ex as isize), y.wrapping_add_signed(ey as isize)).to_f64()
     }
 
-    /// Estimate of the pixel noise's variance from what the quadratic leaves, `|z - B i|^2 / (n - 6)` (with unequal weights the divisor is the
-    /// residual's expected square for unit noise). It includes what a quadratic cannot describe. `None` with six pixels, which always fit.
-    /// NaN where there is no jet.
+    /// Estimate of the pixel noise's variance from what the quadratic leaves, `|z - B i|^2 / (n - 6)` (with
+    /// unequal weights the divisor is the residual's expected square for unit noise). It includes what a
+    /// quadratic cannot describe. `None` with six pixels, which always fit. NaN where there is no jet.
     pub fn noise_variance<T: Real>(&self, frame: &Frame<T>, x: usize, y: usize) -> Option<f64> {
         if self.freedom < 1e-9 {
             return None;
@@ -184,7 +186,8 @@ impl JetStencil {
         Some(left / self.freedom)
     }
 
-    /// The rows `[1, ex, ey, ex^2/2, ex ey, ey^2/2]` of the design matrix B, offsets in units of the pixel pitch.
+    /// The rows `[1, ex, ey, ex^2/2, ex ey, ey^2/2]` of the design matrix B, offsets in units of the pixel
+    /// pitch.
     pub fn design(&self) -> Vec<[f64; 6]> {
         let (dx, dy) = self.pitch;
         self.offsets.iter().map(|&(ex, ey)| design_row(f64::from(ex) * dx, f64::from(ey) * dy)).collect()

@@ -55,8 +55,9 @@ pub(crate) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
     true
 }
 
-/// The Cholesky factor of `a`, which is first mended if it must be: symmetrised, and its eigenvalues lifted to 1e-12 of the largest.
-/// Returns whether it was mended; `None` when it cannot be (NaN, infinity, no positive eigenvalue).
+/// The Cholesky factor of `a`, which is first mended if it must be: symmetrised, and its eigenvalues lifted
+/// to 1e-12 of the largest. Returns whether it was mended; `None` when it cannot be (NaN, infinity, no
+/// positive eigenvalue).
 pub(crate) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
     if cholesky(a, n, l) {
         return Some(false);
@@ -86,7 +87,8 @@ pub(crate) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
 /// How far below zero an eigenvalue may lie, relative to the largest one's size, to be rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What is wrong with a covariance, in words: entries that are not finite, no symmetry, or an eigenvalue below zero by more than rounding. `None`: nothing.
+/// What is wrong with a covariance, in words: entries that are not finite, no symmetry, or an eigenvalue
+/// below zero by more than rounding. `None`: nothing.
 pub(crate) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
     if let Some(value) = a.iter().find(|v| !v.is_finite()) {
         return Some(format!("one with the entry {value}"));
@@ -104,7 +106,8 @@ pub(crate) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
     Some(format!("one with the eigenvalue {least}"))
 }
 
-/// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended; `None`: nothing can be done.
+/// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended;
+/// `None`: nothing can be done.
 pub(crate) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
     if a.iter().any(|v| !v.is_finite()) {
         return None;
@@ -117,7 +120,8 @@ pub(crate) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
 
 /// The least eigenvalue of a symmetric matrix where it is negative by more than rounding.
 fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
-    // With its diagonal raised by what rounding may take, a matrix has a factor: that is cheaper to find out than eigenvalues.
+    // With its diagonal raised by what rounding may take, a matrix has a factor: that is cheaper to find out
+    // than eigenvalues.
     let mut raised = a.to_vec();
     let diagonal = || (0..n).map(|k| k * (n + 1));
     let shift = 0.5 * ROUNDING * diagonal().fold(0.0f64, |m, k| m.max(a[k]));

@@ -1,6 +1,7 @@
 //! The middle one of some numbers.
 
-/// The middle one, of an even number the upper of the two in the middle; `None` of none. The numbers are reordered. NaN counts as greater than every number.
+/// The middle one, of an even number the upper of the two in the middle; `None` of none. The numbers are
+/// reordered. NaN counts as greater than every number.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

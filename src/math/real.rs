@@ -6,11 +6,11 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// `f32` or `f64`: the precision a computation runs in.
 ///
-/// `f32` is the fast path for 8- and 16-bit images; `f64` is used for `f64` input and wherever second differences of
-/// smooth data would drown in `f32` rounding.
+/// `f32` is the fast path for 8- and 16-bit images; `f64` is used for `f64` input and wherever second
+/// differences of smooth data would drown in `f32` rounding.
 ///
-/// Deliberately not bound to `nalgebra::RealField`, whose method names collide with the lane operations; small decompositions
-/// run in `f64` through nalgebra, hot loops through `simd`.
+/// Deliberately not bound to `nalgebra::RealField`, whose method names collide with the lane operations;
+/// small decompositions run in `f64` through nalgebra, hot loops through `simd`.
 pub trait Real:
     Copy
     + Default

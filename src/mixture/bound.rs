@@ -44,10 +44,12 @@ impl PriorTerms {
     }
 }
 
-/// The lower bound after an M step from responsibilities r: `sum_n f_n sum_k r_nk ln r_nk` is `negentropy`, `sum_n f_n` is `total`.
+/// The lower bound after an M step from responsibilities r: `sum_n f_n sum_k r_nk ln r_nk` is `negentropy`,
+/// `sum_n f_n` is `total`.
 ///
-/// `L = -negentropy + ln C(alpha0) - ln C(alpha) + sum_k [ln B(W0, nu0) - ln B(W_k, nu_k) + D / 2 ln (beta0 / beta_k)] - D F / 2 ln 2 pi`: all expectations of the
-/// complete data cancel against the M step's, which leaves normalising constants.
+/// `L = -negentropy + ln C(alpha0) - ln C(alpha) + sum_k [ln B(W0, nu0) - ln B(W_k, nu_k) + D / 2 ln (beta0 /
+/// beta_k)] - D F / 2 ln 2 pi`: all expectations of the complete data cancel against the M step's, which
+/// leaves normalising constants.
 pub(super) fn lower_bound(
     prior: &Prior,
     terms: &PriorTerms,
@@ -60,8 +62,9 @@ pub(super) fn lower_bound(
     with_gaussians(sum, prior, terms, posterior, factors) - gaussian_constant(posterior.dimensions, total)
 }
 
-/// `sum` and what the bound has of every Gaussian: `ln B(W0, nu0) - ln B(W_k, nu_k) + D / 2 ln (beta0 / beta_k)`. Less [`gaussian_constant`] that is the log evidence of the points, as they
-/// are divided among the components.
+/// `sum` and what the bound has of every Gaussian: `ln B(W0, nu0) - ln B(W_k, nu_k) + D / 2 ln (beta0 /
+/// beta_k)`. Less [`gaussian_constant`] that is the log evidence of the points, as they are divided among the
+/// components.
 pub(super) fn with_gaussians(
     mut sum: f64,
     prior: &Prior,

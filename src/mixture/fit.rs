@@ -20,7 +20,8 @@ pub enum Start<'a> {
     Seeds,
     /// With an M step from these responsibilities (N, K), row-major.
     Responsibilities(&'a [f64]),
-    /// With an E step under these components, of which there may be another number than [`MixtureOptions::components`].
+    /// With an E step under these components, of which there may be another number than
+    /// [`MixtureOptions::components`].
     Components(&'a Posterior),
 }
 
@@ -31,7 +32,8 @@ pub struct Fit {
     pub posterior: Posterior,
     /// The prior, with what was taken from the points.
     pub prior: Prior,
-    /// The lower bound after each M step, natural logarithms. It never falls, unless components were left out.
+    /// The lower bound after each M step, natural logarithms. It never falls, unless components were left
+    /// out.
     pub lower_bounds: Vec<f64>,
     /// Whether the bound stood before the rounds were up.
     pub converged: bool,
@@ -48,10 +50,12 @@ impl Fit {
     }
 }
 
-/// Fits a mixture to weighted points. Precision: `f64`. The result does not depend on the number of threads, nor, from seeds, on the order of the points, but for rounding.
+/// Fits a mixture to weighted points. Precision: `f64`. The result does not depend on the number of threads,
+/// nor, from seeds, on the order of the points, but for rounding.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::error::Error::Argument) naming an option, the points (`X`), their weights (`sample_weight`), the responsibilities (`resp`) or components (`start`) that cannot be used.
+/// [`Error::Argument`](crate::error::Error::Argument) naming an option, the points (`X`), their weights
+/// (`sample_weight`), the responsibilities (`resp`) or components (`start`) that cannot be used.
 pub fn fit(points: &Points, options: &MixtureOptions, start: Start) -> Result<Fit> {
     options.check()?;
     points.check()?;
@@ -151,7 +155,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Leaves out components with too few points, but never the last; whether any. Not while earlier points hold to their numbering.
+    /// Leaves out components with too few points, but never the last; whether any. Not while earlier points
+    /// hold to their numbering.
     fn prune(&self, posterior: &mut Posterior, moments: &mut Moments) -> bool {
         if self.options.prune_weight <= 0.0 || self.earlier.is_some() {
             return false;

@@ -31,7 +31,8 @@ impl Moments {
         self.counts.len()
     }
 
-    /// Those of points about `centre`: means first, then scatters about them. `shares(n, take)` hands each responsibility of point n that is not 0, `(k, r_nk)`, to `take`.
+    /// Those of points about `centre`: means first, then scatters about them. `shares(n, take)` hands each
+    /// responsibility of point n that is not 0, `(k, r_nk)`, to `take`.
     pub(super) fn of(
         points: &Points,
         centre: &[f64],
@@ -94,7 +95,8 @@ impl Moments {
         all
     }
 
-    /// The components in another order: component k of the result is component `order[k]`. Fewer or more than all of them are allowed.
+    /// The components in another order: component k of the result is component `order[k]`. Fewer or more than
+    /// all of them are allowed.
     pub(super) fn reordered(&self, order: &[usize]) -> Self {
         let d = self.dimensions;
         let rows = |values: &[f64], length: usize| -> Vec<f64> {

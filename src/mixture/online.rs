@@ -40,13 +40,17 @@ impl Retained {
 
 /// Adds a batch of weighted points to a mixture; the first one, without anything `retained`, is a fit.
 ///
-/// Responsibilities of earlier points stay what they were when their batch came: only their sums (18) to (20) are kept, all of them times `forgetting`. The rounds maximise the same lower bound as
-/// [`fit`](super::fit()), of earlier and new points together, over the responsibilities of the new ones and the components; so it never falls within a batch. With `forgetting` 1 points
-/// that would not change their component any more leave what one fit to all of them does; with less, a batch that came n batches ago weighs `forgetting^n`, and the weight of all points together tends
-/// to that of one batch over `1 - forgetting`.
+/// Responsibilities of earlier points stay what they were when their batch came: only their sums (18) to (20)
+/// are kept, all of them times `forgetting`. The rounds maximise the same lower bound as
+/// [`fit`](super::fit()), of earlier and new points together, over the responsibilities of the new ones and
+/// the components; so it never falls within a batch. With `forgetting` 1 points that would not change their
+/// component any more leave what one fit to all of them does; with less, a batch that came n batches ago
+/// weighs `forgetting^n`, and the weight of all points together tends to that of one batch over `1 -
+/// forgetting`.
 ///
 /// # Errors
-/// As [`fit`](super::fit()); [`Error::Argument`] named `forgetting` outside of (0, 1], or `X` for another dimension than before.
+/// As [`fit`](super::fit()); [`Error::Argument`] named `forgetting` outside of (0, 1], or `X` for another
+/// dimension than before.
 pub fn partial_fit(
     points: &Points,
     options: &MixtureOptions,

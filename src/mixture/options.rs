@@ -5,7 +5,8 @@ use crate::parallel::Threads;
 
 /// Most components: what nobody needs must not take all memory.
 const MOST_COMPONENTS: usize = 1 << 16;
-/// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers any more.
+/// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers
+/// any more.
 const MOST_PRIOR: f64 = 1e100;
 /// And of fewer, the bound is none any more.
 const LEAST_PRIOR: f64 = 1e-100;
@@ -31,7 +32,8 @@ pub enum Seeding {
     Random,
 }
 
-/// Options of [`fit`](super::fit()); the defaults are those of the stereo paper's section on clustering, except where its prior would need a unit.
+/// Options of [`fit`](super::fit()); the defaults are those of the stereo paper's section on clustering,
+/// except where its prior would need a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixtureOptions {
     /// Number of components K: 12.
@@ -48,7 +50,8 @@ pub struct MixtureOptions {
     pub covariance_prior: CovariancePrior,
     /// Most rounds of an M step and an E step: 100.
     pub max_iter: usize,
-    /// Rounds end when the lower bound grows by less than this times the sum of the weights: 1e-4. None: always `max_iter` rounds.
+    /// Rounds end when the lower bound grows by less than this times the sum of the weights: 1e-4. None:
+    /// always `max_iter` rounds.
     pub tol: Option<f64>,
     /// Fits from different seeds, of which that with the greatest lower bound is kept: 1.
     pub n_init: usize,

@@ -54,7 +54,8 @@ impl Points<'_> {
     /// Whether points and weights can be fitted.
     ///
     /// # Errors
-    /// As [`Points::check_values`]; named `sample_weight`: another number of weights than points, one that is negative or not finite, nothing but zeros, or so large that sums of squares overflow.
+    /// As [`Points::check_values`]; named `sample_weight`: another number of weights than points, one that is
+    /// negative or not finite, nothing but zeros, or so large that sums of squares overflow.
     pub(super) fn check(&self) -> Result<()> {
         self.check_values()?;
         let Some(weights) = self.weights else { return Ok(()) };
@@ -78,7 +79,8 @@ impl Points<'_> {
         Ok(())
     }
 
-    /// Weighted mean (D), summed about the heaviest point: that of equal ones is theirs to the last bit, so that they have no spread however large they are.
+    /// Weighted mean (D), summed about the heaviest point: that of equal ones is theirs to the last bit, so
+    /// that they have no spread however large they are.
     pub(super) fn mean(&self) -> Vec<f64> {
         let about =
             self.at((0..self.count()).fold(0, |best, n| if self.weight(n) > self.weight(best) { n } else { best }));

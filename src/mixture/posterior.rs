@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::math::special::digamma;
 use std::f64::consts::{LN_2, TAU};
 
-/// The posterior of every component: `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k ~ W(W_k, nu_k)` (24).
+/// The posterior of every component: `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k
+/// ~ W(W_k, nu_k)` (24).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Posterior {
     /// D.
@@ -58,8 +59,9 @@ impl Posterior {
         self.weight_concentration.len()
     }
 
-    /// Expected precisions `nu_k W_k` (K, D, D), from the factors that densities are computed with: symmetric and without a negative eigenvalue but for rounding, where the inverse of a matrix that
-    /// rounding made singular has none.
+    /// Expected precisions `nu_k W_k` (K, D, D), from the factors that densities are computed with: symmetric
+    /// and without a negative eigenvalue but for rounding, where the inverse of a matrix that rounding made
+    /// singular has none.
     ///
     /// # Errors
     /// [`Error::Numerical`] for a matrix without a factor.
@@ -86,7 +88,8 @@ impl Posterior {
         keep_rows(&mut self.scale_inverses, d * d, keep);
     }
 
-    /// The components called otherwise: component `k` is `names[k]` of the result, and `names` holds each number below K once.
+    /// The components called otherwise: component `k` is `names[k]` of the result, and `names` holds each
+    /// number below K once.
     #[must_use]
     pub fn renamed(&self, names: &[usize]) -> Self {
         let d = self.dimensions;
@@ -139,7 +142,8 @@ impl Posterior {
     /// Share of each component in the points (13), (N, K), row-major. Every row sums to 1.
     ///
     /// # Errors
-    /// [`Error::Argument`] for points that are not finite or of another dimension, [`Error::Numerical`] for a matrix without a factor.
+    /// [`Error::Argument`] for points that are not finite or of another dimension, [`Error::Numerical`] for a
+    /// matrix without a factor.
     pub fn responsibilities(&self, points: &Points) -> Result<Vec<f64>> {
         Ok(self.log_densities(points)?.1)
     }

@@ -9,9 +9,11 @@ use crate::math::dense;
 const FREEDOM: f64 = 9.1;
 /// Pivots of the data's correlations below this are none: points in a plane.
 const FLAT: f64 = 1e-10;
-/// What the diagonal of such a covariance is raised by, relative to itself; along an axis without spread, relative to its mean, or absolutely where no axis has any.
+/// What the diagonal of such a covariance is raised by, relative to itself; along an axis without spread,
+/// relative to its mean, or absolutely where no axis has any.
 const RAISED: f64 = 1e-6;
-/// Variances up to this are no spread: their inverses would be near overflow, and squares below it lose their digits.
+/// Variances up to this are no spread: their inverses would be near overflow, and squares below it lose their
+/// digits.
 const LEAST_VARIANCE: f64 = 1e-304;
 
 /// The prior: `pi ~ Dir(alpha0)` (8), `mu_k ~ N(m0, (beta0 Lambda_k)^-1)`, `Lambda_k ~ W(W0, nu0)` (9).
@@ -85,8 +87,9 @@ pub(super) fn scaled_identity(n: usize, value: f64) -> Vec<f64> {
     (0..n * n).map(|at| if at % (n + 1) == 0 { value } else { 0.0 }).collect()
 }
 
-/// Weighted covariance of the points, over the sum of the weights less one, so that weights are repetitions, or over half of that sum where that is more: below 2 there is nothing
-/// to repeat, and the prior must not jump where the weights pass it. Raised where the points lie in a plane.
+/// Weighted covariance of the points, over the sum of the weights less one, so that weights are repetitions,
+/// or over half of that sum where that is more: below 2 there is nothing to repeat, and the prior must not
+/// jump where the weights pass it. Raised where the points lie in a plane.
 pub(super) fn data_covariance(points: &Points) -> Vec<f64> {
     let d = points.dimensions;
     let mean = points.mean();
@@ -127,7 +130,8 @@ fn raise_where_none(matrix: &mut [f64], spread: &[bool]) {
     }
 }
 
-/// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction. Correlations tell, so that the axes' units make no difference.
+/// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction. Correlations
+/// tell, so that the axes' units make no difference.
 fn raise_if_flat(matrix: &mut [f64], d: usize) {
     let deviations: Vec<f64> = (0..d).map(|i| matrix[i * (d + 1)].sqrt()).collect();
     let correlations: Vec<f64> = (0..d * d).map(|at| matrix[at] / deviations[at / d] / deviations[at % d]).collect();

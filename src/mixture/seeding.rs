@@ -18,9 +18,11 @@ pub(super) fn random(points: &Points, components: usize, rng: CounterRng) -> Vec
     shares
 }
 
-/// The cluster of each point (N) that weighted k-means finds from k-means++ seeds (D. Arthur and S. Vassilvitskii, 2007).
+/// The cluster of each point (N) that weighted k-means finds from k-means++ seeds (D. Arthur and S.
+/// Vassilvitskii, 2007).
 ///
-/// Seeds are drawn from the points in the order of their coordinates, so that the order in which they come makes no difference, nor whether a point comes twice or has twice the weight.
+/// Seeds are drawn from the points in the order of their coordinates, so that the order in which they come
+/// makes no difference, nor whether a point comes twice or has twice the weight.
 pub(super) fn k_means(points: &Points, components: usize, rng: CounterRng) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.count()).filter(|n| points.weight(*n) > 0.0).collect();
     order.sort_unstable_by(|a, b| {
@@ -36,7 +38,8 @@ pub(super) fn k_means(points: &Points, components: usize, rng: CounterRng) -> Ve
     (0..points.count()).map(|n| nearest(&centres, points.at(n)).0).collect()
 }
 
-/// K centres, row-major: the first by weight, the others by weight times the squared distance from those before. Where no point is left apart, the last is repeated.
+/// K centres, row-major: the first by weight, the others by weight times the squared distance from those
+/// before. Where no point is left apart, the last is repeated.
 fn seeds(points: &Points, order: &[usize], components: usize, rng: CounterRng) -> Vec<f64> {
     let mut centres = Vec::with_capacity(components * points.dimensions);
     let mut distances = vec![1.0; points.count()];
@@ -66,7 +69,8 @@ fn drawn(points: &Points, order: &[usize], distances: &[f64], at: f64) -> Option
     chosen.or(order.last()).copied()
 }
 
-/// Moves centres to the means of the points nearest to them; a centre without points stays. Whether any moved.
+/// Moves centres to the means of the points nearest to them; a centre without points stays. Whether any
+/// moved.
 fn lloyd_step(points: &Points, order: &[usize], centres: &mut [f64]) -> bool {
     let d = points.dimensions;
     let mut sums = vec![0.0; centres.len()];

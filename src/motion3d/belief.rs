@@ -1,7 +1,9 @@
 //! Which covariances are believed.
 //!
-//! A variance of nothing, as a rounding error or a wrong unit leaves it, would make one point decide the motion by itself, and all others nothing beside it. Where a variance is below a millionth of that at the end of the most precise quarter of all points, no measurement is so much better
-//! than the others: the point counts as one of that quarter. A quarter of the points that are better together are believed.
+//! A variance of nothing, as a rounding error or a wrong unit leaves it, would make one point decide the
+//! motion by itself, and all others nothing beside it. Where a variance is below a millionth of that at the
+//! end of the most precise quarter of all points, no measurement is so much better than the others: the point
+//! counts as one of that quarter. A quarter of the points that are better together are believed.
 
 use super::observations::quantile;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen};
@@ -38,7 +40,8 @@ fn smallest(given: &Matrix2<f64>) -> f64 {
     given.determinant() / (mean + half.hypot(0.5 * (given[(0, 1)] + given[(1, 0)])))
 }
 
-/// The same for several numbers a point, each with a unit of its own: `size * size` values a matrix, row by row.
+/// The same for several numbers a point, each with a unit of its own: `size * size` values a matrix, row by
+/// row.
 pub(super) fn believed(covariances: &[f64], size: usize) -> Vec<f64> {
     let diagonal = |i: usize| {
         let mut own: Vec<f64> = covariances.iter().skip(i * (size + 1)).step_by(size * size).copied().collect();

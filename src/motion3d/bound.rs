@@ -23,7 +23,8 @@ pub struct MotionBound {
     pub likelihood: [[f64; 5]; 5],
     /// Ideal weights `sigma^2 M^-1 + sigma^4 M^-1 {sum c_kk P_k} M^-1` (25).
     pub ideal: [[f64; 5]; 5],
-    /// Standard deviations of the direction, `sqrt(tr psi)`, degrees: of the bound, of maximum likelihood, of ideal weights.
+    /// Standard deviations of the direction, `sqrt(tr psi)`, degrees: of the bound, of maximum likelihood, of
+    /// ideal weights.
     pub direction_std: [f64; 3],
     /// Axes of `psi`: two unit vectors perpendicular to `u`.
     pub tangent: [[f64; 3]; 2],
@@ -41,13 +42,17 @@ impl MotionBound {
     }
 }
 
-/// The covariances that maximum likelihood and ideal weights have, and the bound, for points whose true inverse depths are given.
+/// The covariances that maximum likelihood and ideal weights have, and the bound, for points whose true
+/// inverse depths are given.
 ///
-/// `points`: the places where flow is measured (their flow is not looked at); `inverse_depth`: `nu` (N) in units of `|u|`. Points that are not finite are left out.
-/// (17) holds while it predicts less than about 5 degrees and the epipole is outside the points.
+/// `points`: the places where flow is measured (their flow is not looked at); `inverse_depth`: `nu` (N) in
+/// units of `|u|`. Points that are not finite are left out. (17) holds while it predicts less than about 5
+/// degrees and the epipole is outside the points.
 ///
 /// # Errors
-/// [`Error::Argument`] for lengths that differ, fewer than 5 finite points, covariances or depths, noise that is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the motion.
+/// [`Error::Argument`] for lengths that differ, fewer than 5 finite points, covariances or depths, noise that
+/// is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the
+/// motion.
 pub fn motion_bound(
     points: &Flow<'_>,
     noise: &Noise<'_>,
@@ -96,7 +101,8 @@ pub(super) fn not_determined() -> Error {
     Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
 }
 
-/// What to say where fewer than `least` points are usable, of which so many have a finite place: the others lack a finite covariance.
+/// What to say where fewer than `least` points are usable, of which so many have a finite place: the others
+/// lack a finite covariance.
 pub(super) fn too_few(least: usize, finite: usize) -> Error {
     if finite < least {
         Error::argument("points", format!("at least {least} points that are finite"), finite)

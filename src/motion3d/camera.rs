@@ -3,7 +3,8 @@
 use crate::error::{Error, Result, number, numbers};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 
-/// The intrinsics matrix `K` of a pinhole camera: `(px, py, 1) = K (x, y, 1)`, skew and unequal focal lengths included.
+/// The intrinsics matrix `K` of a pinhole camera: `(px, py, 1) = K (x, y, 1)`, skew and unequal focal lengths
+/// included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intrinsics {
     matrix: Matrix3<f64>,
@@ -14,7 +15,8 @@ impl Intrinsics {
     /// From `K`, row by row, px.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `K` unless it is an upper triangle with the last row `(0, 0, 1)`, finite and with positive focal lengths.
+    /// [`Error::Argument`] naming `K` unless it is an upper triangle with the last row `(0, 0, 1)`, finite
+    /// and with positive focal lengths.
     pub fn new(matrix: [[f64; 3]; 3]) -> Result<Self> {
         let k = Matrix3::from_fn(|i, j| matrix[i][j]);
         let refuse =
@@ -72,7 +74,8 @@ impl Intrinsics {
         self.matrix.fixed_view::<2, 2>(0, 0).into_owned()
     }
 
-    /// `B = blockdiag(A, kron(A^-T, A))`, which maps `(u, v, u_x, v_x, u_y, v_y)`; covariances map as `B C B^t`.
+    /// `B = blockdiag(A, kron(A^-T, A))`, which maps `(u, v, u_x, v_x, u_y, v_y)`; covariances map as `B C
+    /// B^t`.
     pub(super) fn affine_scale(&self) -> Matrix6<f64> {
         kronecker(&self.scale(), &self.unscale())
     }
@@ -83,7 +86,8 @@ pub(super) fn to_plane(camera: Option<&Intrinsics>) -> Matrix2<f64> {
     camera.map_or_else(Matrix2::identity, Intrinsics::scale)
 }
 
-/// `blockdiag(D_2, kron(D_1^-T, D_2))`, which maps `(u, v, u_x, v_x, u_y, v_y)` where flow is mapped by `D_2` and its place by `D_1`, that is invertible: what noise of the six numbers is multiplied with.
+/// `blockdiag(D_2, kron(D_1^-T, D_2))`, which maps `(u, v, u_x, v_x, u_y, v_y)` where flow is mapped by `D_2`
+/// and its place by `D_1`, that is invertible: what noise of the six numbers is multiplied with.
 pub(super) fn affine_map(flow: &Matrix2<f64>, place: &Matrix2<f64>) -> Matrix6<f64> {
     kronecker(flow, &place.try_inverse().unwrap_or_else(Matrix2::zeros))
 }

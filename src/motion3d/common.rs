@@ -1,10 +1,17 @@
 //! Errors that the flow of a whole picture has in common, which no residual tells.
 //!
-//! *One factor.* With `f`, depths and `w` times `1 + b` all residuals stay, and the direction is the same: a camera's rotation is off by `b w`. Flow from gradients errs like that: noise in the gradients makes it too short (J. Kearney, W. Thompson, D. Boley 1987; C. Fermueller, D. Shulman, Y. Aloimonos 2001), displacements that are not small beside the texture make it too long or too short, alike wherever the texture is.
+//! *One factor.* With `f`, depths and `w` times `1 + b` all residuals stay, and the direction is the same: a
+//! camera's rotation is off by `b w`. Flow from gradients errs like that: noise in the gradients makes it too
+//! short (J. Kearney, W. Thompson, D. Boley 1987; C. Fermueller, D. Shulman, Y. Aloimonos 2001),
+//! displacements that are not small beside the texture make it too long or too short, alike wherever the
+//! texture is.
 //!
-//! *One displacement.* What is alike all over a picture (its texture's scale, the displacement's fraction of a pixel between samples, the blur that is estimated with) makes flow err by the same vector, too. Most of that looks like a rotation.
+//! *One displacement.* What is alike all over a picture (its texture's scale, the displacement's fraction of
+//! a pixel between samples, the blur that is estimated with) makes flow err by the same vector, too. Most of
+//! that looks like a rotation.
 //!
-//! A field's covariance has both in it, as it has the whole error of a point, but no mean over points makes them smaller.
+//! A field's covariance has both in it, as it has the whole error of a point, but no mean over points makes
+//! them smaller.
 
 use super::covariance::{Matrix5, inverse};
 use super::kernels::information;
@@ -17,10 +24,13 @@ use crate::math::Real;
 use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2, Vector3};
 
-/// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it (`benchmarks/motion3d_fields.py --errors`).
+/// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of
+/// windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it
+/// (`benchmarks/motion3d_fields.py --errors`).
 const SHARE: f64 = 0.4;
 
-/// The share of the points whose errors tell how far the factor is off: others have covariances for lack of texture.
+/// The share of the points whose errors tell how far the factor is off: others have covariances for lack of
+/// texture.
 const BEST: f64 = 0.25;
 
 /// About so many sites of a field are asked.
@@ -35,9 +45,11 @@ pub(super) type Moved = SMatrix<f64, 5, 2>;
 /// Standard deviations of errors that all flow of a picture has in common. Default: 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CommonErrors {
-    /// Of a factor, about 1, that all flow is too long by: no residual tells it, and it is one of the rotation's length.
+    /// Of a factor, about 1, that all flow is too long by: no residual tells it, and it is one of the
+    /// rotation's length.
     pub scale: f64,
-    /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not on the sphere.
+    /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not
+    /// on the sphere.
     pub offset: f64,
 }
 
@@ -75,7 +87,8 @@ impl CommonEffect {
         self.moves().iter().map(|moved| moved * moved.transpose()).sum()
     }
 
-    /// The variance of a value that is `value` times as large with all flow, by its slopes along `(psi, w)` and along a point's own flow on the plane at distance 1.
+    /// The variance of a value that is `value` times as large with all flow, by its slopes along `(psi, w)`
+    /// and along a point's own flow on the plane at distance 1.
     pub(super) fn variance(&self, value: f64, of_motion: &SVector<f64, 5>, of_flow: &RowVector2<f64>) -> f64 {
         let [_, along @ ..] = self.moves();
         let displaced = along.iter().zip(self.displaced.map(Vector2::from));
@@ -85,7 +98,8 @@ impl CommonEffect {
 }
 
 impl CommonErrors {
-    /// As far as covariances tell. The factor: by what would be the whole error of the points that tell it best. Of each point, its flow and the covariance of that.
+    /// As far as covariances tell. The factor: by what would be the whole error of the points that tell it
+    /// best. Of each point, its flow and the covariance of that.
     fn told(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> Self {
         let (mut squares, mut variances) = (Vec::new(), Vec::new());
         for (flow, covariance) in points {
@@ -101,7 +115,8 @@ impl CommonErrors {
         Self { scale, offset: SHARE * median(&mut variances).sqrt() }
     }
 
-    /// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not tell by how large a factor flow is off.
+    /// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not
+    /// tell by how large a factor flow is off.
     pub(super) fn of_field<T: Real>(field: &FlowField<T>) -> Self {
         let step = ((field.len() as f64 / ENOUGH).sqrt() as usize).max(1);
         let sites = (0..field.height)
@@ -134,7 +149,8 @@ impl CommonErrors {
         Ok(())
     }
 
-    /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
+    /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do
+    /// to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
     pub(super) fn on(
         &self,
         covariance: &Matrix5,
@@ -151,7 +167,8 @@ impl CommonErrors {
         CommonEffect::of(self.scale, &scaled, &displaced, &(moved * displaced))
     }
 
-    /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the flow do to it.
+    /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the
+    /// flow do to it.
     pub(super) fn added_to_rotation(&self, w: &Vector3<f64>, moved: &Matrix3x2<f64>) -> Matrix3<f64> {
         w * w.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
     }
@@ -167,7 +184,9 @@ pub(super) fn turned(points: &Observations, covariance: &Matrix3<f64>) -> Matrix
     covariance * sum
 }
 
-/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`, `L_k^-1` whitening point `k`; what is known beforehand of the rotation is in `W^t W`. Nothing on the sphere, where flow at different places has no common direction.
+/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`,
+/// `L_k^-1` whitening point `k`; what is known beforehand of the rotation is in `W^t W`. Nothing on the
+/// sphere, where flow at different places has no common direction.
 pub(super) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
     let mut sum = Moved::zeros();
     if inliers.spherical {

@@ -16,7 +16,8 @@ use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, Vector2, Vector3};
 use rayon::prelude::*;
 
-/// A motion as far as times to contact take it: that of a [`MotionEstimate`](super::MotionEstimate) by [`uncertain`](super::MotionEstimate::uncertain).
+/// A motion as far as times to contact take it: that of a [`MotionEstimate`](super::MotionEstimate) by
+/// [`uncertain`](super::MotionEstimate::uncertain).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainMotion {
     /// The motion of the scene relative to the camera.
@@ -39,7 +40,8 @@ pub(super) struct Rates {
     common: CommonEffect,
 }
 
-/// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance 1.
+/// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance
+/// 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Slopes {
     motion: SMatrix<f64, 5, 1>,
@@ -65,7 +67,9 @@ impl Rates {
         Self { u: of.motion.u(), w: of.motion.w(), tangent, covariance, common: of.common }
     }
 
-    /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
+    /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those
+    /// of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its
+    /// neighbours'.
     pub fn slopes(&self, row: &Row, nu: f64) -> Slopes {
         let t = row.g * self.u;
         let s2 = t.norm_squared();
@@ -85,13 +89,15 @@ impl Rates {
         Slopes { motion, flow: flow * self.u.z }
     }
 
-    /// What the motion's covariance makes of slopes, and what errors do that all flow has in common: a factor is one of the rate, a displacement moves the motion and each point's depth together.
+    /// What the motion's covariance makes of slopes, and what errors do that all flow has in common: a factor
+    /// is one of the rate, a displacement moves the motion and each point's depth together.
     pub fn variance(&self, rate: f64, slopes: &Slopes) -> f64 {
         let own = (slopes.motion.transpose() * self.covariance * slopes.motion)[0];
         own + self.common.variance(rate, &slopes.motion, &slopes.flow)
     }
 
-    /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from the motion's covariance; infinite where nothing comes nearer.
+    /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from
+    /// the motion's covariance; infinite where nothing comes nearer.
     pub fn contact(&self, nu: f64, variance: f64, slopes: &Slopes) -> (f64, f64) {
         let rate = nu * self.u.z;
         if rate == 0.0 {
@@ -119,15 +125,18 @@ pub struct ContactMap {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// `-1 / (nu u_z)`, frames, row by row: positive where something comes nearer, infinite where nothing does, NaN where the field is not valid.
+    /// `-1 / (nu u_z)`, frames, row by row: positive where something comes nearer, infinite where nothing
+    /// does, NaN where the field is not valid.
     pub contact: Vec<f64>,
     /// Their standard deviations, frames, by first order from those of the site's own flow and of the motion.
     pub deviation: Vec<f64>,
-    /// Residuals across the epipolar lines in units of noise: far from 0 on what moves by itself, whose time to contact is not that of the scene.
+    /// Residuals across the epipolar lines in units of noise: far from 0 on what moves by itself, whose time
+    /// to contact is not that of the scene.
     pub residual: Vec<f64>,
 }
 
-/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way between the frames with [`Placement::Midpoint`].
+/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way
+/// between the frames with [`Placement::Midpoint`].
 ///
 /// Where the motion has no translation all times are infinite.
 ///
@@ -163,7 +172,8 @@ pub fn contact_map<T: Real>(
     })
 }
 
-/// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None` where it is not valid.
+/// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None`
+/// where it is not valid.
 fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&HalfTurn>, site: usize) -> Option<Row> {
     if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
         return None;
@@ -185,13 +195,13 @@ mod tests {
     use super::super::tests::scenes::{Scene, smooth};
     use super::super::{MotionOptions, Noise, estimate_motion};
     use super::*;
-    use crate::types::{FieldLayout, MOTION_NAMES, Sites};
+    use crate::types::{FieldLayout, MOTION_NAMES, SamplingGrid};
 
     /// The same depth everywhere, seen by a camera of 100 px, with deviations of 0.05 px.
     fn wall(motion: &Motion, nu: f64, camera: &Intrinsics) -> FlowField<f64> {
         let layout = FieldLayout {
             frame_size: (64, 48),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "affine".into(),
             parameters: MOTION_NAMES.map(String::from).to_vec(),
             frame_period: None,

@@ -6,10 +6,12 @@ use nalgebra::{Matrix2, SMatrix, SymmetricEigen};
 /// Covariance of `(psi, w)`.
 pub(super) type Matrix5 = SMatrix<f64, 5, 5>;
 
-/// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still known to be positive.
+/// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still
+/// known to be positive.
 const LEAST_INFORMATION: f64 = 1e-3;
 
-/// Least eigenvalue of an information in units of its own diagonal, below which it may be rounding; a field of half a degree leaves a million times as much.
+/// Least eigenvalue of an information in units of its own diagonal, below which it may be rounding; a field
+/// of half a degree leaves a million times as much.
 const ROUNDING: f64 = 1e-12;
 
 /// What the data say about the covariance of maximum likelihood and the bound.
@@ -27,7 +29,8 @@ pub(super) fn inverse(matrix: &Matrix5) -> Option<Matrix5> {
     inverse.iter().all(|value| value.is_finite()).then_some(inverse)
 }
 
-/// The inverse of an information that determines all five numbers; `None` where rounding alone keeps it positive definite, as that of fewer points than a motion takes, or of all in two places.
+/// The inverse of an information that determines all five numbers; `None` where rounding alone keeps it
+/// positive definite, as that of fewer points than a motion takes, or of all in two places.
 pub(super) fn determined(information: &Matrix5) -> Option<Matrix5> {
     let units = Matrix5::from_diagonal(&information.diagonal().map(|own| 1.0 / own.sqrt()));
     let unitless = units * information * units;
@@ -36,9 +39,11 @@ pub(super) fn determined(information: &Matrix5) -> Option<Matrix5> {
     if least > ROUNDING { inverse(information) } else { None }
 }
 
-/// The covariances that the equations at a minimum give; `None` where noise makes up nearly all of the information.
+/// The covariances that the equations at a minimum give; `None` where noise makes up nearly all of the
+/// information.
 ///
-/// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1` lies below the bound.
+/// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1`
+/// lies below the bound.
 pub(super) fn plugged(equations: &Equations) -> Option<Plugged> {
     plugged_in(&equations.h, &equations.p)
 }

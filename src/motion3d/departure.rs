@@ -1,7 +1,9 @@
 //! How far maximum likelihood may be from the truth where its theory does not hold.
 //!
-//! (17) is linear in the noise of each depth, whose variance grows as `1 / s^2` towards the epipole: where that may lie among the points, the lowest of many ripples is found, which is farther off than (17) has it. The smoothed weights have no ripples.
-//! So what is known of the error then is the distance from their solution, and the covariance of that.
+//! (17) is linear in the noise of each depth, whose variance grows as `1 / s^2` towards the epipole: where
+//! that may lie among the points, the lowest of many ripples is found, which is farther off than (17) has it.
+//! The smoothed weights have no ripples. So what is known of the error then is the distance from their
+//! solution, and the covariance of that.
 
 use super::covariance::{Matrix5, Plugged, direction_deviation};
 use super::efficient::Efficient;
@@ -36,7 +38,8 @@ pub(super) fn among(observations: &Observations, motion: &Motion, deviation: f64
     })
 }
 
-/// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in the minimum's axes.
+/// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in
+/// the minimum's axes.
 pub(super) fn departure(minimum: &Minimum, better: &Efficient) -> Matrix5 {
     let along: Vector2<f64> = minimum.tangent * better.motion.u();
     let turn = better.motion.w() - minimum.motion.w();

@@ -1,7 +1,9 @@
 //! Which rotation is taken out of displacements, and when that is worth its while.
 //!
-//! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out of them ([`turned`](super::turned)) have none. Where the rest would move
-//! an estimate by a small share of its deviation, nothing is turned.
+//! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
+//! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
+//! of them ([`turned`](super::turned)) have none. Where the rest would move an estimate by a small share of
+//! its deviation, nothing is turned.
 
 use super::grid::at_most;
 use super::intake::Intake;
@@ -24,13 +26,15 @@ const FIRST: usize = 200;
 /// Squared shift of an estimate, in its deviations, that is negligible.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the change of the rotation, rad, that is rounding.
+/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the
+/// change of the rotation, rad, that is rounding.
 const SETTLED: f64 = 1e-14;
 const ROUGHLY: f64 = 1e-3;
 const MANY: usize = 10_000;
 const ROUNDING: f64 = 1e-13;
 
-/// What a rest may add to squared residuals, in deviations of their sum by chance, before anything is known of the motion.
+/// What a rest may add to squared residuals, in deviations of their sum by chance, before anything is known
+/// of the motion.
 const HIDDEN: f64 = 0.1;
 
 /// Root mean square of the rest, in units of noise, that decides of hardly a point whether it obeys.
@@ -42,10 +46,12 @@ const APART: f64 = 12.0;
 /// Most times that rows are turned about what they gave.
 const ROUNDS: usize = 6;
 
-/// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are followed, too.
+/// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are
+/// followed, too.
 pub(super) const WANDERED: f64 = 0.1;
 
-/// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and rounds of weights.
+/// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and
+/// rounds of weights.
 const PAIRS: usize = 32;
 const SHARE: f64 = 0.3;
 const STEPS: usize = 6;
@@ -54,7 +60,8 @@ const CUT: f64 = 3.0;
 /// Times that the first rotation is taken out and found again.
 const TURNS: usize = 3;
 
-/// By how much the residuals of `motion` would change if the points were turned about its rotation, at a sample of them.
+/// By how much the residuals of `motion` would change if the points were turned about its rotation, at a
+/// sample of them.
 fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
     let few = at_most(points, SAMPLED, CounterRng::new(0));
     let (here, turned) = (depths(&few, motion), intake.turned(&few, HalfTurn::of(motion)));
@@ -67,7 +74,8 @@ fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -
     (few, changes)
 }
 
-/// The residual of a turned point with the row of the translation half way, as those that are not turned have it: `G(m) t = G(eta_1') t - (eta_2' - eta_1') t_z / 2`.
+/// The residual of a turned point with the row of the translation half way, as those that are not turned have
+/// it: `G(m) t = G(eta_1') t - (eta_2' - eta_1') t_z / 2`.
 fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
     let Some(turn) = &turned.turn else { return 0.0 };
     let row = turned.row(k);
@@ -77,7 +85,8 @@ fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
     if s2 > turned.floor { (t.y * left.x - t.x * left.y) / s2.sqrt() } else { 0.0 }
 }
 
-/// The square of what an estimate would come out otherwise by, in its deviations, if the points were turned about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
+/// The square of what an estimate would come out otherwise by, in its deviations, if the points were turned
+/// about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
 pub(super) fn shift(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> f64 {
     if !points.displaced {
         return 0.0;
@@ -111,9 +120,11 @@ pub(super) fn decides(intake: &Intake<'_>, points: &Observations, motion: &Motio
     changes.iter().map(|change| change * change).sum::<f64>() > OBEYING * OBEYING * changes.len() as f64
 }
 
-/// The points with a rotation taken out that explains most of the flow by itself, of all points or (`robust`) of many; `None` where that hides in the noise, or where there is none.
+/// The points with a rotation taken out that explains most of the flow by itself, of all points or (`robust`)
+/// of many; `None` where that hides in the noise, or where there is none.
 ///
-/// What is left of the flow is short, and so is the rest of third order: even a search that knows nothing of the motion then sees exact flow, nearly. Of noise that is `unknown` anything may be more.
+/// What is left of the flow is short, and so is the rest of third order: even a search that knows nothing of
+/// the motion then sees exact flow, nearly. Of noise that is `unknown` anything may be more.
 pub(super) fn beforehand(
     intake: &Intake<'_>,
     points: &Observations,
@@ -139,7 +150,8 @@ pub(super) fn beforehand(
     Some(intake.turned(points, HalfTurn::new(&w)))
 }
 
-/// The points with the rotation taken out that explains most of their flow by itself, whatever was taken out before; `None` where there is none.
+/// The points with the rotation taken out that explains most of their flow by itself, whatever was taken out
+/// before; `None` where there is none.
 pub(super) fn afresh(intake: &Intake<'_>, points: &Observations) -> Option<Observations> {
     let mut turned = intake.turned(points, HalfTurn::new(&Vector3::zeros()));
     for _ in 0..=TURNS {
@@ -158,9 +170,12 @@ fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
     (0..points.n).map(changed).sum::<f64>() / points.n as f64
 }
 
-/// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all points, and refines `found`. `unknown`: the noise is what the lead leaves.
+/// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all
+/// points, and refines `found`. `unknown`: the noise is what the lead leaves.
 ///
-/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn out to be much larger once its own rotation is taken out, or that is quite another one, the other minima are followed, too, and only those stay that are as good as the best.
+/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn
+/// out to be much larger once its own rotation is taken out, or that is quite another one, the other minima
+/// are followed, too, and only those stay that are as good as the best.
 pub(super) fn settle(
     intake: &Intake<'_>,
     all: &mut Observations,
@@ -212,7 +227,8 @@ fn noise(cost: f64, n: usize, unknown: bool) -> f64 {
 struct Followed {
     minimum: Minimum,
     turned: Option<Observations>,
-    /// What it leaves; infinite where points are led behind the camera, which then do not count, or by more than half a turn.
+    /// What it leaves; infinite where points are led behind the camera, which then do not count, or by more
+    /// than half a turn.
     cost: f64,
 }
 

@@ -65,7 +65,9 @@ impl WeightDepths<'_> {
         }
     }
 
-    /// What known depths are to be multiplied with to be in the unit of the translation, by least squares against the depths of the flow; `None` where these do not tell: such depths say nothing about the scene.
+    /// What known depths are to be multiplied with to be in the unit of the translation, by least squares
+    /// against the depths of the flow; `None` where these do not tell: such depths say nothing about the
+    /// scene.
     fn unit(&self, observations: &Observations, motion: &Motion) -> Option<f64> {
         let Self::Known(given) = self else { return Some(1.0) };
         let own = depths(observations, motion);
@@ -78,12 +80,15 @@ impl WeightDepths<'_> {
     }
 }
 
-/// Deviations above zero of the factor between known depths and those of the flow, below which they have nothing to do with each other.
+/// Deviations above zero of the factor between known depths and those of the flow, below which they have
+/// nothing to do with each other.
 const RELATED: f64 = 3.0;
 
-/// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far away.
+/// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far
+/// away.
 ///
-/// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes no bias.
+/// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes
+/// no bias.
 pub(super) fn efficient(
     observations: &Observations,
     start: &Motion,
@@ -137,13 +142,16 @@ fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Op
     Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance })
 }
 
-/// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are too noisy to tell it.
+/// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are
+/// too noisy to tell it.
 const SLOPES: std::ops::Range<f64> = 0.25..4.0;
 
 /// The least singular value of the slope relative to the largest at which known depths determine the motion.
 const DETERMINED: f64 = 1e-3;
 
-/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights: `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off, depths from elsewhere).
+/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights:
+/// `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off,
+/// depths from elsewhere).
 fn sandwich(
     observations: &Observations,
     motion: &Motion,
@@ -165,7 +173,8 @@ fn sandwich(
     Some(0.5 * (covariance + covariance.transpose()))
 }
 
-/// The same for depths from elsewhere, which no noise of the flow is in: however wrong they are, only what they leave undetermined is not known.
+/// The same for depths from elsewhere, which no noise of the flow is in: however wrong they are, only what
+/// they leave undetermined is not known.
 fn known_sandwich(
     observations: &Observations,
     motion: &Motion,

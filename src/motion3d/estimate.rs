@@ -26,11 +26,14 @@ const TURNS: usize = 2;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
-/// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights (see the module). Units: with a camera flow is in px/frame and `sigma` in px. Rows that are
-/// not finite are left out and come back as NaN. Scenes that do not determine a motion are told by [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
+/// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights
+/// (see the module). Units: with a camera flow is in px/frame and `sigma` in px. Rows that are not finite are
+/// left out and come back as NaN. Scenes that do not determine a motion are told by
+/// [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
 ///
 /// # Errors
-/// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
+/// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`,
+/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     options.check(flow, noise)?;
@@ -78,7 +81,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     let alone = |told: Option<f64>, usual: f64| told.is_none_or(|told| told == usual);
     scaled.observations.independent = alone(options.shared, 1.0) && alone(options.correlation_length, 0.0);
     if unknown && options.rotation_prior.is_some() {
-        // What is known beforehand weighs nothing beside flow of no noise, and how large that is it does not tell.
+        // What is known beforehand weighs nothing beside flow of no noise, and how large that is it does not
+        // tell.
         let alone = estimate(flow, noise, &MotionOptions { rotation_prior: None, ..options.clone() });
         scaled.take(alone.sigma);
         scaled.may_turn = alone.status == Status::RotationOnly;
@@ -118,7 +122,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
 }
 
-/// The points that obey one motion, with its rotation taken out of their displacements where that makes a difference to who obeys.
+/// The points that obey one motion, with its rotation taken out of their displacements where that makes a
+/// difference to who obeys.
 fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let mut kept = consensus(scaled, rng)?;
     for _ in 0..TURNS {

@@ -3,19 +3,23 @@
 use super::common::CommonErrors;
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Rect, Sites, Status};
+use crate::types::{FlowField, Rect, SamplingGrid, Status};
 use nalgebra::Matrix2;
 
-/// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of them goes together still (`benchmarks/motion3d_drive.py`), which the motion's covariance sums (`together`): a residual alone may be judged as if it did not.
+/// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of them
+/// goes together still (`benchmarks/motion3d_drive.py`), which the motion's covariance sums (`together`): a
+/// residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 
-/// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and outliers among them less well; closer ones tell hardly more.
+/// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and
+/// outliers among them less well; closer ones tell hardly more.
 const SPACED: f64 = 2.0;
 
 /// Least spacing, px, where the field does not know how far its errors go together.
 const LEAST_SPACING: f64 = 8.0;
 
-/// Points closer than this many correlation lengths share so much of their errors that neither chance nor outliers can be judged with them as if they did not, and they would tell hardly more.
+/// Points closer than this many correlation lengths share so much of their errors that neither chance nor
+/// outliers can be judged with them as if they did not, and they would tell hardly more.
 const FINEST: f64 = 1.0;
 
 /// Points of a region that a grid which nobody asked for is made finer for.
@@ -24,7 +28,9 @@ const WANTED: usize = 30;
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FieldOptions {
-    /// Distance of the points along rows and columns, px, not below the correlation length of the field; default: 2 correlation lengths, at least 8 px, and less where a region would have fewer than 30 points.
+    /// Distance of the points along rows and columns, px, not below the correlation length of the field;
+    /// default: 2 correlation lengths, at least 8 px, and less where a region would have fewer than 30
+    /// points.
     pub spacing: Option<f64>,
     /// Only points in this rectangle of pixels.
     pub region: Option<Rect>,
@@ -32,20 +38,25 @@ pub struct FieldOptions {
     pub most: Option<usize>,
 }
 
-/// Points with their flow and its covariance, as [`Flow::Plane`](super::Flow::Plane) and [`Noise::Covariances`](super::Noise::Covariances) take them.
+/// Points with their flow and its covariance, as [`Flow::Plane`](super::Flow::Plane) and
+/// [`Noise::Covariances`](super::Noise::Covariances) take them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FieldPoints {
     /// Pixels.
     pub points: Vec<[f64; 2]>,
     /// Their flow, px/frame.
     pub flow: Vec<[f64; 2]>,
-    /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share, `4 pi l^2 / spacing^2`.
+    /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share,
+    /// `4 pi l^2 / spacing^2`.
     pub covariances: Vec<f64>,
-    /// How many points share one error: what the covariances are multiplied with. For [`MotionOptions::shared`](super::MotionOptions).
+    /// How many points share one error: what the covariances are multiplied with. For
+    /// [`MotionOptions::shared`](super::MotionOptions).
     pub shared: f64,
-    /// How far errors of neighbours go together, px: the field's own. For [`MotionOptions::correlation_length`](super::MotionOptions).
+    /// How far errors of neighbours go together, px: the field's own. For
+    /// [`MotionOptions::correlation_length`](super::MotionOptions).
     pub correlation_length: f64,
-    /// What the flow of the whole field may have in common, as far as its covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    /// What the flow of the whole field may have in common, as far as its covariances tell. For
+    /// [`MotionOptions::common`](super::MotionOptions).
     pub common: CommonErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
@@ -75,13 +86,17 @@ impl FieldPoints {
 
 /// Takes every so manieth valid estimate of a field.
 ///
-/// Windowed estimates share pixels, and where they do their errors go together over the correlation length `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too small. Closer than 4 `l` they
-/// get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one. What goes together farther than that is for [`MotionOptions::correlation_length`](super::MotionOptions).
+/// Windowed estimates share pixels, and where they do their errors go together over the correlation length
+/// `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too
+/// small. Closer than 4 `l` they get their covariance times `4 pi l^2 / spacing^2`, the number of points on
+/// the area over which errors are one. What goes together farther than that is for
+/// [`MotionOptions::correlation_length`](super::MotionOptions).
 ///
 /// A list of points is taken whole.
 ///
 /// # Errors
-/// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not positive.
+/// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not
+/// positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     measured(field)?;
     let usual = LEAST_SPACING.max(SPACED * field.layout.correlation_length);
@@ -90,7 +105,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         return Err(Error::argument("spacing", "a positive number", spacing));
     }
     let step = match field.layout.sites {
-        Sites::Grid { stride, .. } => {
+        SamplingGrid::Grid { stride, .. } => {
             let steps = |px: f64| ((px / stride as f64).ceil() as usize).max(1);
             let finest = steps(FINEST * field.layout.correlation_length);
             let mut step = steps(spacing).max(finest);
@@ -99,12 +114,12 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             }
             coarse_enough(field, step, options)
         }
-        Sites::Points(_) => 1,
+        SamplingGrid::Points(_) => 1,
     };
     let shared = shared_by(field, step);
     let spacing = match field.layout.sites {
-        Sites::Grid { stride, .. } => (step * stride) as f64,
-        Sites::Points(_) => spacing,
+        SamplingGrid::Grid { stride, .. } => (step * stride) as f64,
+        SamplingGrid::Points(_) => spacing,
     };
     let correlation_length = field.layout.correlation_length;
     let common = CommonErrors::of_field(field);
@@ -148,7 +163,7 @@ pub(super) fn measured<T>(field: &FlowField<T>) -> Result<()> {
 
 /// Points on the area over which errors are one, at least 1; a list of points is taken to know what it does.
 fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
-    let Sites::Grid { stride, .. } = field.layout.sites else { return 1.0 };
+    let SamplingGrid::Grid { stride, .. } = field.layout.sites else { return 1.0 };
     let (length, spacing) = (field.layout.correlation_length, (step * stride) as f64);
     if spacing >= INDEPENDENT * length {
         return 1.0;
@@ -161,7 +176,7 @@ pub(super) fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
     region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
 }
 
-/// Sites of a grid with that step inside the region.
+/// SamplingGrid of a grid with that step inside the region.
 fn count<T>(field: &FlowField<T>, step: usize, region: Option<Rect>) -> usize {
     let rows = |column: usize| {
         let inside = |row: &usize| {
@@ -195,7 +210,7 @@ mod tests {
     fn field() -> FlowField<f32> {
         let layout = FieldLayout {
             frame_size: (60, 40),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "affine".into(),
             parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
             frame_period: None,

@@ -8,7 +8,7 @@ use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::parallel::Threads;
-use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, Sites, Status};
+use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
@@ -18,7 +18,8 @@ const LEAST: usize = 8;
 /// The share of a window's sites that must be valid, for its middle not to lie beside what is seen of it.
 const SEEN: f64 = 0.5;
 
-/// The least square of a pivot of a covariance, in shares of its own variance: below, rounding of single precision made it.
+/// The least square of a pivot of a covariance, in shares of its own variance: below, rounding of single
+/// precision made it.
 const ROUNDED: f64 = 1e-6;
 
 /// Patches of a field, as [`AffinePatches`] takes them.
@@ -30,7 +31,8 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
-    /// What the flow of the whole field may have in common, as far as its covariances tell. For [`MotionOptions::common`](super::MotionOptions).
+    /// What the flow of the whole field may have in common, as far as its covariances tell. For
+    /// [`MotionOptions::common`](super::MotionOptions).
     pub common: CommonErrors,
 }
 
@@ -46,14 +48,21 @@ impl FieldPatches {
     }
 }
 
-/// Cuts the field, or a region of it, into squares of `size` px that do not overlap, and fits one flow of second order to the flow and the Jacobian of the pixels of each, by least squares with the pixels' covariances: its six numbers at the middle. What bends
-/// would shift those of an affine flow by more than their noise. Windows of which less than half is valid are left out.
+/// Cuts the field, or a region of it, into squares of `size` px that do not overlap, and fits one flow of
+/// second order to the flow and the Jacobian of the pixels of each, by least squares with the pixels'
+/// covariances: its six numbers at the middle. What bends would shift those of an affine flow by more than
+/// their noise. Windows of which less than half is valid are left out.
 ///
-/// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over which errors of the
-/// correlation length `l` are one, their tail beyond the windows included (see [`MotionOptions::correlation_length`](super::MotionOptions)). Flow that is of no second order in a window, as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as much that of the patch grows.
+/// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels
+/// times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over
+/// which errors of the correlation length `l` are one, their tail beyond the windows included (see
+/// [`MotionOptions::correlation_length`](super::MotionOptions)). Flow that is of no second order in a window,
+/// as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as
+/// much that of the patch grows.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch, and `patches` for a size below 8 px.
+/// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch,
+/// and `patches` for a size below 8 px.
 pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<Rect>) -> Result<FieldPatches> {
     measured(field)?;
     if let Some(missing) = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name)) {
@@ -88,7 +97,7 @@ impl Windows {
     /// In what both the field's own region and `region` have of the frame.
     fn new(layout: &FieldLayout, region: Option<Rect>, size: usize) -> Self {
         let (mut left, mut top, (mut right, mut bottom)) = (0, 0, layout.frame_size);
-        let own = if let Sites::Grid { region, .. } = layout.sites { region } else { None };
+        let own = if let SamplingGrid::Grid { region, .. } = layout.sites { region } else { None };
         for r in [own, region].into_iter().flatten() {
             (left, top) = (left.max(r.x), top.max(r.y));
             (right, bottom) = (right.min(r.x.saturating_add(r.width)), bottom.min(r.y.saturating_add(r.height)));
@@ -144,8 +153,8 @@ impl Windows {
         let whole = (self.size * self.size) as f64;
         // Pixels that one site stands for.
         let each = match field.layout.sites {
-            Sites::Grid { stride, .. } => (stride * stride) as f64,
-            Sites::Points(_) => whole / sums.count as f64,
+            SamplingGrid::Grid { stride, .. } => (stride * stride) as f64,
+            SamplingGrid::Points(_) => whole / sums.count as f64,
         };
         if (sums.count as f64) * each < SEEN * whole {
             return None;
@@ -185,7 +194,8 @@ impl Sums {
         self.count += 1;
     }
 
-    /// The solution, its covariance for independent pixels, and how many times larger its residuals are than these allow, at least 1.
+    /// The solution, its covariance for independent pixels, and how many times larger its residuals are than
+    /// these allow, at least 1.
     fn solve(&self) -> Option<(Vector6<f64>, Matrix6<f64>, f64)> {
         let factor = self.normal.cholesky()?;
         let motion = factor.solve(&self.right);
@@ -198,7 +208,8 @@ impl Sums {
     }
 }
 
-/// From the unknowns at the middle to the six numbers at a distance from it: `u + u_x dx + u_y dy + (u_xx dx^2 + 2 u_xy dx dy + u_yy dy^2) / 2, ...`, `u_x + u_xx dx + u_xy dy, ...`.
+/// From the unknowns at the middle to the six numbers at a distance from it: `u + u_x dx + u_y dy + (u_xx
+/// dx^2 + 2 u_xy dx dy + u_yy dy^2) / 2, ...`, `u_x + u_xx dx + u_xy dy, ...`.
 fn transport([dx, dy]: [f64; 2]) -> SMatrix<f64, 6, UNKNOWN> {
     let mut out = SMatrix::zeros();
     for i in 0..2 {

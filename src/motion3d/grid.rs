@@ -19,7 +19,9 @@ pub(super) const SEARCHED: usize = 1000;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
 
-/// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond it, starts among them, and the share that these are apart.
+/// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is
+/// as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond
+/// it, starts among them, and the share that these are apart.
 const ACROSS: usize = 12;
 const NARROW: f64 = 0.45;
 const BEYOND: f64 = 0.25;
@@ -75,7 +77,8 @@ fn each<R: Send>(directions: &[Vector3<f64>], work: impl Fn(&Vector3<f64>) -> Op
     groups.into_iter().flatten().collect()
 }
 
-/// The best of the motions, cheapest first, no two within `apart` degrees of each other (or of each other's opposite).
+/// The best of the motions, cheapest first, no two within `apart` degrees of each other (or of each other's
+/// opposite).
 pub(super) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -> Vec<(Motion, f64)> {
     motions.sort_by(|a, b| a.1.total_cmp(&b.1));
     let limit = apart.to_radians().cos();
@@ -120,7 +123,8 @@ impl Searched {
         Self { all, basins, within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
     }
 
-    /// The most promising motions: the best, and those in whose neighbourhood the least is left, lest all lie in one long valley.
+    /// The most promising motions: the best, and those in whose neighbourhood the least is left, lest all lie
+    /// in one long valley.
     pub fn starts(&self) -> Vec<Motion> {
         let all = apart(self.all.clone(), APART, STARTS).into_iter();
         let basins = apart(self.basins.clone(), APART, BASINS);
@@ -137,7 +141,8 @@ impl Searched {
     }
 }
 
-/// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow that the nearest direction looks worse than hundreds of others.
+/// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow
+/// that the nearest direction looks worse than hundreds of others.
 fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -> Vec<(Motion, f64)> {
     let few = &*at_most(observations, FEW, rng);
     let led = |&(motion, _): &(Motion, f64)| {
@@ -158,7 +163,8 @@ fn different(motions: impl Iterator<Item = (Motion, f64)>) -> Vec<Motion> {
     kept
 }
 
-/// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half width, rad.
+/// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half
+/// width, rad.
 fn within(observations: &Observations) -> (Vec<Vector3<f64>>, f64) {
     let none = (Vec::new(), 0.0);
     let seen = |at: &[f64; 3]| {

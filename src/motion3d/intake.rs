@@ -46,7 +46,8 @@ impl Intake<'_> {
         }
     }
 
-    /// The usable points in the order given; rows that are not finite or whose covariance is no covariance are left out. Unknown noise is taken to be 1 of the flow's unit.
+    /// The usable points in the order given; rows that are not finite or whose covariance is no covariance
+    /// are left out. Unknown noise is taken to be 1 of the flow's unit.
     pub fn whitened(&self) -> Observations {
         let sources: Vec<u32> = (0..self.flow.len() as u32).collect();
         let rows = self.rows(&sources);
@@ -77,7 +78,8 @@ impl Intake<'_> {
         self.placement == Placement::Midpoint && matches!(self.flow, Flow::Plane { .. })
     }
 
-    /// The same points in the same units, with the rotation of a motion taken out of their displacements; a point that this leads behind the camera gets weight 0.
+    /// The same points in the same units, with the rotation of a motion taken out of their displacements; a
+    /// point that this leads behind the camera gets weight 0.
     pub fn turned(&self, points: &Observations, turn: HalfTurn) -> Observations {
         let nothing = Row { g: nalgebra::Matrix2x3::zeros(), r: nalgebra::Matrix2x3::zeros(), f: Vector2::zeros() };
         let one = |(&k, &before): (&u32, &[f64; 3])| match self.row(k as usize, Some(&turn)) {
@@ -119,7 +121,8 @@ impl Intake<'_> {
     }
 }
 
-/// A displacement with a rotation taken out, whitened, and its place half way; `covariance` in squared units of the flow.
+/// A displacement with a rotation taken out, whitened, and its place half way; `covariance` in squared units
+/// of the flow.
 pub(super) fn turned_row(
     point: [f64; 2],
     flow: [f64; 2],
@@ -134,7 +137,8 @@ pub(super) fn turned_row(
     Row::whitened(&turned.rows, turned.flow, &covariance).map(|row| (row, turned.middle))
 }
 
-/// A point of the picture, whitened, and its place on the plane at distance 1; `covariance` in squared units of the flow.
+/// A point of the picture, whitened, and its place on the plane at distance 1; `covariance` in squared units
+/// of the flow.
 pub(super) fn plane_row(
     point: [f64; 2],
     flow: [f64; 2],

@@ -1,6 +1,7 @@
 //! The loops over points, written once for every lane width.
 //!
-//! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar line and `s m = T . d` the part along it (2).
+//! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar
+//! line and `s m = T . d` the part along it (2).
 
 mod equations;
 mod front;
@@ -52,7 +53,8 @@ impl<V: Lanes<Scalar = f64>> Everywhere<V> {
     }
 }
 
-// Functions and loops instead of closures throughout: a closure would be compiled without the lanes' instructions.
+// Functions and loops instead of closures throughout: a closure would be compiled without the lanes'
+// instructions.
 
 #[inline(always)]
 fn splat<V: Lanes<Scalar = f64>>([x, y, z]: [f64; 3]) -> [V; 3] {

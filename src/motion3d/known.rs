@@ -1,7 +1,9 @@
 //! What is known beforehand of the rotation, and whether the flow contradicts it.
 //!
-//! A rotation `w0` of information `L` beside flow whose information about `(psi, w)` is `D` leads to `w`, from which both pull with the same force `g = L (w0 - w)`. The flow alone would lead to a motion that is away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right, `d` has the covariance `L^-1 + C_ww` with
-//! that of the flow alone.
+//! A rotation `w0` of information `L` beside flow whose information about `(psi, w)` is `D` leads to `w`,
+//! from which both pull with the same force `g = L (w0 - w)`. The flow alone would lead to a motion that is
+//! away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right,
+//! `d` has the covariance `L^-1 + C_ww` with that of the flow alone.
 
 use super::covariance::{Matrix5, inverse};
 use super::kernels::{add_to_rotation, equations};
@@ -36,7 +38,8 @@ impl Known {
     }
 }
 
-/// What a motion's covariance is made of: `own`, in which errors that the information takes for independent may go together, times `wider`, and what all flow has in `common`.
+/// What a motion's covariance is made of: `own`, in which errors that the information takes for independent
+/// may go together, times `wider`, and what all flow has in `common`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grown {
     pub own: Matrix5,
@@ -51,7 +54,8 @@ impl Grown {
     }
 }
 
-/// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains it, or where the flow alone does not determine a motion.
+/// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains
+/// it, or where the flow alone does not determine a motion.
 ///
 /// `information`: of the flow and of the known rotation together.
 pub(super) fn contradiction(
@@ -77,7 +81,8 @@ pub(super) fn contradiction(
     (!by_chance(square, 3.0)).then(|| alone.fixed_columns::<3>(2) * force)
 }
 
-/// The motion that the flow tells by itself, the nearest one to `motion`, and how much less likely it is with the known rotation.
+/// The motion that the flow tells by itself, the nearest one to `motion`, and how much less likely it is with
+/// the known rotation.
 pub(super) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternative {
     let mut alone = inliers.clone();
     alone.prior = None;
@@ -86,7 +91,8 @@ pub(super) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternat
     Alternative { motion: found, excess: cost(&found) - cost(motion) }
 }
 
-/// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to be added to that, and what the flow tells by itself.
+/// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to
+/// be added to that, and what the flow tells by itself.
 pub(super) fn rotation_contradiction(
     known: &Known,
     w: &Vector3<f64>,

@@ -1,7 +1,10 @@
 //! Whether displacements are explained as well by a motion that turns by much less, or otherwise.
 //!
-//! Rows that an estimate's rotation was taken out of are those of a linear model about it. Seen from a motion that turns by a large angle, what nature did, with a small one, looks impossible: in a narrow field, where a translation and a rotation do nearly the same, such motions leave hardly more than the true one. So the
-//! other directions are asked with the rotation taken out that explains most of the flow by itself, and those that might do each with its own.
+//! Rows that an estimate's rotation was taken out of are those of a linear model about it. Seen from a motion
+//! that turns by a large angle, what nature did, with a small one, looks impossible: in a narrow field, where
+//! a translation and a rotation do nearly the same, such motions leave hardly more than the true one. So the
+//! other directions are asked with the rotation taken out that explains most of the flow by itself, and those
+//! that might do each with its own.
 
 use super::displaced::{WANDERED, afresh};
 use super::grid::{at_most, evaluate};
@@ -17,7 +20,8 @@ use rayon::prelude::*;
 /// Times that a direction's own rotation is taken out.
 const ROUNDS: usize = 4;
 
-/// Whether, for `most` of the points, a direction that is `farther` from the estimate's is as plausible, each with its own rotation taken out.
+/// Whether, for `most` of the points, a direction that is `farther` from the estimate's is as plausible, each
+/// with its own rotation taken out.
 pub(super) fn plausible_less_turned(
     intake: &Intake<'_>,
     inliers: &Observations,

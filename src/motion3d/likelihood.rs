@@ -10,7 +10,8 @@ use super::special::by_chance;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
 
-/// Minima that are then refined on all points, beside the one with the smoothest depths and the first where signs count without their noise.
+/// Minima that are then refined on all points, beside the one with the smoothest depths and the first where
+/// signs count without their noise.
 const FINALISTS: usize = 2;
 
 /// Directions nearer than this, degrees, are one minimum.
@@ -20,9 +21,11 @@ pub(super) const SAME: f64 = 0.5;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidate {
     pub minimum: Minimum,
-    /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared units of noise.
+    /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared
+    /// units of noise.
     pub cost: f64,
-    /// The same but for what noise alone leads behind the camera, where the roughness is in it; else infinite.
+    /// The same but for what noise alone leads behind the camera, where the roughness is in it; else
+    /// infinite.
     pub fair: f64,
 }
 
@@ -45,7 +48,8 @@ impl Candidate {
     }
 }
 
-/// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the best minimum leaves more than that, it is looked for from more starts.
+/// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the
+/// best minimum leaves more than that, it is looked for from more starts.
 pub(super) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
     let rounder = observations.rounder();
     let first = rounder.first().unwrap_or(observations);
@@ -85,8 +89,9 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
                 finalists.push(added);
             }
         }
-        // What leaves more on few points than chance explains need not be followed on many, whatever its signs and depths.
-        // (Signs do not decide here: at a minimum that is not reached yet they are of other depths.)
+        // What leaves more on few points than chance explains need not be followed on many, whatever its
+        // signs and depths. (Signs do not decide here: at a minimum that is not reached yet they are of other
+        // depths.)
         let left = |finalist: &Candidate| finalist.minimum.equations.cost;
         let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
         let limit = least + close(fewer.n) * (least / fewer.n as f64).max(1.0);
@@ -119,9 +124,11 @@ pub(super) fn close(n: usize) -> f64 {
     8.0 * (n as f64).sqrt() + 25.0
 }
 
-/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness of their depths, too.
+/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness
+/// of their depths, too.
 ///
-/// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and differ by about `2 sqrt(n)` by chance.
+/// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and
+/// differ by about `2 sqrt(n)` by chance.
 pub(super) fn choose(
     observations: &Observations,
     minima: &[Minimum],

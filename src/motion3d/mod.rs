@@ -1,18 +1,23 @@
 //! Rigid 3-D motion from noisy optical flow, with the bound that no estimator can beat.
 //!
-//! One translation `u` (a direction: `|u| = 1`), one rotation `w` and an inverse depth `nu_k` for every point explain a flow field,
+//! One translation `u` (a direction: `|u| = 1`), one rotation `w` and an inverse depth `nu_k` for every point
+//! explain a flow field,
 //!
 //! ```text
 //! f_k = nu_k G_k u + R_k w        plane: G = [[1, 0, -x], [0, 1, -y]],  R = [[-xy, 1 + x^2, -y], [-(1 + y^2), xy, x]]
 //! ```
 //!
-//! Maximum likelihood minimises the part of the flow residual across the epipolar lines. Its covariance is the Cramér-Rao bound plus a term of fourth order in the
-//! noise, because the depths that weigh its equations are noisy themselves. [`Method::Efficient`] takes the weights from depths smoothed over neighbours; a wrong weight costs variance and
-//! never causes bias, as the residual across an epipolar line is independent of the depth along it.
+//! Maximum likelihood minimises the part of the flow residual across the epipolar lines. Its covariance is
+//! the Cramér-Rao bound plus a term of fourth order in the noise, because the depths that weigh its equations
+//! are noisy themselves. [`Method::Efficient`] takes the weights from depths smoothed over neighbours; a
+//! wrong weight costs variance and never causes bias, as the residual across an epipolar line is independent
+//! of the depth along it.
 //!
-//! Source: T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion Estimation from Noisy Optical Flow"; equation numbers are that paper's.
+//! Source: T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion
+//! Estimation from Noisy Optical Flow"; equation numbers are that paper's.
 //!
-//! `u` and `w` are the motion of the scene relative to the camera: `X_dot = u + w x X`; the camera's own velocity is `-u`. Camera axes: x right, y down, z forward. Inverse depths are in units of `|u|` per frame.
+//! `u` and `w` are the motion of the scene relative to the camera: `X_dot = u + w x X`; the camera's own
+//! velocity is `-u`. Camera axes: x right, y down, z forward. Inverse depths are in units of `|u|` per frame.
 //!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};

@@ -34,7 +34,8 @@ pub(super) fn cross_matrix(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }
 
-/// Two unit vectors `e1`, `e2` with `e1 x e2 = direction` (of length 1), as rows; the same for the same direction.
+/// Two unit vectors `e1`, `e2` with `e1 x e2 = direction` (of length 1), as rows; the same for the same
+/// direction.
 pub(super) fn tangents(direction: &Vector3<f64>) -> Matrix2x3<f64> {
     // The axis least along the direction keeps the cross product well away from zero.
     let axis = direction.iamin();
@@ -52,7 +53,8 @@ impl Rows {
         }
     }
 
-    /// On the sphere at the bearing `eta`, axes `e1`, `e2` of [`tangents`]: `G = E (I - eta eta^t) = E`, `R = -G [eta]x`.
+    /// On the sphere at the bearing `eta`, axes `e1`, `e2` of [`tangents`]: `G = E (I - eta eta^t) = E`, `R =
+    /// -G [eta]x`.
     pub fn sphere(eta: &Vector3<f64>) -> Self {
         let g = tangents(eta);
         Self { g, r: -g * cross_matrix(eta) }
@@ -60,7 +62,8 @@ impl Rows {
 }
 
 impl Motion {
-    /// A motion along `direction` (of any length above 0; only its direction counts) with the rotation rate `w`, rad/frame.
+    /// A motion along `direction` (of any length above 0; only its direction counts) with the rotation rate
+    /// `w`, rad/frame.
     pub fn new(direction: [f64; 3], rotation: [f64; 3]) -> Self {
         Self { translation: Vector3::from(direction).normalize().into(), rotation }
     }
@@ -97,7 +100,8 @@ impl Motion {
         a.cross(&b).norm().atan2(a.dot(&b))
     }
 
-    /// Flow `(u, v)` at `(x, y)` of the plane at distance 1 of a point with the inverse depth `nu`: equation (1).
+    /// Flow `(u, v)` at `(x, y)` of the plane at distance 1 of a point with the inverse depth `nu`: equation
+    /// (1).
     pub fn plane_flow(&self, point: [f64; 2], inverse_depth: f64) -> [f64; 2] {
         let rows = Rows::plane(point);
         (rows.g * self.u() * inverse_depth + rows.r * self.w()).into()
@@ -110,7 +114,9 @@ impl Motion {
         (camera.unscale() * Vector2::from(flow)).into()
     }
 
-    /// Displacement over the whole frame of a place of the first view, px with a camera, else on the plane at distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the point is behind the camera.
+    /// Displacement over the whole frame of a place of the first view, px with a camera, else on the plane at
+    /// distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the
+    /// point is behind the camera.
     pub fn picture_displacement(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
         let turn = HalfTurn::new(&self.w());
         let Some(camera) = camera else { return turn.displacement(&self.u(), point, inverse_depth).into() };
@@ -124,7 +130,8 @@ impl Motion {
         eta.cross(&pull).into()
     }
 
-    /// Affine flow `(u, v, u_x, v_x, u_y, v_y)` at `(x, y)` of the plane at distance 1 of a surface with inverse depth and slopes `(nu, nu_x, nu_y)` there.
+    /// Affine flow `(u, v, u_x, v_x, u_y, v_y)` at `(x, y)` of the plane at distance 1 of a surface with
+    /// inverse depth and slopes `(nu, nu_x, nu_y)` there.
     pub fn affine_flow(&self, point: [f64; 2], surface: [f64; 3]) -> [f64; 6] {
         let rows = AffineRows::new(point);
         let m = rows.depth(&self.u()) * Vector3::from(surface) + rows.rotation * self.w();
@@ -137,7 +144,8 @@ impl Motion {
         std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
     }
 
-    /// The displacement of the whole frame in units of the path's length: `t = V(w) u`, so that `X' = Rot X + t / nu` for a point with `|u| = 1`.
+    /// The displacement of the whole frame in units of the path's length: `t = V(w) u`, so that `X' = Rot X +
+    /// t / nu` for a point with `|u| = 1`.
     ///
     /// `V = I + (1 - cos a) / a^2 [w]x + (a - sin a) / a^3 [w]x^2`, `a = |w|`.
     pub fn displacement(&self) -> [f64; 3] {
@@ -154,7 +162,8 @@ impl Motion {
         (u + once * first + w.cross(&once) * second).into()
     }
 
-    /// The essential matrix `[t]x Rot` of the frame, row by row: `eta'^t E eta = 0` for the two views' points.
+    /// The essential matrix `[t]x Rot` of the frame, row by row: `eta'^t E eta = 0` for the two views'
+    /// points.
     pub fn essential_matrix(&self) -> [[f64; 3]; 3] {
         let rotation = *nalgebra::Rotation3::new(self.w()).matrix();
         let matrix = cross_matrix(&Vector3::from(self.displacement())) * rotation;

@@ -1,5 +1,6 @@
-//! The nearest points of every point, by a k-d tree. Points are told by their place in the tree, where neighbours are near each other in memory too.
-//! Which of several points at the same distance are kept depends on the points alone.
+//! The nearest points of every point, by a k-d tree. Points are told by their place in the tree, where
+//! neighbours are near each other in memory too. Which of several points at the same distance are kept
+//! depends on the points alone.
 
 use rayon::prelude::*;
 
@@ -9,7 +10,8 @@ const LEAF: usize = 12;
 /// Points whose neighbours one task looks for.
 const BAND: usize = 256;
 
-/// Numbers of neighbours that are told apart: the first 8 in a list are the 8 nearest, the first 16 the 16 nearest, ...
+/// Numbers of neighbours that are told apart: the first 8 in a list are the 8 nearest, the first 16 the 16
+/// nearest, ...
 pub(super) const SIZES: [usize; 4] = [8, 16, 32, 64];
 
 #[derive(Debug, Clone, Copy)]
@@ -103,7 +105,8 @@ impl Tree {
         ranges.filter(|places| places.len() >= least).collect()
     }
 
-    /// The `k` nearest of the points at the places `asked`, themselves left out; `k` is less than the number of points.
+    /// The `k` nearest of the points at the places `asked`, themselves left out; `k` is less than the number
+    /// of points.
     pub fn nearest(&self, asked: &[u32], k: usize) -> Neighbours {
         let mut places = vec![0u32; asked.len() * k];
         places.par_chunks_mut(BAND * k).zip(asked.par_chunks(BAND)).for_each(|(out, asked)| {
@@ -162,7 +165,8 @@ impl Tree {
     }
 }
 
-/// Puts the keys so that the first of each of [`SIZES`] are the nearest, the last of them the farthest of these.
+/// Puts the keys so that the first of each of [`SIZES`] are the nearest, the last of them the farthest of
+/// these.
 fn nest(keys: &mut [u64], k: usize) {
     let mut end = k;
     for &size in SIZES.iter().rev().filter(|&&size| size <= k) {
@@ -171,7 +175,8 @@ fn nest(keys: &mut [u64], k: usize) {
     }
 }
 
-/// Splits the points `index`, which begin at `first` of all, at the middle of their widest side; returns the node.
+/// Splits the points `index`, which begin at `first` of all, at the middle of their widest side; returns the
+/// node.
 fn split(positions: &[[f64; 3]], index: &mut [u32], first: u32, nodes: &mut Vec<Node>) -> u32 {
     let (mut least, mut greatest) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for &i in index.iter() {

@@ -8,7 +8,8 @@ use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
 
-/// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A multiple of every lane count.
+/// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
+/// multiple of every lane count.
 pub(super) const CHUNK: usize = 4096;
 
 /// Lanes are filled up with points of weight 0 to a multiple of this.
@@ -24,7 +25,8 @@ pub(super) const ROUNDING: f64 = 1e-11;
 const ENOUGH: usize = 1000;
 const FAR_FROM_ROUND: f64 = 0.9;
 
-/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other, where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
+/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other,
+/// where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
 const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
 
 /// By how much residuals may grow from one of these to the next.
@@ -38,15 +40,18 @@ pub(super) struct Row {
     pub f: Vector2<f64>,
 }
 
-/// Whitened points as planes: `g` (6), `r` (6), `f` (2), each of `stride` values, of which those after `n` are zero.
+/// Whitened points as planes: `g` (6), `r` (6), `f` (2), each of `stride` values, of which those after `n`
+/// are zero.
 #[derive(Debug, Clone)]
 pub(super) struct Observations {
     pub n: usize,
     pub stride: usize,
     planes: Vec<f64>,
-    /// Where the rows are those of: `(x, y, 0)` on the plane, the bearing on the sphere. Half way along a displacement this has half of the flow's noise in it.
+    /// Where the rows are those of: `(x, y, 0)` on the plane, the bearing on the sphere. Half way along a
+    /// displacement this has half of the flow's noise in it.
     pub position: Vec<[f64; 3]>,
-    /// Where the points were given, in the same axes, for neighbourhoods and what is predicted from them: free of the flow's noise, so that a prediction is independent of the point's residual.
+    /// Where the points were given, in the same axes, for neighbourhoods and what is predicted from them:
+    /// free of the flow's noise, so that a prediction is independent of the point's residual.
     pub site: Vec<[f64; 3]>,
     /// Whether positions and sites are bearings.
     pub spherical: bool,
@@ -71,7 +76,8 @@ pub(super) struct Observations {
 }
 
 impl Row {
-    /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None` unless all is finite and `S` positive definite.
+    /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None`
+    /// unless all is finite and `S` positive definite.
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
         let whiten = unit(covariance)?;
         let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
@@ -93,7 +99,8 @@ impl Observations {
         self.prior.map_or(0.0, |known| known.pull(w).1)
     }
 
-    /// Usable points in the order given; `source` tells where they come from. Their sites are left to be told.
+    /// Usable points in the order given; `source` tells where they come from. Their sites are left to be
+    /// told.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
@@ -171,7 +178,8 @@ impl Observations {
         }
     }
 
-    /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with little of it.
+    /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with
+    /// little of it.
     fn stretch(&self, k: usize) -> (f64, Vector2<f64>) {
         let g = self.row(k).g;
         // Rows of whitened points are stretched along the axis with little noise.
@@ -181,14 +189,16 @@ impl Observations {
         (stretch, eigen.eigenvectors.column(most).into_owned())
     }
 
-    /// How many times as large noise is along one axis as along the other, of all but a tenth of the points at most.
+    /// How many times as large noise is along one axis as along the other, of all but a tenth of the points
+    /// at most.
     pub fn longest(&self) -> f64 {
         let few = (0..self.n).step_by(self.n.div_ceil(ENOUGH).max(1));
         let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
         quantile(&mut stretches, FAR_FROM_ROUND)
     }
 
-    /// The same points where no point's noise is more than `ratio` times as large along one axis as along the other: the smaller deviation is taken to be larger.
+    /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
+    /// other: the smaller deviation is taken to be larger.
     fn rounded(&self, ratio: f64) -> Self {
         let mut out = self.clone();
         for k in 0..self.n {

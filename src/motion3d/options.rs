@@ -39,7 +39,11 @@ pub enum Noise<'a> {
     Unknown,
     /// Standard deviation of each component, in the unit of the flow.
     Sigma(f64),
-    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of the flow. Points whose covariance is not finite are left out; others must be symmetric and positive definite, on the sphere across the bearing. A point whose smaller variance is below a millionth of the lower quartile of all has that quartile added: no measurement is so much better than others, and one that says so would decide alone.
+    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of
+    /// the flow. Points whose covariance is not finite are left out; others must be symmetric and positive
+    /// definite, on the sphere across the bearing. A point whose smaller variance is below a millionth of the
+    /// lower quartile of all has that quartile added: no measurement is so much better than others, and one
+    /// that says so would decide alone.
     Covariances(&'a [f64]),
 }
 
@@ -65,9 +69,12 @@ pub enum Placement {
     Start,
 }
 
-/// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a thing that moves by itself.
+/// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a
+/// thing that moves by itself.
 ///
-/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both. Where flow contradicts it beyond chance the status is [`Ambiguous`](super::Status::Ambiguous); of a rotation alone the covariance and the alternative tell.
+/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
+/// Where flow contradicts it beyond chance the status is [`Ambiguous`](super::Status::Ambiguous); of a
+/// rotation alone the covariance and the alternative tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationPrior {
     /// Rotation rate `w`, rad/frame.
@@ -77,7 +84,8 @@ pub struct RotationPrior {
 }
 
 impl RotationPrior {
-    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard deviation about each axis, rad/frame). `None` where the scene's is not known.
+    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard
+    /// deviation about each axis, rad/frame). `None` where the scene's is not known.
     pub fn of_scene(scene: &MotionEstimate, turning: f64) -> Option<Self> {
         Self::beside(scene.motion.rotation, &scene.covariance, turning)
     }
@@ -98,19 +106,26 @@ pub struct MotionOptions {
     pub method: Method,
     /// Whether points that do not obey the motion are found and left out; default: no.
     pub robust: bool,
-    /// Where displacements belong on the plane; default: half way. Bearings and their flow are taken as given.
+    /// Where displacements belong on the plane; default: half way. Bearings and their flow are taken as
+    /// given.
     pub placement: Placement,
     /// Which predictors smooth depths for the weights; default: the better one.
     pub smoother: Smoother,
-    /// Inverse depths for the weights, one for each point, known from elsewhere up to a common factor; points whose value is not finite are left out; default: smoothed from the flow.
+    /// Inverse depths for the weights, one for each point, known from elsewhere up to a common factor; points
+    /// whose value is not finite are left out; default: smoothed from the flow.
     pub weight_depths: Option<Vec<f64>>,
     /// A motion near which the minimum is looked for, instead of everywhere; not with `robust`.
     pub initial: Option<Motion>,
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
-    /// How many points share one error, at least 1: the noise given is so many times their own in variance, so that together they tell no more than they know. What is an outlier, and what chance explains, is judged by their own. Default: 1.
+    /// How many points share one error, at least 1: the noise given is so many times their own in variance,
+    /// so that together they tell no more than they know. What is an outlier, and what chance explains, is
+    /// judged by their own. Default: 1.
     pub shared: Option<f64>,
-    /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the sphere), as those of windowed flow do: the covariance is then that of the sums over points whose errors correlate (`together`), in no direction smaller than that of independent points. Default: not at all.
+    /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the
+    /// sphere), as those of windowed flow do: the covariance is then that of the sums over points whose
+    /// errors correlate (`together`), in no direction smaller than that of independent points. Default: not
+    /// at all.
     pub correlation_length: Option<f64>,
     /// Errors that all flow has in common, as flow from gradients has them. Default: none.
     pub common: CommonErrors,
@@ -211,7 +226,8 @@ impl Flow<'_> {
         }
     }
 
-    /// Whether all covariances that are finite are some; on the sphere only across the bearing, where the flow is.
+    /// Whether all covariances that are finite are some; on the sphere only across the bearing, where the
+    /// flow is.
     fn check_covariances(&self, covariances: &[f64], values: usize) -> Result<()> {
         for (k, given) in covariances.chunks_exact(values).enumerate() {
             let good = match self {

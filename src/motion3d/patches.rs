@@ -1,6 +1,7 @@
 //! Motion from six numbers a patch, flow and Jacobian: three constraints each, where flow alone gives one.
 //!
-//! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum likelihood worse than flow alone, so that they are shrunk.
+//! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum
+//! likelihood worse than flow alone, so that they are shrunk.
 
 mod replicas;
 mod report;
@@ -114,11 +115,15 @@ impl AffinePatches<'_> {
 
 /// The rigid motion that explains the affine flow of patches.
 ///
-/// As [`estimate_motion`](super::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5 patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches. Patches should
-/// be fits over windows of 30 px and more that do not overlap: numbers that share noise must come with covariances that say so. Other minima and opposite directions that no patch behind the camera excludes are told as for points.
+/// As [`estimate_motion`](super::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5
+/// patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches.
+/// Patches should be fits over windows of 30 px and more that do not overlap: numbers that share noise must
+/// come with covariances that say so. Other minima and opposite directions that no patch behind the camera
+/// excludes are told as for points.
 ///
 /// # Errors
-/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`, `rotation_prior`, `shared` and `correlation_length`, which this form does not have.
+/// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`,
+/// `rotation_prior`, `shared` and `correlation_length`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let refuse = |name: &'static str| {
@@ -200,13 +205,15 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     out
 }
 
-/// Patches at different places: those at one tell of no more surfaces, and of no more constraints, than one of less noise.
+/// Patches at different places: those at one tell of no more surfaces, and of no more constraints, than one
+/// of less noise.
 fn places(system: &System, points: &[[f64; 2]]) -> usize {
     let place = |&k: &u32| points[k as usize].map(f64::to_bits);
     system.source.iter().map(place).collect::<HashSet<_>>().len()
 }
 
-/// The minima that are reached from the best directions of the half sphere, both signs each, the cheapest first.
+/// The minima that are reached from the best directions of the half sphere, both signs each, the cheapest
+/// first.
 fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
@@ -244,7 +251,8 @@ fn least_squares(system: &System) -> Option<RotationOnly> {
     Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
-/// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given; their flow is not looked at.
+/// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given;
+/// their flow is not looked at.
 ///
 /// # Errors
 /// As [`motion_bound`](super::motion_bound).

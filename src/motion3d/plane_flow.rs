@@ -1,8 +1,13 @@
 //! The flow of one plane, whatever the motion.
 //!
-//! Points of a plane `nu = n . eta` move by `(u n^t + [w]x) eta` relative to the camera: their flow is `f = G A eta` with a matrix `A` that is known up to a multiple of the unit matrix, eight numbers (H. Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 . eta)`, `a_3` being the last row of `A`: a homography.
+//! Points of a plane `nu = n . eta` move by `(u n^t + [w]x) eta` relative to the camera: their flow is `f = G
+//! A eta` with a matrix `A` that is known up to a multiple of the unit matrix, eight numbers (H.
+//! Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 . eta)`, `a_3` being the last row of
+//! `A`: a homography.
 //!
-//! Whether the flow is a plane's is asked of the flow itself: depths at an estimated motion depart from a plane's by what the motion is off, and by more than their own noise where that is small along the epipolar lines.
+//! Whether the flow is a plane's is asked of the flow itself: depths at an estimated motion depart from a
+//! plane's by what the motion is off, and by more than their own noise where that is small along the epipolar
+//! lines.
 
 use super::observations::{Observations, Row};
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};

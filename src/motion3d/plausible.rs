@@ -1,7 +1,10 @@
 //! Which directions explain the flow as well as the estimate does.
 //!
-//! Two directions leave different components of the noise as residuals: across lines that are turned by `phi` against each other, the difference of `J` has the variance `4 sum sin^2 phi` whatever is true. Where depths are mostly noise, that hides the truth behind a
-//! lower minimum. Two things do not fluctuate so: the estimating equation, which at the true direction is zero but for the noise of its own few unknowns, however wrong its weights; and the depth map, which a wrong motion makes rough.
+//! Two directions leave different components of the noise as residuals: across lines that are turned by `phi`
+//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` whatever is true. Where
+//! depths are mostly noise, that hides the truth behind a lower minimum. Two things do not fluctuate so: the
+//! estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
+//! however wrong its weights; and the depth map, which a wrong motion makes rough.
 
 use super::grid::{at_most, evaluate};
 use super::kernels::{Bilinear, best_rotation, depths, equations, information};
@@ -45,7 +48,9 @@ pub(super) struct Asked {
     angle: f64,
 }
 
-/// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate), explains the flow of `most` points as well as the best of these, depth signs included. A covariance is that of one minimum; a valley of minima shows here.
+/// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate),
+/// explains the flow of `most` points as well as the best of these, depth signs included. A covariance is
+/// that of one minimum; a valley of minima shows here.
 pub(super) fn plausible_beyond(
     observations: &Observations,
     motions: &[Motion],
@@ -98,7 +103,8 @@ pub(super) fn fluctuation(observations: &Observations, one: &Motion, other: &Mot
     2.0 * (0..observations.n).map(turned).sum::<f64>().sqrt()
 }
 
-/// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is consistent with the estimating equation; each with the points as it sees them.
+/// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is
+/// consistent with the estimating equation; each with the points as it sees them.
 pub(super) fn as_likely(known: &[(&Observations, Asked)], doubts: &[(&Observations, Asked)], rng: CounterRng) -> bool {
     let Some((points, _)) = known.first().filter(|_| !doubts.is_empty()) else { return false };
     let mut smoother = DepthSmoother::new(points, Smoother::Auto, rng);
@@ -108,7 +114,9 @@ pub(super) fn as_likely(known: &[(&Observations, Asked)], doubts: &[(&Observatio
     smooth.into_iter().any(|(points, asked)| consistent(points, &asked.motion, &mut smoother))
 }
 
-/// Whether the estimating equation holds at a motion but for chance: of `g = sum W^t e` with weights from smoothed depths, `g^t (sum W^t W)^-1 g` is chi-squared with the two unknowns of the direction, as the rotation is the best.
+/// Whether the estimating equation holds at a motion but for chance: of `g = sum W^t e` with weights from
+/// smoothed depths, `g^t (sum W^t W)^-1 g` is chi-squared with the two unknowns of the direction, as the
+/// rotation is the best.
 fn consistent(observations: &Observations, motion: &Motion, smoother: &mut DepthSmoother) -> bool {
     let tangent = tangents(&motion.u());
     let nu = smoother.smooth(&depths(observations, motion)).nu;

@@ -34,7 +34,8 @@ impl Effort {
     /// To the minimum.
     pub const FULL: Self = Self { steps: 60, tolerance: 1e-10, deviations: 0.0 };
 
-    /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the deviation hardly anything is left.
+    /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the
+    /// deviation hardly anything is left.
     pub const fn of(n: usize) -> Self {
         if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
     }
@@ -54,7 +55,8 @@ impl Minimum {
         Self { motion, tangent, equations: equations(observations, &motion, &tangent, cut) }
     }
 
-    /// The same with all depths of the other sign: `e` and `J` stay, `D` at the depths changes its sign with the axes.
+    /// The same with all depths of the other sign: `e` and `J` stay, `D` at the depths changes its sign with
+    /// the axes.
     pub fn reversed(&self, observations: &Observations) -> Self {
         Self::at(observations, self.motion.reversed(), None)
     }
@@ -62,7 +64,8 @@ impl Minimum {
 
 /// The step that solves the damped equations of `n` points; `None` where they have no solution.
 ///
-/// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they would leave the share `P / H` of the way, and are taken without it.
+/// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they
+/// would leave the share `P / H` of the way, and are taken without it.
 fn step(equations: &Equations, n: usize, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
     let Equations { h, p, gradient, .. } = equations;
     let solved = |matrix: SMatrix<f64, 5, 5>| {
@@ -80,9 +83,11 @@ fn squared_deviations(equations: &Equations, step: &SMatrix<f64, 5, 1>, n: usize
     step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }
 
-/// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along with it.
+/// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along
+/// with it.
 ///
-/// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton steps.
+/// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton
+/// steps.
 pub(super) fn refine(observations: &Observations, start: Motion, cut: Option<f64>, effort: Effort) -> Minimum {
     let mut here = Minimum::at(observations, start, cut);
     let mut damping = 1e-4;
@@ -146,7 +151,8 @@ mod tests {
         assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
     }
 
-    /// Of depths so noisy that their noise is seven tenths of `H`, Gauss-Newton steps would leave as much of the way each.
+    /// Of depths so noisy that their noise is seven tenths of `H`, Gauss-Newton steps would leave as much of
+    /// the way each.
     #[test]
     fn noisy_depths_do_not_shorten_steps() {
         let observations = Scene::oblique(20000, 0.3, 5).observations();

@@ -21,7 +21,8 @@ const RIDGE: f64 = 1e-9;
 /// Noise variance of a prediction that nothing is known for.
 pub(super) const NO_PREDICTION: f64 = 1e30;
 
-/// What a regression needs of a point, by its place in the tree: where it is, its depth and the inverse variance of that.
+/// What a regression needs of a point, by its place in the tree: where it is, its depth and the inverse
+/// variance of that.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Site {
     pub at: [f64; 3],
@@ -147,9 +148,11 @@ impl Kernel<f64> for Regress<'_> {
     }
 }
 
-/// Predicts the depth of each of `asked` (places in the tree) from the `k` nearest of its neighbours, itself left out.
+/// Predicts the depth of each of `asked` (places in the tree) from the `k` nearest of its neighbours, itself
+/// left out.
 ///
-/// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the smoother's weights `l`.
+/// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the
+/// smoother's weights `l`.
 pub(super) fn regress(
     sites: &[Site],
     asked: &[u32],

@@ -44,7 +44,8 @@ pub(super) struct Solution {
 }
 
 impl Solution {
-    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for maximum likelihood's covariance.
+    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
+    /// maximum likelihood's covariance.
     pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
         let minimum = &chosen.minimum;
         let likelihood = Likelihood {
@@ -80,7 +81,8 @@ impl Solution {
         }
     }
 
-    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the weights, which may be wrong, the motion stays.
+    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the
+    /// weights, which may be wrong, the motion stays.
     pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
         let Some(covariance) = self.covariance else { return };
         let from = Told { motion: self.motion, tangent: self.tangent, covariance };
@@ -114,7 +116,8 @@ impl Solution {
         self.common = common;
     }
 
-    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as far as the motion that the flow tells by itself.
+    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as
+    /// far as the motion that the flow tells by itself.
     pub fn contradicted(&mut self, inliers: &Observations) -> bool {
         let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
         let told = if let Some(nu) = &self.smooth {
@@ -193,7 +196,8 @@ pub(super) fn report(
     out
 }
 
-/// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any, else the point's own.
+/// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any,
+/// else the point's own.
 fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) -> Vec<(f64, f64)> {
     let half_way = half_way(inliers, &solution.motion);
     let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
@@ -206,7 +210,8 @@ fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) 
     depths
 }
 
-/// Times to contact with their deviations, by first order from those of the depth and of the motion; and the rate of approach of all inliers together.
+/// Times to contact with their deviations, by first order from those of the depth and of the motion; and the
+/// rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
     let rates = Rates::new(&out.uncertain());
     let likeliest = likeliest(out, inliers, solution);

@@ -11,17 +11,24 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
 pub enum Status {
     /// A motion with its covariance.
     Ok,
-    /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly. Also too few to tell outliers from inliers: from large noise that is not known, or where a tenth of what obeys does so by chance.
+    /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly.
+    /// Also too few to tell outliers from inliers: from large noise that is not known, or where a tenth of
+    /// what obeys does so by chance.
     FewPoints,
     /// Fewer than 5 points (or 2 patches): no motion.
     TooFewPoints,
     /// The flow is that of a rotation, as far as its noise lets tell: `u` is NaN, inverse depths are 0.
     RotationOnly,
-    /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite direction where depths do not exclude it, another minimum, that of other points in a robust search, that of the flow by itself where it contradicts what is known of the rotation.
+    /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite
+    /// direction where depths do not exclude it, another minimum, that of other points in a robust search,
+    /// that of the flow by itself where it contradicts what is known of the rotation.
     Ambiguous,
-    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or directions farther than the covariance has it explain the flow as well.
+    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's
+    /// standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or
+    /// directions farther than the covariance has it explain the flow as well.
     IllConditioned,
-    /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed weights is given.
+    /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed
+    /// weights is given.
     LowSnr,
 }
 
@@ -58,7 +65,8 @@ pub struct Likelihood {
 pub struct Alternative {
     /// The motion.
     pub motion: Motion,
-    /// How much less likely it is, with its depths: in squared units of noise, like `J`; negative where maximum likelihood preferred it and the depths did not.
+    /// How much less likely it is, with its depths: in squared units of noise, like `J`; negative where
+    /// maximum likelihood preferred it and the depths did not.
     pub excess: f64,
 }
 
@@ -91,13 +99,16 @@ pub struct MotionEstimate {
     pub inverse_depth_std: Vec<f64>,
     /// `nu~` (N), the depths in the weights; those of maximum likelihood are `nu^`. NaN for points left out.
     pub inverse_depth_smooth: Vec<f64>,
-    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; empty otherwise. Slopes are per unit of the plane at distance 1.
+    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; empty otherwise. Slopes are per unit of
+    /// the plane at distance 1.
     pub surfaces: Vec<[f64; 3]>,
-    /// Frames to contact (N), `-1 / (nu~ u_z)`: positive when approaching, infinite where there is no approach.
+    /// Frames to contact (N), `-1 / (nu~ u_z)`: positive when approaching, infinite where there is no
+    /// approach.
     pub time_to_contact: Vec<f64>,
     /// Standard deviations of those (N), of the depths and of the motion.
     pub time_to_contact_std: Vec<f64>,
-    /// `nu u_z` of the points together and its standard deviation, 1/frame, weighted by what each point's own flow says: that of one object, or of the scene's mean. Its time to contact is `-1 / rate`.
+    /// `nu u_z` of the points together and its standard deviation, 1/frame, weighted by what each point's own
+    /// flow says: that of one object, or of the scene's mean. Its time to contact is `-1 / rate`.
     pub approach: (f64, f64),
     /// Points that obey the motion (N).
     pub inliers: Vec<bool>,
@@ -160,7 +171,8 @@ impl MotionEstimate {
     }
 }
 
-/// The focus of expansion `K (u / u_z)` with its covariance from that of `(psi, w)` in the axes `tangent` (px, px^2; without a camera on the plane at distance 1); `None` when `|u_z| < 1e-9`.
+/// The focus of expansion `K (u / u_z)` with its covariance from that of `(psi, w)` in the axes `tangent`
+/// (px, px^2; without a camera on the plane at distance 1); `None` when `|u_z| < 1e-9`.
 pub fn focus_of_expansion(
     motion: &Motion,
     tangent: &[[f64; 3]; 2],

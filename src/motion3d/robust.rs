@@ -31,7 +31,8 @@ use strays::Strays;
 pub(super) use unknown::larger;
 pub(super) use whole::one_noise;
 
-/// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be as far.
+/// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be
+/// as far.
 const INLIER: f64 = 3.0;
 
 /// Starts that are refined, and the least angle between them, degrees.
@@ -47,13 +48,15 @@ const GATES: usize = 2;
 /// The share of strays among those that obey from which on they matter for the search.
 const MATTER: f64 = 0.03;
 
-/// From which share on the motions of few points are not known: which of them are strays decides between directions far apart, whose residuals and depths are as likely.
+/// From which share on the motions of few points are not known: which of them are strays decides between
+/// directions far apart, whose residuals and depths are as likely.
 const DOUBT: f64 = 0.1;
 
 /// Fewest points that a motion is found from.
 const LEAST: usize = 5;
 
-/// Two motions of different points of which neither has a tenth of all points more than the other: which is the scene's cannot be told.
+/// Two motions of different points of which neither has a tenth of all points more than the other: which is
+/// the scene's cannot be told.
 const MAJORITY: f64 = 0.1;
 
 /// What residuals that estimate noise are fewer by: the unknowns of a motion.
@@ -62,7 +65,8 @@ const UNKNOWNS: usize = 5;
 /// Below so many points a few of them can agree by chance far better than the noise of all is: see [`whole`].
 const SELECTED: usize = 100;
 
-/// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be sure; the factor between both noises that makes a difference.
+/// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be
+/// sure; the factor between both noises that makes a difference.
 const WORTH: f64 = 4.0;
 const SURE: f64 = 10.0;
 const APART_NOISE: f64 = 1.5;
@@ -79,9 +83,11 @@ pub(super) struct Consensus {
     pub motion: Motion,
     /// Indices among the observations, ascending.
     pub inliers: Vec<u32>,
-    /// Those of them that the motion is to be estimated from: a thing that moves by itself has points that obey by chance, and these pull the same way.
+    /// Those of them that the motion is to be estimated from: a thing that moves by itself has points that
+    /// obey by chance, and these pull the same way.
     pub inner: Vec<u32>,
-    /// Other motions that about as many points obey, and how much more each costs, in squared units of noise; the best first.
+    /// Other motions that about as many points obey, and how much more each costs, in squared units of noise;
+    /// the best first.
     pub rivals: Vec<Rival>,
     /// Whether the points are too few to tell outliers from large noise.
     pub doubtful: bool,
@@ -116,11 +122,13 @@ impl Consensus {
 pub(super) struct Rival {
     pub motion: Motion,
     pub excess: f64,
-    /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is another minimum for the same points.
+    /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is
+    /// another minimum for the same points.
     pub others: bool,
 }
 
-/// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated, and the points are measured in it afterwards.
+/// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated,
+/// and the points are measured in it afterwards.
 pub(super) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let found = obeyed(scaled, rng)?;
     Some(with_doubts(&scaled.observations, found, rng))

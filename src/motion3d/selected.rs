@@ -1,10 +1,12 @@
-//! What a choice of points makes of an estimate: who obeys, what the choice leaves in doubt, what noise that was estimated from it is worth.
+//! What a choice of points makes of an estimate: who obeys, what the choice leaves in doubt, what noise that
+//! was estimated from it is worth.
 
 use super::observations::Observations;
 use super::result::{MotionEstimate, Status};
 use super::robust::{self, Consensus};
 
-/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their own.
+/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their
+/// own.
 pub(super) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
     for &k in &kept.inliers {
         let source = all.source[k as usize] as usize;
@@ -16,10 +18,12 @@ pub(super) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, ke
     found
 }
 
-/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful choice of points and no surer; what
-/// else is told says more.
+/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that
+/// nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
+/// choice of points and no surer; what else is told says more.
 ///
-/// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of them.
+/// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of
+/// them.
 pub(super) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
     let doubtful = kept.doubtful;
     let few = match found.status {
@@ -31,7 +35,9 @@ pub(super) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensu
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 
-/// What a covariance that is a multiple of an estimated variance is to be multiplied with: of errors in units of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W. Gosset 1908).
+/// What a covariance that is a multiple of an estimated variance is to be multiplied with: of errors in units
+/// of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W.
+/// Gosset 1908).
 ///
 /// Residuals cut off as those of outliers tell less of the variance than all would.
 pub(super) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
@@ -40,5 +46,6 @@ pub(super) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
     free / (free - 2.0)
 }
 
-/// The information about a variance that is left where residuals beyond 2.5 deviations are cut off and the points chosen by it: 0.69 by the cut alone.
+/// The information about a variance that is left where residuals beyond 2.5 deviations are cut off and the
+/// points chosen by it: 0.69 by the cut alone.
 const TOLD_BY_CUT: f64 = 0.6;

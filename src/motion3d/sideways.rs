@@ -1,25 +1,30 @@
-//! A translation along the image plane without a rotation: section 5 of the paper, where one angle is unknown and everything has a closed form.
+//! A translation along the image plane without a rotation: section 5 of the paper, where one angle is unknown
+//! and everything has a closed form.
 //!
-//! On the plane at distance 1 with `u_z = 0`, `w = 0` and `u = (cos psi, sin psi, 0)` the flow is `f_k = nu_k u` with noise. Any weights `mean + a (m_k - mean)` of the parts `m_k = f_k . u` along
-//! the direction make the estimating equation `sum weight_k (f_k across u) = 0` the principal axis of
+//! On the plane at distance 1 with `u_z = 0`, `w = 0` and `u = (cos psi, sin psi, 0)` the flow is `f_k = nu_k
+//! u` with noise. Any weights `mean + a (m_k - mean)` of the parts `m_k = f_k . u` along the direction make
+//! the estimating equation `sum weight_k (f_k across u) = 0` the principal axis of
 //!
 //! ```text
 //! Q = F F^t / n + a (sum f f^t - F F^t / n),     F = sum f
 //! ```
 //!
-//! with `a = 1` for maximum likelihood (28), `a = 0` for weights of 1 (30) and `a = tau^2 / (tau^2 + sigma^2)`, `tau^2` the scatter of the depths, for shrunk ones. The variance is
-//! `sigma^2 (mean^2 + a^2 (tau^2 + sigma^2)) / (n (mean^2 + a tau^2)^2)`, which is (29), (31) and the least of all `a`.
+//! with `a = 1` for maximum likelihood (28), `a = 0` for weights of 1 (30) and `a = tau^2 / (tau^2 +
+//! sigma^2)`, `tau^2` the scatter of the depths, for shrunk ones. The variance is `sigma^2 (mean^2 + a^2
+//! (tau^2 + sigma^2)) / (n (mean^2 + a tau^2)^2)`, which is (29), (31) and the least of all `a`.
 
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2, Vector2};
 
-/// Times that the scatter of depths is asked along the direction found with the one before: it converges at once unless noise hides it.
+/// Times that the scatter of depths is asked along the direction found with the one before: it converges at
+/// once unless noise hides it.
 const ROUNDS: usize = 8;
 
 /// What the flow across the direction is weighed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SidewaysWeights {
-    /// Depths drawn to their mean by what noise leaves of their scatter: never worse than either of the others.
+    /// Depths drawn to their mean by what noise leaves of their scatter: never worse than either of the
+    /// others.
     #[default]
     Shrunk,
     /// Each point's own depth: maximum likelihood (28), the principal axis of `sum f f^t`.
@@ -39,22 +44,26 @@ pub struct SidewaysBound {
     pub ones: f64,
     /// Shrunk weights `sigma^2 / (n [mean^2 + var^2 / (var + sigma^2)])`.
     pub shrunk: f64,
-    /// Noise above which weights of 1 beat maximum likelihood, `sqrt(m2) std(nu) / |mean nu|`, in the unit of the flow.
+    /// Noise above which weights of 1 beat maximum likelihood, `sqrt(m2) std(nu) / |mean nu|`, in the unit of
+    /// the flow.
     pub crossover: f64,
 }
 
 /// A direction along the image plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SidewaysEstimate {
-    /// `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; depths are positive, most of them.
+    /// `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; depths are positive,
+    /// most of them.
     pub angle: f64,
-    /// Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less their noise; infinite where noise explains all flow.
+    /// Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less
+    /// their noise; infinite where noise explains all flow.
     pub variance: f64,
     /// The Cramér-Rao bound with the same moments, rad^2.
     pub bound: f64,
     /// Standard deviation of each component of the flow: as given, else estimated.
     pub sigma: f64,
-    /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their deviation is `sigma`. NaN where the flow is not finite.
+    /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their deviation is
+    /// `sigma`. NaN where the flow is not finite.
     pub inverse_depth: Vec<f64>,
 }
 
@@ -92,7 +101,8 @@ impl Moments {
         }
     }
 
-    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`; infinite where they see nothing.
+    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`; infinite where
+    /// they see nothing.
     fn variance(&self, a: f64, noise: f64) -> f64 {
         let slope = self.squared_mean + a * self.scatter;
         if slope == 0.0 {
@@ -176,13 +186,18 @@ fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
     if plus <= minus { axis } else { -axis }
 }
 
-/// The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow at N points wherever they are.
+/// The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow
+/// at N points wherever they are.
 ///
-/// `flow`: per frame on the plane at distance 1, or px/frame of a camera with square pixels; each component has the deviation `sigma`, which is estimated from the flow across the direction where
-/// it is `None`. Flow that is not finite is left out. (29) and (31) are of first order: they hold while they are small beside a radian.
+/// `flow`: per frame on the plane at distance 1, or px/frame of a camera with square pixels; each component
+/// has the deviation `sigma`, which is estimated from the flow across the direction where it is `None`. Flow
+/// that is not finite is left out. (29) and (31) are of first order: they hold while they are small beside a
+/// radian.
 ///
 /// # Errors
-/// [`Error::Argument`] for a `sigma` that is none and for a `flow` of fewer than two finite vectors (one where `sigma` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum, is zero.
+/// [`Error::Argument`] for a `sigma` that is none and for a `flow` of fewer than two finite vectors (one
+/// where `sigma` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum, is
+/// zero.
 pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: SidewaysWeights) -> Result<SidewaysEstimate> {
     sigma.map_or(Ok(()), check)?;
     let sums = Sums::of(flow);
@@ -214,12 +229,15 @@ pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: Sideway
     })
 }
 
-/// What any estimator, and each of those of [`estimate_sideways`], makes of points with these true inverse depths: for the design of an experiment.
+/// What any estimator, and each of those of [`estimate_sideways`], makes of points with these true inverse
+/// depths: for the design of an experiment.
 ///
-/// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out. `sigma`: deviation of each component of the flow, in the same unit.
+/// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out. `sigma`:
+/// deviation of each component of the flow, in the same unit.
 ///
 /// # Errors
-/// [`Error::Argument`] for a `sigma` that is none, and an `inverse_depth` without a finite value; [`Error::NotObservable`] when all are zero.
+/// [`Error::Argument`] for a `sigma` that is none, and an `inverse_depth` without a finite value;
+/// [`Error::NotObservable`] when all are zero.
 pub fn sideways_bound(inverse_depth: &[f64], sigma: f64) -> Result<SidewaysBound> {
     check(sigma)?;
     let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();

@@ -1,7 +1,9 @@
 //! How surely the depths tell the sign of a translation.
 //!
-//! A motion and its opposite explain the parts of the flow across the epipolar lines equally well: only depths, which must be positive, decide. In a narrow field a rotation adds nearly the same to all depths, and turns them round
-//! at hardly any cost. So each sign is given the rotation and the direction that suit it best.
+//! A motion and its opposite explain the parts of the flow across the epipolar lines equally well: only
+//! depths, which must be positive, decide. In a narrow field a rotation adds nearly the same to all depths,
+//! and turns them round at hardly any cost. So each sign is given the rotation and the direction that suit it
+//! best.
 
 use super::grid::{SEARCHED, sample};
 use super::kernels::{FrontEquations, front_equations};
@@ -48,7 +50,8 @@ fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
     (motion, here.cost)
 }
 
-/// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared units of noise; `None` where the depths exclude it.
+/// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared
+/// units of noise; `None` where the depths exclude it.
 pub(super) fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<(Motion, f64)> {
     let searched = if observations.n > SEARCHED {
         Cow::Owned(observations.subset(&sample(observations.n, SEARCHED, rng)))

@@ -1,4 +1,5 @@
-//! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as far as that can be trusted.
+//! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as
+//! far as that can be trusted.
 
 use super::grid::sample;
 use super::kernels::Depths;
@@ -45,7 +46,8 @@ struct Fitted {
     loss: f64,
 }
 
-/// Depths for the weights, how much of each point's own is in them, and their posterior variances; as long as the planes.
+/// Depths for the weights, how much of each point's own is in them, and their posterior variances; as long as
+/// the planes.
 #[derive(Debug, Clone)]
 pub(super) struct Smoothed {
     pub nu: Vec<f64>,
@@ -142,7 +144,8 @@ impl DepthSmoother {
         Fitted { kind: Kind::Prior, prediction, excess, loss }
     }
 
-    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 / tot, 25)]`. Whatever smooths the weights, this looks at the better predictor.
+    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 /
+    /// tot, 25)]`. Whatever smooths the weights, this looks at the better predictor.
     pub fn cost(&self, depths: &Depths) -> f64 {
         let sites = self.sites(depths);
         let fitted = self.best(&sites, Smoother::Auto);

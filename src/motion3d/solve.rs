@@ -30,7 +30,8 @@ const SMOOTHED: usize = 30;
 /// Times that a minimum is chosen anew once its own rotation is taken out of displacements.
 const CHOICES: usize = 4;
 
-/// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by which a motion is another one than that whose rotation is taken out.
+/// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by
+/// which a motion is another one than that whose rotation is taken out.
 const AGAIN: usize = 2;
 const ASTRAY: f64 = 1.0;
 
@@ -115,7 +116,8 @@ impl Task<'_, '_> {
         }
     }
 
-    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves of the flow. (Of all points in known noise that was asked before any motion was looked for.)
+    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves
+    /// of the flow. (Of all points in known noise that was asked before any motion was looked for.)
     fn without_translation(
         &self,
         scaled: &mut Scaled,
@@ -153,14 +155,16 @@ impl Task<'_, '_> {
             settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
             (candidates, made) = self.preferred(inliers, &found);
         }
-        // Each of two is preferred with the rotation of the other taken out: that whose own is out now is told.
+        // Each of two is preferred with the rotation of the other taken out: that whose own is out now is
+        // told.
         if let Some(own) = candidates.iter().position(|other| !matters(self.intake, inliers, other.motion())) {
             candidates[..=own].rotate_right(1);
         }
         (candidates, made)
     }
 
-    /// Solves once more with the rotation taken out of the minimum that smoothed weights preferred to the first of the `candidates`.
+    /// Solves once more with the rotation taken out of the minimum that smoothed weights preferred to the
+    /// first of the `candidates`.
     fn solved_there(
         &self,
         scaled: &mut Scaled,
@@ -191,7 +195,8 @@ impl Task<'_, '_> {
         DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
     }
 
-    /// Maximum likelihood's motion or that of the smoothed weights, which are asked as well where maximum likelihood's theory does not hold.
+    /// Maximum likelihood's motion or that of the smoothed weights, which are asked as well where maximum
+    /// likelihood's theory does not hold.
     fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solved {
         let chosen = candidates[0];
         let wanted = match self.options.method {
@@ -236,7 +241,8 @@ impl Task<'_, '_> {
         Solved { solution, deviation, low, told, undecided }
     }
 
-    /// Takes into account what a linear theory of independent points of known noise that all obey leaves out. `cost`: what maximum likelihood leaves.
+    /// Takes into account what a linear theory of independent points of known noise that all obey leaves out.
+    /// `cost`: what maximum likelihood leaves.
     fn widen(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
         if let Some(known) = self.known {
             solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
@@ -256,7 +262,9 @@ impl Task<'_, '_> {
     }
 }
 
-/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with its own; or one that is where depths behind the camera count only as far as noise does not explain them: of depths that are hardly any, half are behind it.
+/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with
+/// its own; or one that is where depths behind the camera count only as far as noise does not explain them:
+/// of depths that are hardly any, half are behind it.
 fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternative> {
     let first = &candidates[0];
     let preferred = candidates.get(1).filter(|other| other.cost < first.cost);
@@ -267,13 +275,16 @@ fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternativ
     Some(Alternative { motion: *other.motion(), excess: other.cost - first.cost })
 }
 
-/// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it: whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was missed), the motion is off by as much (R. Birge 1932).
+/// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it:
+/// whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was
+/// missed), the motion is off by as much (R. Birge 1932).
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
     let free = inliers.n.saturating_sub(5) as f64 / inliers.shared;
     if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
 }
 
-/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may be true.
+/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may
+/// be true.
 fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
     let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
     let deviation = deviation.max(direction_deviation(&best.covariance));
@@ -293,7 +304,8 @@ fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::of(inliers.n))).collect())
 }
 
-/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied with.
+/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied
+/// with.
 fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
     let before = scaled.sigma;
     scaled.take(sigma);

@@ -42,11 +42,13 @@ const FEW: usize = 1000;
 /// Deviations of a standard normal that a share of 0.001 lies beyond.
 const RARE: f64 = 3.0902;
 
-/// Standard deviations by which the best of all directions explains pure noise better than any one would, and a margin; what few points add to that.
+/// Standard deviations by which the best of all directions explains pure noise better than any one would, and
+/// a margin; what few points add to that.
 const SEARCHED: f64 = 5.5;
 const FEW_POINTS: f64 = 12.0;
 
-/// How far, in standard deviations, a chi-squared value of `degrees` degrees of freedom lies from its expectation (E. Wilson, M. Hilferty 1931: its cube root is nearly normal).
+/// How far, in standard deviations, a chi-squared value of `degrees` degrees of freedom lies from its
+/// expectation (E. Wilson, M. Hilferty 1931: its cube root is nearly normal).
 pub(super) fn chi2_deviation(chi2: f64, degrees: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees);
     ((chi2 / degrees).cbrt() - (1.0 - spread)) / spread.sqrt()
@@ -57,7 +59,8 @@ pub(super) fn by_chance(chi2: f64, degrees: f64) -> bool {
     chi2_deviation(chi2, degrees) < RARE
 }
 
-/// The rotation that explains the flow best without a translation; `None` where the points do not determine it.
+/// The rotation that explains the flow best without a translation; `None` where the points do not determine
+/// it.
 pub(super) fn rotation_only(observations: &Observations) -> Option<RotationOnly> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     let plane = |p: usize| observations.plane(p);
@@ -108,7 +111,8 @@ pub(super) fn turning(observations: &Observations) -> Option<RotationOnly> {
 
 /// The same where the noise is to be estimated: `cost` is what the best motion leaves of the flow.
 ///
-/// If there were no translation, that would take no more away than the same share of any noise, and what the choice of a direction takes.
+/// If there were no translation, that would take no more away than the same share of any noise, and what the
+/// choice of a direction takes.
 pub(super) fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
     let rotation = rotation_only(observations)?;
     let n = observations.n as f64;
@@ -120,17 +124,21 @@ pub(super) fn turning_in_unknown_noise(observations: &Observations, cost: f64) -
     (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
-/// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n| u`.
+/// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n|
+/// u`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Twin {
     pub motion: Motion,
-    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a known rotation.
+    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a
+    /// known rotation.
     pub behind: f64,
 }
 
-/// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is not, or where both motions are the same.
+/// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is
+/// not, or where both motions are the same.
 ///
-/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate; `unknown`: the noise is what the motion leaves.
+/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate; `unknown`:
+/// the noise is what the motion leaves.
 pub(super) fn twin(
     intake: &Intake<'_>,
     observations: &Observations,
@@ -138,7 +146,8 @@ pub(super) fn twin(
     distinct: f64,
     unknown: bool,
 ) -> Option<Twin> {
-    // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much more than one alone.
+    // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much
+    // more than one alone.
     let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
     let fits = |plane: &PlaneFlow| chi2_deviation(plane.chi2, plane.free / observations.shared) < usual * RARE;
     // What is far from a plane is so for few points already.
@@ -178,7 +187,8 @@ pub(super) fn twin(
     (angle > distinct).then_some(better)
 }
 
-/// A point's `eta`, where `nu = n . eta` holds for a plane. Half way along a displacement it is the picture of the point half way, which a displacement that changes the depth has at `m + nu^2 t_z / 4 G(m) t`.
+/// A point's `eta`, where `nu = n . eta` holds for a plane. Half way along a displacement it is the picture
+/// of the point half way, which a displacement that changes the depth has at `m + nu^2 t_z / 4 G(m) t`.
 fn place(observations: &Observations, motion: &Motion, k: usize, nu: f64) -> Vector3<f64> {
     let [x, y, z] = observations.position[k];
     if observations.spherical {
@@ -190,7 +200,8 @@ fn place(observations: &Observations, motion: &Motion, k: usize, nu: f64) -> Vec
     Vector3::new(x + along.x, y + along.y, 1.0)
 }
 
-/// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken out, where another one was.
+/// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken
+/// out, where another one was.
 fn other_motion<'a>(
     intake: &Intake<'_>,
     observations: &'a Observations,
@@ -215,7 +226,8 @@ fn other_motion<'a>(
     Some((other, Cow::Owned(seen)))
 }
 
-/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the motion would have it: all depths together tell that with less certainty.
+/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the
+/// motion would have it: all depths together tell that with less certainty.
 ///
 /// `rest`: what a plane leaves of each depth.
 fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {

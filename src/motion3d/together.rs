@@ -1,7 +1,10 @@
 //! What errors that go together over some distance do to a covariance.
 //!
-//! Sums over points that are taken for independent make the covariance too small where neighbours err alike. With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the covariance
-//! `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows agree, so that points which decide alone are hardly touched. How far errors go together beyond the length that is told, and how large they are, the residuals tell ([`Errors`]).
+//! Sums over points that are taken for independent make the covariance too small where neighbours err alike.
+//! With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the
+//! covariance `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows
+//! agree, so that points which decide alone are hardly touched. How far errors go together beyond the length
+//! that is told, and how large they are, the residuals tell ([`Errors`]).
 
 mod errors;
 
@@ -13,7 +16,8 @@ use super::options::Flow;
 use errors::{Errors, Neighbourhood};
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, SymmetricEigen, Vector3};
 
-/// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows stop sharing pixels, the rest over so many correlation lengths.
+/// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows
+/// stop sharing pixels, the rest over so many correlation lengths.
 const QUICK: f64 = 0.4;
 const TAIL: f64 = 3.75;
 
@@ -22,12 +26,14 @@ const REACH: f64 = 15.0;
 
 type Vector5 = SMatrix<f64, 5, 1>;
 
-/// Correlation of the errors of windowed flow at a distance, in correlation lengths: `0.4 exp(-d^2 / 4) + 0.6 exp(-d / 3.75)`.
+/// Correlation of the errors of windowed flow at a distance, in correlation lengths: `0.4 exp(-d^2 / 4) + 0.6
+/// exp(-d / 3.75)`.
 fn correlation(distance: f64) -> f64 {
     QUICK * (-0.25 * distance * distance).exp() + (1.0 - QUICK) * (-distance / TAIL).exp()
 }
 
-/// The area over which errors are one, `int rho`, in squared correlation lengths: sums over larger areas err as if so much of it were one point.
+/// The area over which errors are one, `int rho`, in squared correlation lengths: sums over larger areas err
+/// as if so much of it were one point.
 pub(super) fn area() -> f64 {
     std::f64::consts::PI * (4.0 * QUICK + 2.0 * (1.0 - QUICK) * TAIL * TAIL)
 }
@@ -40,9 +46,11 @@ pub(super) struct Weighted<'a> {
     pub nu: &'a [f64],
 }
 
-/// The covariance where errors go together over `length`, in the unit of the points: in no direction smaller than `covariance`, which takes the points for independent.
+/// The covariance where errors go together over `length`, in the unit of the points: in no direction smaller
+/// than `covariance`, which takes the points for independent.
 ///
-/// From `covariance = X B X` with `B = sum W^t W` follows the `X` that the equations' errors are multiplied with: the geometric mean of the covariance and `B^-1`.
+/// From `covariance = X B X` with `B = sum W^t W` follows the `X` that the equations' errors are multiplied
+/// with: the geometric mean of the covariance and `B^-1`.
 pub(super) fn together(
     covariance: &Matrix5,
     inliers: &Observations,
@@ -90,7 +98,8 @@ fn positive(matrix: &Matrix5) -> Matrix5 {
     eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose()
 }
 
-/// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told has too much for each point's own where several share one error.
+/// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told
+/// has too much for each point's own where several share one error.
 fn excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
     points.different(errors.stretch) * errors.variance + points.squares() * (errors.variance - 1.0)
 }

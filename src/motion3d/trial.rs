@@ -13,7 +13,8 @@ use super::smoothing::DepthSmoother;
 /// Most minima from which smoothed weights are tried.
 const TRIED: usize = 3;
 
-/// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)` are as likely.
+/// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
+/// are as likely.
 const UNDECIDED: f64 = 1.5;
 
 /// Solutions nearer than so many deviations are one.
@@ -25,8 +26,9 @@ pub(super) struct Trial {
     pub undecided: Option<Alternative>,
 }
 
-/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a
-/// motion is easier to judge.
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum,
+/// whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a motion is
+/// easier to judge.
 pub(super) fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,

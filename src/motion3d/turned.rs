@@ -1,21 +1,29 @@
 //! Displacements over a whole frame with its rotation taken out, so that what is left is exact.
 //!
-//! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Turned to the camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a translation is left:
+//! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Turned to the
+//! camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a
+//! translation is left:
 //!
 //! ```text
 //! X_2' = X_1' + t,    t = V' u,    V' = int exp(s [w]x) ds from -1/2 to 1/2 = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,   a = |w|
 //! ```
 //!
-//! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and `eta_2'`, lie on a line through the epipole, and with `nu = 1 / Z_2'`
+//! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and
+//! `eta_2'`, lie on a line through the epipole, and with `nu = 1 / Z_2'`
 //!
 //! ```text
 //! eta_2' - eta_1' = nu G(eta_1') t        exactly, however long the displacement
 //! ```
 //!
-//! A rotation that is `d` more than the one that was taken out adds `R V' d` across the line to first order, with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends, as `exp([w + d]x) = exp([w]x / 2) exp([V' d]x) exp([w]x / 2)`. So the rows `G(eta_1') V'`, `R V'` with the flow `eta_2' - eta_1' + R V' w` (and `V' w = w`)
-//! have the same unknowns `(u, w)` as those of instantaneous flow, and are exact where the rotation taken out is the motion's own.
+//! A rotation that is `d` more than the one that was taken out adds `R V' d` across the line to first order,
+//! with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends, as `exp([w + d]x) = exp([w]x / 2)
+//! exp([V' d]x) exp([w]x / 2)`. So the rows `G(eta_1') V'`, `R V'` with the flow `eta_2' - eta_1' + R V' w`
+//! (and `V' w = w`) have the same unknowns `(u, w)` as those of instantaneous flow, and are exact where the
+//! rotation taken out is the motion's own.
 //!
-//! At the middle the same holds, with `nu = 2 / (Z_1' + Z_2')`; but there the noise of the second view's point is in `m`, too, and the residual across the line is its distance from the epipolar line times `2 Z_2' / (Z_1' + Z_2')`: a motion that takes all depths far away would make any flow fit.
+//! At the middle the same holds, with `nu = 2 / (Z_1' + Z_2')`; but there the noise of the second view's
+//! point is in `m`, too, and the residual across the line is its distance from the epipolar line times `2
+//! Z_2' / (Z_1' + Z_2')`: a motion that takes all depths far away would make any flow fit.
 
 use super::motion::{Motion, Rows, cross_matrix};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
@@ -99,9 +107,12 @@ impl HalfTurn {
         if towards.iter().all(|value| value.is_finite()) { Self { towards, ..turn } } else { turn }
     }
 
-    /// The rows of `w` for a displacement `left` from `from` with the rows `g` of `u`: at its middle, times `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which its depth changes them.
+    /// The rows of `w` for a displacement `left` from `from` with the rows `g` of `u`: at its middle, times
+    /// `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which its depth changes them.
     ///
-    /// Of the displacement only what lies along the epipolar line of the direction that is known counts: what is across is the noise of the residual, and rows that go with it would not leave the sum of their products zero. Depths that noise has change the rows rather by less than by far too much.
+    /// Of the displacement only what lies along the epipolar line of the direction that is known counts: what
+    /// is across is the noise of the residual, and rows that go with it would not leave the sum of their
+    /// products zero. Depths that noise has change the rows rather by less than by far too much.
     fn turning(&self, from: &Vector2<f64>, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> Matrix2x3<f64> {
         let t = g * self.towards;
         let square = t.norm_squared();
@@ -112,7 +123,8 @@ impl HalfTurn {
         Rows::plane((from + 0.5 * way).into()).r * (1.0 - change)
     }
 
-    /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation; `None` where that leads behind the camera.
+    /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation;
+    /// `None` where that leads behind the camera.
     pub fn out_of(&self, first: [f64; 2], second: [f64; 2]) -> Option<Turned> {
         let (from, at_first) = pictured(&self.half, first)?;
         let (to, spread) = pictured(&self.half.transpose(), second)?;
@@ -124,7 +136,8 @@ impl HalfTurn {
         Some(Turned { middle, rows, left, flow, spread, first: at_first })
     }
 
-    /// The displacement over the whole frame of a point of the first view, on the plane at distance 1, whose inverse depth half way in time is `nu`, under the translation `u`; NaN behind the camera.
+    /// The displacement over the whole frame of a point of the first view, on the plane at distance 1, whose
+    /// inverse depth half way in time is `nu`, under the translation `u`; NaN behind the camera.
     ///
     /// With `c = int exp(s [w]x) u ds` from 0 to 1/2 the depth half way is `Z (exp([w]x / 2) eta)_z + c_z`.
     pub fn displacement(&self, u: &Vector3<f64>, [x, y]: [f64; 2], nu: f64) -> Vector2<f64> {
@@ -154,7 +167,9 @@ impl HalfTurn {
 /// From inverse depths in rows that a rotation was taken out of to those half way in time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct HalfWay {
-    /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`: `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2 + (1 - cos(a / 2)) / a^2 (w x u)`.
+    /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`:
+    /// `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2
+    /// + (1 - cos(a / 2)) / a^2 (w x u)`.
     ahead: f64,
 }
 

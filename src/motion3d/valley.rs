@@ -1,8 +1,12 @@
 //! What a covariance leaves out where the direction is known to a large share of the field only.
 //!
-//! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with them what the points tell, change: an estimate that is off may seem to know the motion much better than one that is right. So the confidence
-//! interval of that one unknown is looked for where it ends: where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the place only, not an estimate there).
-//! The deviation that has these ends is told, with the bend of the valley that they show, and with what the other unknowns are known to there.
+//! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with
+//! them what the points tell, change: an estimate that is off may seem to know the motion much better than
+//! one that is right. So the confidence interval of that one unknown is looked for where it ends: where the
+//! estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by as much as
+//! chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the place only,
+//! not an estimate there). The deviation that has these ends is told, with the bend of the valley that they
+//! show, and with what the other unknowns are known to there.
 
 use super::covariance::{Matrix5, direction_block, direction_deviation, inverse};
 use super::departure::among;
@@ -12,7 +16,8 @@ use super::motion::Motion;
 use super::observations::Observations;
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
-/// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where the epipole may lie among the points.
+/// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where
+/// the epipole may lie among the points.
 const STRAIGHT: f64 = 0.08;
 const STRAIGHT_AMONG: f64 = 0.03;
 
@@ -22,7 +27,8 @@ const ROUND: f64 = 6.0;
 /// The 0.95 quantile of chi squared with one degree of freedom.
 const END: f64 = 3.841;
 
-/// Most places that an end is looked for at, how near its square deviation is to be, and the longest step from one to the next.
+/// Most places that an end is looked for at, how near its square deviation is to be, and the longest step
+/// from one to the next.
 const PLACES: usize = 12;
 const NEAR: f64 = 0.1;
 const LONGEST: f64 = 2.0;
@@ -30,7 +36,8 @@ const LONGEST: f64 = 2.0;
 /// The farthest that is looked, rad: farther the direction is not known.
 const FARTHEST: f64 = 1.5;
 
-/// The direction's deviation as a share of the field beyond which no covariance tells the shape of the valley, whose every bend counts.
+/// The direction's deviation as a share of the field beyond which no covariance tells the shape of the
+/// valley, whose every bend counts.
 const BEYOND: f64 = 1.5;
 
 /// Most steps towards the valley's floor, and the length of one that is the last, rad.
@@ -53,7 +60,8 @@ pub(super) struct Valley<'a> {
     pub tangent: &'a Matrix2x3<f64>,
 }
 
-/// Where a valley is gone along from: the axes, the first of which is the valley's, the line that the others follow by the covariance, and what damps weights near the epipole.
+/// Where a valley is gone along from: the axes, the first of which is the valley's, the line that the others
+/// follow by the covariance, and what damps weights near the epipole.
 struct Course<'a> {
     axes: &'a Matrix2x3<f64>,
     slope: Vector4,
@@ -71,7 +79,8 @@ struct End {
 }
 
 impl Valley<'_> {
-    /// How many axes of the direction, the one that is known least first, have a covariance that the theory at the estimate does not tell.
+    /// How many axes of the direction, the one that is known least first, have a covariance that the theory
+    /// at the estimate does not tell.
     pub fn bent(&self, covariance: &Matrix5) -> usize {
         let deviation = direction_deviation(covariance);
         let share = deviation.to_radians() / spread(&self.observations.site);
@@ -89,7 +98,9 @@ impl Valley<'_> {
         }
     }
 
-    /// The covariance with what a curved and widening valley adds; the same where the direction is known well beside the field. `weights`: the depths that weigh the equations at a motion. And whether that tells the valley: it has ends, and is not so long that a covariance has none of its shape.
+    /// The covariance with what a curved and widening valley adds; the same where the direction is known well
+    /// beside the field. `weights`: the depths that weigh the equations at a motion. And whether that tells
+    /// the valley: it has ends, and is not so long that a covariance has none of its shape.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
         let (mut out, mut told) = (*covariance, true);
@@ -103,7 +114,8 @@ impl Valley<'_> {
         (out, told && (axes == 0 || share < BEYOND))
     }
 
-    /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors the one with the larger value is number 0. And how many ends were found.
+    /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors
+    /// the one with the larger value is number 0. And how many ends were found.
     fn along(
         &self,
         so_far: &Matrix5,
@@ -193,7 +205,8 @@ impl Valley<'_> {
         self.motion.u() + axes.transpose() * Vector2::new(psi, across)
     }
 
-    /// The other unknowns and the score, chi squared with one degree of freedom, where the direction is off by `psi`.
+    /// The other unknowns and the score, chi squared with one degree of freedom, where the direction is off
+    /// by `psi`.
     fn at(
         &self,
         &Course { axes, damped, .. }: &Course<'_>,
@@ -201,7 +214,8 @@ impl Valley<'_> {
         guess: Vector4,
         weights: &mut impl FnMut(&Motion) -> Vec<f64>,
     ) -> Option<(End, f64)> {
-        // Of any length: the equation's root does not depend on that, and so is solved by Newton's steps as it stands.
+        // Of any length: the equation's root does not depend on that, and so is solved by Newton's steps as
+        // it stands.
         let moved = |rest: &Vector4| {
             let turn = Vector3::new(rest[1], rest[2], rest[3]);
             Motion::of(&self.off(axes, psi, rest[0]), &(self.motion.w() + turn))

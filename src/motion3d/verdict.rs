@@ -23,14 +23,16 @@ const FEW: usize = 12;
 /// Standard deviation of the direction, degrees, beyond which it is not known.
 pub(super) const WIDE: f64 = 20.0;
 
-/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are [`SPACING`] degrees apart, half of that from one of them.
+/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are
+/// [`SPACING`] degrees apart, half of that from one of them.
 pub(super) const FAR: f64 = 4.0;
 pub(super) const SPACING: f64 = 4.0;
 
 /// The same in the estimate's own deviations, for directions that the smoothed weights do not exclude.
 const CONSISTENT: f64 = 3.0;
 
-/// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger still, it is the valley that is looked for.
+/// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger
+/// still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
 
 /// Most points that are asked again where few leave a doubt.
@@ -42,7 +44,8 @@ const BLIND: f64 = 20.0;
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
 
-/// Least eigenvalue of the information, relative to what points all over the screen would give, that is not rounding.
+/// Least eigenvalue of the information, relative to what points all over the screen would give, that is not
+/// rounding.
 const DETERMINED: f64 = 1e-12;
 
 /// What else speaks for or against a motion.
@@ -148,10 +151,13 @@ fn planar(
     true
 }
 
-/// Whether directions explain the flow as well as the estimate that are farther than the covariance has it: in a valley that bends or widens, that of its lowest point tells too little.
+/// Whether directions explain the flow as well as the estimate that are farther than the covariance has it:
+/// in a valley that bends or widens, that of its lowest point tells too little.
 ///
-/// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked at; of the points that the search sees they are that much larger. Where few of many points leave a doubt, [`ASKED_AGAIN`] of them are asked: with noisy depths the
-/// deviation of the few grows faster than by the root of their number.
+/// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked
+/// at; of the points that the search sees they are that much larger. Where few of many points leave a doubt,
+/// [`ASKED_AGAIN`] of them are asked: with noisy depths the deviation of the few grows faster than by the
+/// root of their number.
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
@@ -186,7 +192,8 @@ fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
     }
 }
 
-/// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the epipole, do not, whatever their noise seems to add.
+/// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the
+/// epipole, do not, whatever their noise seems to add.
 pub(super) fn determined(observations: &Observations, motion: &Motion) -> bool {
     let tangent = tangents(&motion.u());
     let h = equations(observations, motion, &tangent, None).h;

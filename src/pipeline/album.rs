@@ -26,7 +26,8 @@ enum Place {
     Film(TableTarget, Option<FilmWriter>),
 }
 
-/// Whether a path names a film, and not a folder. Other files than films are not written, and a folder that looks like one is not made by mistake.
+/// Whether a path names a film, and not a folder. Other files than films are not written, and a folder that
+/// looks like one is not made by mistake.
 fn is_film(path: &Path, argument: &'static str) -> Result<bool> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m")) {
         return Ok(true);
@@ -46,7 +47,8 @@ fn is_film(path: &Path, argument: &'static str) -> Result<bool> {
 }
 
 impl Album {
-    /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a film of `frame_rate` frames per second.
+    /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a film of `frame_rate`
+    /// frames per second.
     ///
     /// Errors name `argument`.
     pub fn create(path: &Path, stem: &str, argument: &'static str, frame_rate: f64) -> Result<Self> {
@@ -111,8 +113,9 @@ impl Album {
         Ok(())
     }
 
-    /// A film gets its name when the run is complete; what there is of one that was stopped is kept as `name.partial.y4m`. Pictures of an earlier run are replaced, all of them, when the run
-    /// is complete; those of one that was stopped are kept in `name.partial` beside them.
+    /// A film gets its name when the run is complete; what there is of one that was stopped is kept as
+    /// `name.partial.y4m`. Pictures of an earlier run are replaced, all of them, when the run is complete;
+    /// those of one that was stopped are kept in `name.partial` beside them.
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
         let any = self.written > 0;
         match &mut self.place {
@@ -150,7 +153,8 @@ fn earlier(folder: &Path, stem: &str) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).filter(ours).collect()
 }
 
-/// Pictures that take the place of earlier ones: they wait in a folder of their own inside the other, which goes when this is dropped.
+/// Pictures that take the place of earlier ones: they wait in a folder of their own inside the other, which
+/// goes when this is dropped.
 #[derive(Debug)]
 struct Replacement {
     folder: PathBuf,

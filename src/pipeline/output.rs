@@ -4,7 +4,7 @@ use super::sink::{Fields, PictureRanges, Pictures, Rows, Sink, TableTarget};
 use crate::error::{Error, Result};
 use crate::io::{Element, FieldFormat};
 use crate::math::Real;
-use crate::types::Sites;
+use crate::types::SamplingGrid;
 use std::path::{Path, PathBuf};
 
 /// A picture of one field, PNG.
@@ -75,10 +75,11 @@ fn format_of(path: &Path) -> Option<Format> {
 
 /// Where everything of a run goes.
 ///
-/// A path is a **folder** when it exists as one, ends in a separator or has no extension; it then gets, for every field, `000012.npz`
-/// (and `.flo`, `.png`, `.pfm`) and `000012_colour.png`, numbered by the frame that the field belongs to, and for the run one `points.csv`. Any
-/// other path is a **file** whose extension tells its format: `.csv` takes every field of the run; the others take exactly one field, and its pictures
-/// lie beside it as `name_colour.png`.
+/// A path is a **folder** when it exists as one, ends in a separator or has no extension; it then gets, for
+/// every field, `000012.npz` (and `.flo`, `.png`, `.pfm`) and `000012_colour.png`, numbered by the frame that
+/// the field belongs to, and for the run one `points.csv`. Any other path is a **file** whose extension tells
+/// its format: `.csv` takes every field of the run; the others take exactly one field, and its pictures lie
+/// beside it as `name_colour.png`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OutputPlan {
     /// Formats written for each field.
@@ -121,10 +122,12 @@ pub struct OutputWish<'a> {
 }
 
 impl OutputPlan {
-    /// Decides from the user's words where results go, and refuses what could only fail later. Nothing is made yet.
+    /// Decides from the user's words where results go, and refuses what could only fail later. Nothing is
+    /// made yet.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `output`, `format` or `picture`; [`Error::Io`] when the place cannot be written.
+    /// [`Error::Argument`] naming `output`, `format` or `picture`; [`Error::Io`] when the place cannot be
+    /// written.
     pub fn decide(wish: &OutputWish<'_>) -> Result<Self> {
         let formats: Vec<Format> = wish.formats.iter().map(|name| parse_format(name)).collect::<Result<_>>()?;
         let pictures: Vec<PictureKind> =
@@ -148,8 +151,8 @@ impl OutputPlan {
     ///
     /// # Errors
     /// [`Error::Argument`] naming `format` or `picture`.
-    pub fn check_sites(&self, sites: &Sites) -> Result<()> {
-        if !matches!(sites, Sites::Points(_)) {
+    pub fn check_sites(&self, sites: &SamplingGrid) -> Result<()> {
+        if !matches!(sites, SamplingGrid::Points(_)) {
             return Ok(());
         }
         if let Some(format) = self.formats.iter().find(|format| **format != FieldFormat::Npz) {
@@ -175,7 +178,8 @@ impl OutputPlan {
         }
     }
 
-    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the fields are made.
+    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the
+    /// fields are made.
     ///
     /// # Errors
     /// [`Error::Io`] when the folder cannot be made or written.
@@ -313,13 +317,15 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Whether a path means a folder: it exists as one, ends in a separator, or has no extension and is no device or pipe.
+/// Whether a path means a folder: it exists as one, ends in a separator, or has no extension and is no device
+/// or pipe.
 pub fn is_folder(path: &Path) -> bool {
     let ends_in_separator = path.to_string_lossy().ends_with(std::path::is_separator);
     path.is_dir() || ends_in_separator || path.extension().is_none() && !is_device(path)
 }
 
-/// Whether something is there that is neither a folder nor a regular file: it is written as it is, whatever its name.
+/// Whether something is there that is neither a folder nor a regular file: it is written as it is, whatever
+/// its name.
 pub fn is_device(path: &Path) -> bool {
     path.metadata().is_ok_and(|meta| !meta.is_dir() && !meta.is_file())
 }
@@ -337,7 +343,8 @@ fn exists(path: &Path) -> Error {
     Error::argument("output", "a place without earlier results (--force replaces them)", path.display())
 }
 
-/// Refuses, before any work is done, a single file that exists (unless `replace`) or whose folder cannot be written.
+/// Refuses, before any work is done, a single file that exists (unless `replace`) or whose folder cannot be
+/// written.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `output`; [`Error::Io`].

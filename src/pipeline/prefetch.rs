@@ -1,5 +1,5 @@
-//! Reading ahead: the source works on its own thread, so that decoding and estimating overlap and a blocked read never
-//! keeps the run from being stopped.
+//! Reading ahead: the source works on its own thread, so that decoding and estimating overlap and a blocked
+//! read never keeps the run from being stopped.
 
 use crate::error::{Error, Result};
 use crate::io::{FrameFormat, FrameSource, ViewPairs};
@@ -33,7 +33,8 @@ impl Prefetch<[AnyFrame; 2]> {
 }
 
 impl<T: Send + 'static> Prefetch<T> {
-    /// Starts to call `read`. The thread ends with what there is to read, at the first error, or when this end is dropped.
+    /// Starts to call `read`. The thread ends with what there is to read, at the first error, or when this
+    /// end is dropped.
     fn of(mut read: impl FnMut() -> Result<Option<T>> + Send + 'static) -> Result<Self> {
         let (sender, frames) = sync_channel(READ_AHEAD);
         std::thread::Builder::new()
@@ -96,7 +97,8 @@ pub struct FirstFrame {
     pub dtype: &'static str,
 }
 
-/// Looks at the first frame of `source` without losing it: what it is (`None`: no frame at all), and the whole source again.
+/// Looks at the first frame of `source` without losing it: what it is (`None`: no frame at all), and the
+/// whole source again.
 ///
 /// # Errors
 /// Those of the source.

@@ -13,7 +13,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Which frames of the input the pushed ones are: frame `k` of the run is frame `first + k * step` of the input.
+/// Which frames of the input the pushed ones are: frame `k` of the run is frame `first + k * step` of the
+/// input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbering {
     /// Index of the first frame.
@@ -52,15 +53,16 @@ pub struct Summary {
     pub frames: usize,
     /// Fields estimated and taken by every sink.
     pub fields: usize,
-    /// Sites with a valid estimate.
+    /// SamplingGrid with a valid estimate.
     pub valid: u64,
-    /// Sites in all.
+    /// SamplingGrid in all.
     pub sites: u64,
     /// Restarts of a filter's pixel.
     pub repairs: usize,
     /// Files written.
     pub files: usize,
-    /// The last of them, under the name that it really has: the rows of a run that was stopped have another one than was asked for.
+    /// The last of them, under the name that it really has: the rows of a run that was stopped have another
+    /// one than was asked for.
     pub latest: Option<PathBuf>,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -128,12 +130,12 @@ impl<T: SimdReal> Pipeline<T> {
 
     /// Works through `source` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its error stops the run, and what is
-    /// complete then stays.
+    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
-    /// Those of the source, the stage, the sinks and `progress`; [`Error::Argument`] when there are too few frames or one
-    /// differs in size.
+    /// Those of the source, the stage, the sinks and `progress`; [`Error::Argument`] when there are too few
+    /// frames or one differs in size.
     pub fn run(&mut self, source: Box<dyn FrameSource>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(source, progress);

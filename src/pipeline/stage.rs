@@ -38,7 +38,8 @@ pub trait Stage<T>: Send {
     }
 }
 
-/// An [`Estimator`] with a memory of the few frames that it needs, and of the estimates before where they are fused over time.
+/// An [`Estimator`] with a memory of the few frames that it needs, and of the estimates before where they are
+/// fused over time.
 pub struct EstimatorStage<T> {
     estimator: Estimator,
     needed: usize,
@@ -93,7 +94,8 @@ impl<T: SimdReal> Stage<T> for EstimatorStage<T> {
 
 /// A [`FlowFilter`]: a field for every frame, the first included.
 ///
-/// The filter is made when the first frame has come and told its size, unless one is brought along to be continued.
+/// The filter is made when the first frame has come and told its size, unless one is brought along to be
+/// continued.
 pub struct FilterStage<T> {
     options: FlowFilterOptions,
     filter: Option<FlowFilter<T>>,

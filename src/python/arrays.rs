@@ -12,7 +12,8 @@ use pyo3::types::{PyIterator, PyList};
 /// Sample types that frames may have, for messages.
 const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
 
-/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of another byte order is copied.
+/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of
+/// another byte order is copied.
 pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = object.py();
     if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
@@ -45,7 +46,8 @@ pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
 pub fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
     let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
     if let Ok(slice) = typed.as_slice() {
-        // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it lies.
+        // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it
+        // lies.
         if array.is_c_contiguous() {
             return Some(spare::copy(slice));
         }
@@ -151,7 +153,8 @@ pub struct Frames<'py> {
 }
 
 impl<'py> Frames<'py> {
-    /// Checks the outer shape; each frame is converted when it is asked for, so that a long stack is never copied whole.
+    /// Checks the outer shape; each frame is converted when it is asked for, so that a long stack is never
+    /// copied whole.
     pub fn new(object: &Bound<'py, PyAny>, colour: ColourRule) -> PyResult<Self> {
         let is_sequence =
             object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
@@ -273,9 +276,9 @@ pub fn view<'py, T: Element>(
     }
     let layout = shape.into_dimension().strides(strides.into_dimension());
     let array = ArrayView::from_shape(layout, data).map_err(|e| PyValueError::new_err(e.to_string()))?;
-    // SAFETY: callers pass memory owned by the frozen Python object `owner`, which never reallocates or frees it while it lives;
-    // `owner` becomes the base of the new array. The array is made read-only before anyone sees it, and stays so, because its
-    // base offers no writable buffer.
+    // SAFETY: callers pass memory owned by the frozen Python object `owner`, which never reallocates or frees
+    // it while it lives; `owner` becomes the base of the new array. The array is made read-only before anyone
+    // sees it, and stays so, because its base offers no writable buffer.
     let array = unsafe { PyArrayDyn::borrow_from_array(&array, owner.clone()) };
     array.getattr("flags")?.setattr("writeable", false)?;
     Ok(array.into_any())

@@ -33,10 +33,11 @@ impl Work for Quantiser {
     }
 }
 
-/// `frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard deviations, reflecting borders.
+/// `frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard
+/// deviations, reflecting borders.
 ///
-/// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only the pixels whose kernel reaches
-/// it. ValueError for a negative or infinite `sigma`.
+/// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only
+/// the pixels whose kernel reaches it. ValueError for a negative or infinite `sigma`.
 #[pyfunction]
 #[pyo3(signature = (frame, sigma, *, truncate=None, threads=None))]
 pub fn smooth<'py>(
@@ -70,9 +71,11 @@ pub fn quantise<'py>(frame: &Bound<'py, PyAny>, step: Option<f64>) -> PyResult<B
     arrays::from_any_frame(py, levels)
 }
 
-/// Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green, blue; alpha is left out.
+/// Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green,
+/// blue; alpha is left out.
 ///
-/// Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is copied.
+/// Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is
+/// copied.
 #[pyfunction]
 pub fn luminance<'py>(frame: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     arrays::from_any_frame(frame.py(), arrays::frame("frame", frame, ColourRule::Luminance)?)

@@ -1,7 +1,8 @@
 //! Keyword options, declared once each.
 //!
-//! A list of options is a macro that hands `name: kept as taken = default,` to another macro: [`keep_options`] makes the struct that holds and pickles
-//! them, [`constructor`] the `__new__` of a class that takes them. Python thereby sees the full signature, and an option is added in one line.
+//! A list of options is a macro that hands `name: kept as taken = default,` to another macro:
+//! [`keep_options`] makes the struct that holds and pickles them, [`constructor`] the `__new__` of a class
+//! that takes them. Python thereby sees the full signature, and an option is added in one line.
 
 /// Hands `$then!` its `[$target]`, the options `$own`, and those that whatever works on frames has.
 macro_rules! with_common {

@@ -1,4 +1,5 @@
-//! Weighted mixtures for Python; the class that a user meets is `jacoflow.mixture.VariationalGaussianMixture`.
+//! Weighted mixtures for Python; the class that a user meets is
+//! `jacoflow.mixture.VariationalGaussianMixture`.
 
 use super::arrays;
 use crate::error::Error;

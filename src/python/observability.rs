@@ -14,8 +14,9 @@ use pyo3::types::PyDict;
 
 /// Observability of the affine model at every pixel, from three frames.
 ///
-/// Returns a dictionary of arrays (H, W) without units: `rank` of the twelve equations (6: observable), `rank_single` of the six without second time
-/// derivatives, `condition` code (see `ObservabilityMap`), `condition_number`, and `known`, false at the border and where a sample is not finite.
+/// Returns a dictionary of arrays (H, W) without units: `rank` of the twelve equations (6: observable),
+/// `rank_single` of the six without second time derivatives, `condition` code (see `ObservabilityMap`),
+/// `condition_number`, and `known`, false at the border and where a sample is not finite.
 #[pyfunction(name = "_observability")]
 #[pyo3(signature = (frames, *, time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, smooth=None, quantise=None, colour=None, threads=None))]
 pub fn observability<'py>(
@@ -75,7 +76,8 @@ impl Request {
     }
 }
 
-/// Theorem 1 for one jet (I, Ix, Iy, Ixx, Ixy, Iyy) moving by (u, v, u_x, v_x, u_y, v_y): (condition code, rank_single, rank, condition number).
+/// Theorem 1 for one jet (I, Ix, Iy, Ixx, Ixy, Iyy) moving by (u, v, u_x, v_x, u_y, v_y): (condition code,
+/// rank_single, rank, condition number).
 #[pyfunction(name = "_classify")]
 pub fn classify(jet: [f64; 6], motion: [f64; 6]) -> (u8, u8, u8, f64) {
     let found = crate::flow::classify(jet, motion);

@@ -6,12 +6,13 @@ use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{AnyFrame, Mask, Rect, Sample, Sites};
+use crate::types::{AnyFrame, Mask, Rect, Sample, SamplingGrid};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused by name where it is out of range.
+/// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
+/// by name where it is out of range.
 #[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
 #[pyo3(transparent)]
 pub struct Integer(pub i64);
@@ -79,7 +80,12 @@ pub fn simd(name: Option<&str>) -> PyResult<Option<Level>> {
 }
 
 /// `points`, `region`, `stride`.
-pub fn sites(py: Python<'_>, points: &Object, region: Option<Region>, stride: Option<Integer>) -> PyResult<Sites> {
+pub fn sites(
+    py: Python<'_>,
+    points: &Object,
+    region: Option<Region>,
+    stride: Option<Integer>,
+) -> PyResult<SamplingGrid> {
     let stride = stride.map(|n| count("stride", n)).transpose()?;
     if let Some(points) = points {
         if region.is_some() || stride.is_some() {
@@ -90,13 +96,15 @@ pub fn sites(py: Python<'_>, points: &Object, region: Option<Region>, stride: Op
             .into_iter()
             .map(|(x, y)| Ok((usize::try_from(x).map_err(|_| (x, y))?, usize::try_from(y).map_err(|_| (x, y))?)));
         let pixels = inside.collect::<Result<Vec<_>, _>>();
-        return pixels.map(Sites::Points).map_err(|point: (i64, i64)| {
+        return pixels.map(SamplingGrid::Points).map_err(|point: (i64, i64)| {
             Error::argument("points", "pixels (x, y) inside the frame", format!("{point:?}")).into()
         });
     }
     let region = self::region(region)?;
-    let Sites::Grid { stride: default, .. } = Sites::default() else { return Ok(Sites::default()) };
-    Ok(Sites::Grid { region, stride: stride.unwrap_or(default) })
+    let SamplingGrid::Grid { stride: default, .. } = SamplingGrid::default() else {
+        return Ok(SamplingGrid::default());
+    };
+    Ok(SamplingGrid::Grid { region, stride: stride.unwrap_or(default) })
 }
 
 /// `neighbourhood`: (columns, rows) or an (N, 2) array of offsets; `sigma` weighs it.

@@ -74,8 +74,8 @@ fn span(frame: &Frame<f32>) -> f64 {
 ///
 /// B. Lucas, T. Kanade, 1981; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade feature tracker",
 /// 2000. Minimises the squared differences in a window of `window` x `window` px (odd), on `levels` levels
-/// (1: full size alone). A level takes at most `max_steps` steps and ends with one shorter than `min_step` px.
-/// `guesses` (N, 2): expected flow, default zero.
+/// (1: full size alone). A level takes at most `max_steps` steps and ends with one shorter than `min_step`
+/// px. `guesses` (N, 2): expected flow, default zero.
 ///
 /// `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
 /// point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or

@@ -28,7 +28,8 @@ impl<'py> Reporter<'py> {
         Ok(Self { py, callback })
     }
 
-    /// `done` of `total` frames are finished. Raises KeyboardInterrupt when Ctrl-C was pressed, and whatever the function raises.
+    /// `done` of `total` frames are finished. Raises KeyboardInterrupt when Ctrl-C was pressed, and whatever
+    /// the function raises.
     pub fn step(&self, done: usize, total: usize) -> PyResult<()> {
         self.py.check_signals()?;
         if let Some(callback) = &self.callback {

@@ -14,9 +14,10 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 ///
-/// `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `seed`
-/// makes everything random; `carrier` (one of `scenes.carriers()`) is what the motion moves; `parameters` are those of
-/// `scenes.parameters(name)`, each in the unit told there. Time t is in frames, brightness in grey levels of an 8-bit scale.
+/// `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point
+/// `origin` (x, y) px; `seed` makes everything random; `carrier` (one of `scenes.carriers()`) is what the
+/// motion moves; `parameters` are those of `scenes.parameters(name)`, each in the unit told there. Time t is
+/// in frames, brightness in grey levels of an 8-bit scale.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct Scene {
     kind: String,
@@ -84,7 +85,8 @@ impl Scene {
         self.core.origin()
     }
 
-    /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped.
+    /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
+    /// nor clipped.
     fn frame<'py>(&self, py: Python<'py>, t: f64) -> PyResult<Bound<'py, PyAny>> {
         self.expect_room(1)?;
         let threads = Threads::new(None)?;
@@ -110,9 +112,11 @@ impl Scene {
 
     /// Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
     ///
-    /// Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between the times t + a and t + b of the matter that is at each
-    /// pixel at time t, `(d(b) - d(a)) / (b - a)` for displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
-    /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where the scene has no single truth.
+    /// Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between
+    /// the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
+    /// displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
+    /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
+    /// the scene has no single truth.
     #[pyo3(signature = (t, *, between=None))]
     fn truth(&self, py: Python<'_>, t: f64, between: Option<(f64, f64)>) -> PyResult<FlowField> {
         let threads = Threads::new(None)?;
@@ -126,13 +130,15 @@ impl Scene {
         Ok(FlowField::single(field?))
     }
 
-    /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth.
+    /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
+    /// array (6,); None without truth.
     fn motion<'py>(&self, py: Python<'py>, x: f64, y: f64, t: f64) -> PyResult<Option<Bound<'py, PyAny>>> {
         let motion = self.core.motion(x, y, t);
         motion.map(|m| Ok(arrays::owned(py, &[6], m.to_array().to_vec())?.into_any())).transpose()
     }
 
-    /// How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later; None where the scene does not know.
+    /// How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;
+    /// None where the scene does not know.
     ///
     /// It differs from `duration` times the velocity wherever paths are curved.
     #[pyo3(signature = (x, y, t, duration=1.0))]
@@ -170,8 +176,8 @@ impl Scene {
 
 /// What a camera does to a frame: white noise, rounding, clipping.
 ///
-/// `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or "nearest"; `saturate` clips to 0 ... 255;
-/// `seed` of the noise. Without arguments it changes nothing.
+/// `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or
+/// "nearest"; `saturate` clips to 0 ... 255; `seed` of the noise. Without arguments it changes nothing.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct Sensor {
     sensor: CoreSensor,
@@ -213,7 +219,8 @@ impl Sensor {
         arrays::from_frame(py, seen)
     }
 
-    /// As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255 clipped.
+    /// As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255
+    /// clipped.
     #[pyo3(signature = (frame, index=0))]
     fn apply_u8<'py>(&self, frame: &Bound<'py, PyAny>, index: u64) -> PyResult<Bound<'py, PyAny>> {
         let py = frame.py();
@@ -283,7 +290,8 @@ pub fn scene_carriers(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     Ok(all)
 }
 
-/// Parameters of the scene or carrier `name`: a dictionary from the parameter's name to (default or None, meaning with its unit).
+/// Parameters of the scene or carrier `name`: a dictionary from the parameter's name to (default or None,
+/// meaning with its unit).
 ///
 /// ValueError for an unknown name.
 #[pyfunction(name = "_scene_parameters")]

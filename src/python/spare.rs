@@ -1,7 +1,8 @@
 //! Memory of results and frames that Python let go of, kept for the next ones of the same size.
 //!
-//! A sequence asks for the same few large buffers again and again. Fresh ones cost a page fault every 4 KiB and have to be initialised, on the calling
-//! thread, which together can take as long as a per-pixel estimate. At most [`LIMIT`] bytes are kept, the newest.
+//! A sequence asks for the same few large buffers again and again. Fresh ones cost a page fault every 4 KiB
+//! and have to be initialised, on the calling thread, which together can take as long as a per-pixel
+//! estimate. At most [`LIMIT`] bytes are kept, the newest.
 
 use crate::parallel::PerProcess;
 use std::any::Any;

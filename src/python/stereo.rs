@@ -91,7 +91,8 @@ impl Matching<'_> {
 type Matched<'py> =
     (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, (f64, bool));
 
-/// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and scores (N,), then the row offset and whether it is to be doubted.
+/// The compiled part of `jacoflow.stereo.edge_disparity`: disparity (H, W), then rows, columns, values and
+/// scores (N,), then the row offset and whether it is to be doubted.
 #[pyfunction(name = "_edge_disparity")]
 pub fn edge_disparity<'py>(
     left: &Bound<'py, PyAny>,

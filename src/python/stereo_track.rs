@@ -1,4 +1,5 @@
-//! The stereo tracker for Python: views in, plain values out; the classes a user meets are in `jacoflow.track`.
+//! The stereo tracker for Python: views in, plain values out; the classes a user meets are in
+//! `jacoflow.track`.
 
 mod options;
 
@@ -31,7 +32,8 @@ impl PyStereoTracker {
 }
 
 impl Tracking {
-    /// A step from views, the left one first, in grey levels, `dt` after the last one: views with which no step can be taken say nothing of the scale of floats.
+    /// A step from views, the left one first, in grey levels, `dt` after the last one: views with which no
+    /// step can be taken say nothing of the scale of floats.
     fn step<const N: usize>(
         &mut self,
         views: &[AnyFrame; N],
@@ -74,7 +76,8 @@ impl PyStereoTracker {
         told(py, step)
     }
 
-    /// The next step from the left view and its disparities, NaN where there is none, `dt` after the last one, as a dictionary.
+    /// The next step from the left view and its disparities, NaN where there is none, `dt` after the last
+    /// one, as a dictionary.
     fn update_disparity<'py>(
         &self,
         left: &Bound<'py, PyAny>,

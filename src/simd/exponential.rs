@@ -26,7 +26,8 @@ const SERIES: [f64; 14] = [
     1.0,
 ];
 
-/// `e^x`, to 1e-15 of itself for `-708 <= x <= 709`; zero below, not above the value at 709 beyond. NaN gives no NaN: callers look for that before.
+/// `e^x`, to 1e-15 of itself for `-708 <= x <= 709`; zero below, not above the value at 709 beyond. NaN gives
+/// no NaN: callers look for that before.
 ///
 /// `x = n ln 2 + r` with `|r| <= ln 2 / 2` and the series of `e^r`, whose first term left out is 1e-18.
 #[inline(always)]

@@ -5,8 +5,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A few equal floating-point lanes, processed together.
 ///
-/// Implementations other than the scalars use instructions that not every processor has; they are named only inside
-/// [`dispatch`](super::dispatch), which checks first.
+/// Implementations other than the scalars use instructions that not every processor has; they are named only
+/// inside [`dispatch`](super::dispatch), which checks first.
 pub(crate) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -39,7 +39,8 @@ pub(crate) trait Lanes:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The greatest whole number not above the value.
     fn floor(self) -> Self;
-    /// 2 to the power of the value, a whole number that is an exponent of normal numbers: -126 to 127 in single, -1022 to 1023 in double precision.
+    /// 2 to the power of the value, a whole number that is an exponent of normal numbers: -126 to 127 in
+    /// single, -1022 to 1023 in double precision.
     fn power_of_two(self) -> Self;
     /// Sums four rows of four neighbours down their columns, a patch of its own for every lane `l`:
     /// `result[k][l] = sum_j weights[j][l] plane[(row[l] + j) stride + column[l] + k]`, `j, k = 0..4`.

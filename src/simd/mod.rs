@@ -1,8 +1,8 @@
 //! Run-time choice of the instruction set, and the lane type that kernels are generic over.
 //!
 //! A kernel is written once as a [`Kernel`] whose `run` is generic over [`Lanes`]; [`dispatch`] compiles it
-//! for AVX-512, AVX2+FMA and for plain scalars, and picks at run time. The scalar twin is the same source with one lane and no
-//! fused multiply-add: it is the oracle in tests and the path on other processors.
+//! for AVX-512, AVX2+FMA and for plain scalars, and picks at run time. The scalar twin is the same source
+//! with one lane and no fused multiply-add: it is the oracle in tests and the path on other processors.
 //!
 //! Closures do not inherit target features, so a kernel is a struct with its arguments as fields and
 //! `#[inline(always)]` on `run` and on everything hot that it calls.
@@ -74,7 +74,8 @@ impl Level {
         })
     }
 
-    /// The level that the environment variable `JACOFLOW_SIMD` names (`scalar`, `avx2`, `avx512`); none when it is unset or empty.
+    /// The level that the environment variable `JACOFLOW_SIMD` names (`scalar`, `avx2`, `avx512`); none when
+    /// it is unset or empty.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `JACOFLOW_SIMD` for another word or a level that this processor lacks.
@@ -85,7 +86,8 @@ impl Level {
         }
     }
 
-    /// `choice`, after making sure that without one the environment does not ask for nonsense: a mistake there must not go unnoticed.
+    /// `choice`, after making sure that without one the environment does not ask for nonsense: a mistake
+    /// there must not go unnoticed.
     ///
     /// # Errors
     /// As [`Level::from_environment`].

@@ -1,7 +1,8 @@
 //! Doors that are generic over the precision, rooms that are not.
 //!
-//! A generic function is compiled again in every crate that calls it: each test, bench and user would compile all kernels anew. A public generic door
-//! therefore hands over to an instance for `f32` or `f64` that is compiled once, in this crate.
+//! A generic function is compiled again in every crate that calls it: each test, bench and user would compile
+//! all kernels anew. A public generic door therefore hands over to an instance for `f32` or `f64` that is
+//! compiled once, in this crate.
 
 use std::any::Any;
 

@@ -7,7 +7,8 @@ use crate::math::median;
 const LEAST_MATCHED: f64 = 0.3;
 /// Fewer edge pixels say nothing of the rows.
 const LEAST_EDGES: usize = 30;
-/// A median score below this is that of matches most of which are wrong: one of rows that are aligned is above .8 with noise of 2 grey levels, of rows that are two apart or more below .55.
+/// A median score below this is that of matches most of which are wrong: one of rows that are aligned is
+/// above .8 with noise of 2 grey levels, of rows that are two apart or more below .55.
 const POOR: f64 = 0.7;
 
 /// An estimate of the row offset, and what it is worth.
@@ -15,7 +16,8 @@ const POOR: f64 = 0.7;
 pub struct RowOffset {
     /// `y_right - y_left`, rows.
     pub rows: f64,
-    /// Whether the views have edges and yet hardly agree at any offset that was searched: the true one lies outside of the range, or the views do not belong together.
+    /// Whether the views have edges and yet hardly agree at any offset that was searched: the true one lies
+    /// outside of the range, or the views do not belong together.
     pub doubtful: bool,
 }
 
@@ -63,14 +65,16 @@ impl Agreement {
         self.edges >= LEAST_EDGES && self.matched < LEAST_MATCHED
     }
 
-    /// Whether there is much to be matched, too little of it was or the offset is `unsure` for another reason, and what was matched is matched badly.
+    /// Whether there is much to be matched, too little of it was or the offset is `unsure` for another
+    /// reason, and what was matched is matched badly.
     pub fn is_doubtful(&self, unsure: bool) -> bool {
         let poor = self.score.is_some_and(|score| score < POOR);
         self.edges >= LEAST_EDGES && (unsure || !self.suffices()) && poor
     }
 }
 
-/// Whether an offset is at or beyond an end of the rows that were searched: so is the best of those that are all wrong.
+/// Whether an offset is at or beyond an end of the rows that were searched: so is the best of those that are
+/// all wrong.
 pub(super) fn at_an_end(rows: f64, (least, greatest): (i32, i32)) -> bool {
     least < greatest && (rows < f64::from(least) + 0.5 || rows > f64::from(greatest) - 0.5)
 }

@@ -1,8 +1,10 @@
 //! Costs summed along chains of edge pixels: the sparse semi-global matching of section 6.2.
 //!
-//! For each of 8 directions r let q be the nearest edge pixel behind p along r, at most 16 px away, g its distance:
-//! `L_r(p, d) = C(p, d) + min{L_r(q, d), L_r(q, d +- 1) + P1 e^{-g/16}, min L_r(q, .) + P2 e^{-g/16}} - min L_r(q, .)`, and `C(p, d)` where there is none.
-//! Two sweeps, one from above and one from below, carry four directions each. Only the last rows of `L_r` are kept: they stay in the processor's caches.
+//! For each of 8 directions r let q be the nearest edge pixel behind p along r, at most 16 px away, g its
+//! distance: `L_r(p, d) = C(p, d) + min{L_r(q, d), L_r(q, d +- 1) + P1 e^{-g/16}, min L_r(q, .) + P2
+//! e^{-g/16}} - min L_r(q, .)`, and `C(p, d)` where there is none. Two sweeps, one from above and one from
+//! below, carry four directions each. Only the last rows of `L_r` are kept: they stay in the processor's
+//! caches.
 
 use super::cost::{CHUNK, UNIT};
 use super::edges::EdgeMap;
@@ -26,7 +28,8 @@ pub(super) enum From {
     Below,
 }
 
-/// `sum_r L_r` over the four directions of a sweep, as `costs` is laid out, `padded` candidates for each edge pixel.
+/// `sum_r L_r` over the four directions of a sweep, as `costs` is laid out, `padded` candidates for each edge
+/// pixel.
 pub(super) fn sweep(edges: &EdgeMap, costs: &[u16], padded: usize, from: From) -> Vec<u16> {
     let mut total = vec![0u16; costs.len()];
     dispatch(Level::detect(), Sweep { edges, costs, padded, from, total: &mut total });
@@ -88,7 +91,8 @@ impl Last {
     }
 }
 
-/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions of the level.
+/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the
+/// instructions of the level.
 impl Kernel<f32> for Sweep<'_> {
     type Output = ();
 

@@ -1,6 +1,7 @@
 //! Disparity by agreement of gradient classes in a window: section 2.3.
 //!
-//! Few of the candidates of an edge pixel show its own class at their middle, about one in twenty. Only these have their window compared, 32 pixels of a row at a time.
+//! Few of the candidates of an edge pixel show its own class at their middle, about one in twenty. Only these
+//! have their window compared, 32 pixels of a row at a time.
 
 use super::edges::{EdgeMap, NO_CLASS};
 use super::options::EdgeDisparityOptions;
@@ -10,7 +11,8 @@ use rayon::prelude::*;
 
 /// Pixels compared at a time; no window is wider.
 const LANES: usize = 32;
-/// Stands for left pixels without a class and for what is beyond a window, never equal to [`NO_CLASS`] or a class on the right.
+/// Stands for left pixels without a class and for what is beyond a window, never equal to [`NO_CLASS`] or a
+/// class on the right.
 const NOTHING_LEFT: u8 = NO_CLASS - 1;
 /// Edge pixels of one task.
 const TASK: usize = 256;
@@ -33,7 +35,8 @@ struct Padded {
 }
 
 impl Padded {
-    /// The classes of a view with `radius` pixels before them, [`LANES`] after them, and `radius` rows on both sides; `nothing` there and where there is no class.
+    /// The classes of a view with `radius` pixels before them, [`LANES`] after them, and `radius` rows on
+    /// both sides; `nothing` there and where there is no class.
     fn new(class: &Frame<u8>, radius: usize, nothing: u8) -> Self {
         let (width, height) = class.size();
         let stride = width + radius + LANES;
@@ -47,10 +50,12 @@ impl Padded {
     }
 }
 
-/// The best match of every `every`-th edge pixel of `left`, in the order of its lists; `None` where no candidate is supported.
+/// The best match of every `every`-th edge pixel of `left`, in the order of its lists; `None` where no
+/// candidate is supported.
 ///
-/// `S(p; d, e)` is the number of pixels `q` in the window round `p` with `class_L(q) = class_R(q - (d, -e))`. A candidate must agree at `p` itself, and half the
-/// window must lie in both views. The largest `S` wins, among equals the least `|e|`, then the least `d`. `rows` are the candidates of `e`.
+/// `S(p; d, e)` is the number of pixels `q` in the window round `p` with `class_L(q) = class_R(q - (d, -e))`.
+/// A candidate must agree at `p` itself, and half the window must lie in both views. The largest `S` wins,
+/// among equals the least `|e|`, then the least `d`. `rows` are the candidates of `e`.
 pub(super) fn match_classes(
     left: &EdgeMap,
     right: &EdgeMap,
@@ -91,7 +96,8 @@ struct Task<'a> {
     out: &'a mut [Option<ClassMatch>],
 }
 
-/// Bytes are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions of the level.
+/// Bytes are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions
+/// of the level.
 impl Kernel<f32> for Task<'_> {
     type Output = ();
 
@@ -158,7 +164,8 @@ fn left_block(left: &Padded, x: usize, y: usize, window: usize) -> ([[u8; LANES]
     (block, classed)
 }
 
-/// In how many pixels of the window the right classes equal the left ones; `right` begins at the window's first pixel.
+/// In how many pixels of the window the right classes equal the left ones; `right` begins at the window's
+/// first pixel.
 #[inline(always)]
 fn agreement(block: &[[u8; LANES]; LANES], right: &[u8], stride: usize, window: usize) -> u32 {
     // No column has more than 31 pixels: bytes do not overflow.
@@ -197,7 +204,8 @@ mod tests {
     use super::*;
     use crate::math::random::CounterRng;
 
-    /// Cells of random levels, 8 px wide; the left view shows at `x` what the right shows at `x - d`, `e` rows lower.
+    /// Cells of random levels, 8 px wide; the left view shows at `x` what the right shows at `x - d`, `e`
+    /// rows lower.
     fn view(d: i32, e: i32) -> Frame<f32> {
         let rng = CounterRng::new(3);
         Frame::from_fn(96, 80, |x, y| {

@@ -14,7 +14,8 @@ const EQUAL: [f32; 2] = [0.92, 1.08];
 /// By what factor the ratios may differ; where they do by more, the views differ otherwise than by a gain.
 const ALIKE: f32 = 1.15;
 
-/// The right view times the ratio of both views' contrasts, unless that is nearly 1 or is none. Matching compares gradients, which a gain changes; a bias they do not see.
+/// The right view times the ratio of both views' contrasts, unless that is nearly 1 or is none. Matching
+/// compares gradients, which a gain changes; a bias they do not see.
 pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, Frame<f32>> {
     match ratio(left, right) {
         Some(ratio) if !(EQUAL[0]..=EQUAL[1]).contains(&ratio) => Cow::Owned(right.map(|&value| value * ratio)),
@@ -22,7 +23,8 @@ pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, 
     }
 }
 
-/// Contrast of the left view over that of the right one, where it can be told: the middle of the ratios of both views' greatest differences in brightness, at the same ranks. Only a gain makes all of them alike:
+/// Contrast of the left view over that of the right one, where it can be told: the middle of the ratios of
+/// both views' greatest differences in brightness, at the same ranks. Only a gain makes all of them alike:
 /// not what covers part of a view, nor a white at which one is cut off.
 fn ratio(left: &Frame<f32>, right: &Frame<f32>) -> Option<f32> {
     let (left, right) = (greatest_differences(left)?, greatest_differences(right)?);
@@ -32,7 +34,8 @@ fn ratio(left: &Frame<f32>, right: &Frame<f32>) -> Option<f32> {
     (most <= ALIKE * least).then_some(0.5 * (below + above))
 }
 
-/// Sizes of the differences across two pixels along x that the shares are above; `None` where these are noise.
+/// Sizes of the differences across two pixels along x that the shares are above; `None` where these are
+/// noise.
 fn greatest_differences(view: &Frame<f32>) -> Option<[f32; SHARES.len()]> {
     let rows = (0..view.height()).step_by(SAMPLED).map(|y| view.row(y));
     let sizes = rows.flat_map(|row| row.windows(3).step_by(SAMPLED).map(|three| (three[2] - three[0]).abs()));

@@ -1,7 +1,8 @@
 //! What it costs to call two pixels one point: section 6.2.
 //!
-//! `C(p, d)` is the mean over 5 x 5 px of `min(|g_x - g_x'| + |g_y - g_y'|, 6)`, gradients with a Gaussian of 1 px. Gradients are kept in sixteenths of a grey level/px, which is
-//! far below their noise, so that 16 candidates are compared at a time and sums are exact whatever their order.
+//! `C(p, d)` is the mean over 5 x 5 px of `min(|g_x - g_x'| + |g_y - g_y'|, 6)`, gradients with a Gaussian of
+//! 1 px. Gradients are kept in sixteenths of a grey level/px, which is far below their noise, so that 16
+//! candidates are compared at a time and sums are exact whatever their order.
 
 use super::edges::EdgeMap;
 use crate::parallel::for_each_band;
@@ -25,7 +26,8 @@ pub(super) const UNIT: u16 = STEPS as u16 * (SIDE * SIDE) as u16;
 pub(super) const HIGHEST: u16 = TRUNCATION * UNIT;
 /// Gradients beyond this are told as this, steps.
 const LARGEST: f32 = 8000.0;
-/// Stands for what is unknown or outside, by the side of the view: further from every gradient, and from the other side's, than the truncation.
+/// Stands for what is unknown or outside, by the side of the view: further from every gradient, and from the
+/// other side's, than the truncation.
 const UNKNOWN: [i16; 2] = [-16000, 16000];
 /// Edge pixels of one task.
 const TASK: usize = 256;
@@ -69,14 +71,16 @@ impl Coded {
     }
 }
 
-/// The nearest whole number to a value within [`LARGEST`] of 0. Cut off rather than rounded, which not every processor can do to many at a time.
+/// The nearest whole number to a value within [`LARGEST`] of 0. Cut off rather than rounded, which not every
+/// processor can do to many at a time.
 #[inline(always)]
 fn rounded(value: f32) -> i16 {
     const SHIFT: f32 = 2.0 * LARGEST;
     ((value + (SHIFT + 0.5)) as i32 - SHIFT as i32) as i16
 }
 
-/// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x + first + k` of the other view.
+/// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x +
+/// first + k` of the other view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Candidates {
     /// Where the first lies, px from the pixel.
@@ -105,7 +109,8 @@ impl Candidates {
     }
 }
 
-/// Costs of all candidates of all edge pixels, `candidates.padded()` for each, in the order of the edges. What `allowed` leaves out costs the most.
+/// Costs of all candidates of all edge pixels, `candidates.padded()` for each, in the order of the edges.
+/// What `allowed` leaves out costs the most.
 pub(super) fn costs(
     edges: &EdgeMap,
     own: &Coded,
@@ -146,7 +151,8 @@ struct OnePixel<'a> {
     out: &'a mut [u16],
 }
 
-/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions of the level.
+/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the
+/// instructions of the level.
 impl Kernel<f32> for OnePixel<'_> {
     type Output = ();
 

@@ -23,11 +23,14 @@ pub struct EdgeDisparity {
     pub columns: Vec<u32>,
     /// Their disparities, px.
     pub values: Vec<f32>,
-    /// How well both views agree there, 0 to 1: share of the window's classed pixels whose class agrees, or 1 less the matching cost over its truncation.
+    /// How well both views agree there, 0 to 1: share of the window's classed pixels whose class agrees, or 1
+    /// less the matching cost over its truncation.
     pub scores: Vec<f32>,
-    /// Whether `row_offset` was searched and the views hardly agree with it: the true one lies outside of the range, or the views do not belong together. Many disparities are then wrong.
+    /// Whether `row_offset` was searched and the views hardly agree with it: the true one lies outside of the
+    /// range, or the views do not belong together. Many disparities are then wrong.
     pub rows_doubtful: bool,
-    /// How many rows lower the right view shows a point: the one given, the estimate, or the most frequent one of the class matching (0 without matches).
+    /// How many rows lower the right view shows a point: the one given, the estimate, or the most frequent
+    /// one of the class matching (0 without matches).
     pub row_offset: f64,
 }
 
@@ -52,13 +55,16 @@ impl EdgeDisparity {
     }
 }
 
-/// Disparity `d = x_left - x_right` of the edge pixels of the left view, in px, with `(x, y)` on the left at `(x - d, y + e)` on the right, `e` the row offset.
+/// Disparity `d = x_left - x_right` of the edge pixels of the left view, in px, with `(x, y)` on the left at
+/// `(x - d, y + e)` on the right, `e` the row offset.
 ///
-/// Views are (H, W) in 8-bit grey levels, which the thresholds are in. Samples that are not finite leave no edge where the gradient's kernel reaches them. A view without edges
-/// gives an empty result. Source: the stereo paper, (1) to (5), and [`Method::SemiGlobal`]. Bit-identical for any number of threads.
+/// Views are (H, W) in 8-bit grey levels, which the thresholds are in. Samples that are not finite leave no
+/// edge where the gradient's kernel reaches them. A view without edges gives an empty result. Source: the
+/// stereo paper, (1) to (5), and [`Method::SemiGlobal`]. Bit-identical for any number of threads.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::Error::Argument) for an option out of range, views (or a prior) of different size, or views smaller than 17 px.
+/// [`Error::Argument`](crate::Error::Argument) for an option out of range, views (or a prior) of different
+/// size, or views smaller than 17 px.
 pub fn edge_disparity(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<EdgeDisparity> {
     options.check_views(left, right)?;
     Ok(options.threads.install(|| match options.method {

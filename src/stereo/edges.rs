@@ -17,8 +17,8 @@ pub struct EdgeMap {
     pub gradient_y: Frame<f32>,
     /// Magnitude of the gradient, grey levels/px.
     pub magnitude: Frame<f32>,
-    /// Class of the gradient's direction, 0 to n - 1, class 0 centred on the x axis, turning towards y: (5) with the sign kept; [`NO_CLASS`] below the threshold
-    /// and where a sample in reach is not finite.
+    /// Class of the gradient's direction, 0 to n - 1, class 0 centred on the x axis, turning towards y: (5)
+    /// with the sign kept; [`NO_CLASS`] below the threshold and where a sample in reach is not finite.
     pub class: Frame<u8>,
     /// Rows of the edge pixels, in row-major order.
     pub rows: Vec<u32>,
@@ -40,8 +40,9 @@ pub struct EdgeSettings {
 impl EdgeMap {
     /// Edges of a view.
     ///
-    /// An edge pixel has a class and is the greatest magnitude along its gradient: not less than one px back and more than one px ahead (bilinear), so that of two equal
-    /// neighbours one remains. The outermost pixels have no neighbours and are none. Identical for any number of threads.
+    /// An edge pixel has a class and is the greatest magnitude along its gradient: not less than one px back
+    /// and more than one px ahead (bilinear), so that of two equal neighbours one remains. The outermost
+    /// pixels have no neighbours and are none. Identical for any number of threads.
     pub fn new(view: &Frame<f32>, settings: &EdgeSettings) -> Self {
         let radius = (4.0 * settings.sigma).round() as usize;
         let (gradient_x, gradient_y) = gaussian_gradient(Level::detect(), view, settings.sigma, radius);

@@ -1,6 +1,7 @@
 //! The row offset of a film: found at the first pair that shows enough of it, and watched from then on.
 //!
-//! Cameras are screwed down, so one offset serves a film, and a single pair's would only add noise. But a film may begin with black, with a title that was drawn into both views alike, or with noise: what such a
+//! Cameras are screwed down, so one offset serves a film, and a single pair's would only add noise. But a
+//! film may begin with black, with a title that was drawn into both views alike, or with noise: what such a
 //! pair says, if anything, must not be believed for ever.
 
 use super::agreement::{Agreement, RowOffset};
@@ -28,16 +29,19 @@ impl FilmRows {
         Self { given, found: None }
     }
 
-    /// The offset for all pairs to come, rows: the one given, or what was found as long as the views agree with it.
+    /// The offset for all pairs to come, rows: the one given, or what was found as long as the views agree
+    /// with it.
     pub fn known(&self) -> Option<f64> {
         self.given.or(self.found)
     }
 
     /// The next pair, as [`edge_disparity`] matches it; the options' `row_offset` is not looked at.
     ///
-    /// [`Method::SemiGlobal`] aligns the rows by the offset that is known. It becomes known at the first pair of which the estimate can be believed: enough windows for the vertical steps, and three tenths of
-    /// the edge pixels matched. Where a later pair is matched worse than that, or a vertical step from the known offset leads farther than a fifth of a row, it is estimated again. Pairs that show too little
-    /// change nothing. [`Method::Classes`] searches the rows at every pixel unless they are given.
+    /// [`Method::SemiGlobal`] aligns the rows by the offset that is known. It becomes known at the first pair
+    /// of which the estimate can be believed: enough windows for the vertical steps, and three tenths of the
+    /// edge pixels matched. Where a later pair is matched worse than that, or a vertical step from the known
+    /// offset leads farther than a fifth of a row, it is estimated again. Pairs that show too little change
+    /// nothing. [`Method::Classes`] searches the rows at every pixel unless they are given.
     ///
     /// # Errors
     /// As [`edge_disparity`].

@@ -1,11 +1,13 @@
 //! Disparity of the edge pixels of two views.
 //!
-//! Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance"), sections on gradients and disparity, equations (1) to (5).
-//! `d = x_left - x_right`; near is large, and disparities are negative where cameras that converge look far.
+//! Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and
+//! luminance"), sections on gradients and disparity, equations (1) to (5). `d = x_left - x_right`; near is
+//! large, and disparities are negative where cameras that converge look far.
 //!
-//! Two ways to match ([`Method`]): the paper's agreement of signed gradient classes in a window, and semi-global matching of gradients along chains of edge pixels (after
-//! H. Hirschmueller, "Stereo processing by semiglobal matching and mutual information", 2008, with edge pixels in place of a dense grid), which wants the rows of the cameras
-//! aligned: [`estimate_row_offset`].
+//! Two ways to match ([`Method`]): the paper's agreement of signed gradient classes in a window, and
+//! semi-global matching of gradients along chains of edge pixels (after H. Hirschmueller, "Stereo processing
+//! by semiglobal matching and mutual information", 2008, with edge pixels in place of a dense grid), which
+//! wants the rows of the cameras aligned: [`estimate_row_offset`].
 
 mod agreement;
 mod align;

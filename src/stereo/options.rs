@@ -14,9 +14,12 @@ const MOST_CANDIDATES: i64 = 1024;
 /// What says that two edge pixels are one point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Agreement of the classes of gradient direction in a window, section 3 of the stereo paper: whole disparities, each with a row offset of its own.
+    /// Agreement of the classes of gradient direction in a window, section 3 of the stereo paper: whole
+    /// disparities, each with a row offset of its own.
     Classes,
-    /// Gradients compared and smoothed along chains of edge pixels from eight sides, checked from the right view, refined to fractions of a pixel. A gain of the right view over the left one is taken out beforehand. The default.
+    /// Gradients compared and smoothed along chains of edge pixels from eight sides, checked from the right
+    /// view, refined to fractions of a pixel. A gain of the right view over the left one is taken out
+    /// beforehand. The default.
     #[default]
     SemiGlobal,
 }
@@ -43,17 +46,20 @@ impl Method {
     }
 }
 
-/// Options of [`edge_disparity`](super::edge_disparity) and [`estimate_row_offset`](super::estimate_row_offset). Grey levels are those of 8 bit.
+/// Options of [`edge_disparity`](super::edge_disparity) and
+/// [`estimate_row_offset`](super::estimate_row_offset). Grey levels are those of 8 bit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EdgeDisparityOptions {
     /// How views are matched; default [`Method::SemiGlobal`].
     pub method: Method,
     /// Least and greatest disparity `x_left - x_right`, px, both included; default -40 to 24.
     pub disparity_range: (i32, i32),
-    /// Least and greatest row offset `y_right - y_left`, rows, both included, that are searched where `row_offset` is not given; default -4 to 4.
+    /// Least and greatest row offset `y_right - y_left`, rows, both included, that are searched where
+    /// `row_offset` is not given; default -4 to 4.
     pub row_range: (i32, i32),
-    /// How many rows lower the right view shows a point. `None` (default): searched at every pixel by [`Method::Classes`], estimated beforehand for
-    /// [`Method::SemiGlobal`]. The class matching rounds it to whole rows.
+    /// How many rows lower the right view shows a point. `None` (default): searched at every pixel by
+    /// [`Method::Classes`], estimated beforehand for [`Method::SemiGlobal`]. The class matching rounds it to
+    /// whole rows.
     pub row_offset: Option<f64>,
     /// Fractions of a pixel ([`Method::SemiGlobal`] only; classes give whole px); default true.
     pub subpixel: bool,
@@ -63,7 +69,8 @@ pub struct EdgeDisparityOptions {
     pub prior: Option<Frame<f32>>,
     /// How far from the expected one disparity is looked for, px; default 3.
     pub prior_radius: u32,
-    /// Standard deviation of the Gaussian behind gradients and edges, px; default 2, cut off at four times that.
+    /// Standard deviation of the Gaussian behind gradients and edges, px; default 2, cut off at four times
+    /// that.
     pub sigma: f64,
     /// Least magnitude of the gradient that has a direction, grey levels/px; default 2.
     pub threshold: f64,
@@ -161,7 +168,8 @@ impl EdgeDisparityOptions {
         }
     }
 
-    /// Disparities that are to be looked for at a pixel, px, both included; none where what is expected lies outside the range.
+    /// Disparities that are to be looked for at a pixel, px, both included; none where what is expected lies
+    /// outside the range.
     pub(super) fn candidates(&self, x: usize, y: usize) -> Option<(i32, i32)> {
         let (least, greatest) = self.disparity_range;
         let expected = self.prior.as_ref().map_or(f32::NAN, |prior| prior.get(x, y));

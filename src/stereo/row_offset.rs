@@ -1,7 +1,8 @@
 //! How many rows lower the right camera sees a point: section 6.1.
 //!
-//! Along a slanted edge a wrong row offset looks like a wrong disparity. Each window's own shift along x is therefore solved for together with the one offset that all share, and only
-//! what no shift along x explains speaks for an offset.
+//! Along a slanted edge a wrong row offset looks like a wrong disparity. Each window's own shift along x is
+//! therefore solved for together with the one offset that all share, and only what no shift along x explains
+//! speaks for an offset.
 
 use super::agreement::{Agreement, RowOffset, at_an_end};
 use super::align::rows_moved;
@@ -39,11 +40,14 @@ const LEAST_SCALE: f64 = 0.5;
 /// Least sum of squared slopes of a window, (grey levels/px)^2, before it is divided by.
 const LEAST_SLOPE: f64 = 4.0;
 
-/// How many rows lower the right view shows a point: `y_right - y_left`, rows with fractions; 0 where nothing can be matched.
+/// How many rows lower the right view shows a point: `y_right - y_left`, rows with fractions; 0 where nothing
+/// can be matched.
 ///
-/// The most frequent row offset of the class matching (section 2.3) of some edge pixels within `row_range`, then twice: disparity by semi-global matching of the rows so aligned,
-/// and Lucas-Kanade steps along y in 9 x 9 windows round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the median of all.
-/// `row_offset`, `prior` and the method of the options are not looked at. Identical for any number of threads.
+/// The most frequent row offset of the class matching (section 2.3) of some edge pixels within `row_range`,
+/// then twice: disparity by semi-global matching of the rows so aligned, and Lucas-Kanade steps along y in 9
+/// x 9 windows round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the
+/// median of all. `row_offset`, `prior` and the method of the options are not looked at. Identical for any
+/// number of threads.
 ///
 /// # Errors
 /// As [`edge_disparity`](super::edge_disparity).
@@ -68,14 +72,16 @@ pub fn find_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisp
 pub(super) struct RowEstimate {
     /// `y_right - y_left`.
     pub rows: f64,
-    /// Whether vertical steps could be made until the end; else it is the most frequent offset of the classes, whatever that is worth.
+    /// Whether vertical steps could be made until the end; else it is the most frequent offset of the
+    /// classes, whatever that is worth.
     pub settled: bool,
     /// How well the views agree with it.
     pub agreement: Agreement,
 }
 
 impl RowEstimate {
-    /// Whether nothing speaks for it, and the agreement against it: rows that cannot be told, as of vertical edges alone, do no harm.
+    /// Whether nothing speaks for it, and the agreement against it: rows that cannot be told, as of vertical
+    /// edges alone, do no harm.
     pub fn is_doubtful(&self, options: &EdgeDisparityOptions) -> bool {
         self.agreement.is_doubtful(!self.settled || at_an_end(self.rows, options.row_range))
     }
@@ -116,7 +122,8 @@ pub(super) fn row_offset_of(
     RowEstimate { rows: offset, settled: true, agreement }
 }
 
-/// How far one vertical step leads from an offset with which views were matched, rows; none of fewer windows than steps need.
+/// How far one vertical step leads from an offset with which views were matched, rows; none of fewer windows
+/// than steps need.
 pub(super) fn misalignment(
     left: &Frame<f32>,
     view: &View,
@@ -148,7 +155,8 @@ struct Window {
     at: (f64, usize),
 }
 
-/// What one window says of a step: `sum g (L - R)` along x and y, and the root mean square of `L - R` less its mean.
+/// What one window says of a step: `sum g (L - R)` along x and y, and the root mean square of `L - R` less
+/// its mean.
 #[derive(Clone, Copy)]
 struct Misfit {
     moments: [f64; 2],
@@ -221,7 +229,8 @@ impl Window {
     }
 }
 
-/// The offset after at most so many Lucas-Kanade steps along y; none without enough windows, or when they leave the neighbourhood of the start.
+/// The offset after at most so many Lucas-Kanade steps along y; none without enough windows, or when they
+/// leave the neighbourhood of the start.
 fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps: usize) -> Option<f64> {
     let mut offset = start;
     for _ in 0..steps {
@@ -237,7 +246,8 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps:
     Some(offset)
 }
 
-/// One step along y with the aligned right view, rows; the windows take their own along x with it. None without enough windows.
+/// One step along y with the aligned right view, rows; the windows take their own along x with it. None
+/// without enough windows.
 fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
     let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(aligned)).collect();
     let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();
@@ -272,7 +282,8 @@ pub(super) mod tests {
     use crate::image::cubic_at;
     use crate::math::random::CounterRng;
 
-    /// Soft cells seen by two cameras: the right one `offset` rows lower, disparity -3.3 px above and 2.4 px below the middle.
+    /// Soft cells seen by two cameras: the right one `offset` rows lower, disparity -3.3 px above and 2.4 px
+    /// below the middle.
     pub fn views(offset: f64) -> [Frame<f32>; 2] {
         let rng = CounterRng::new(5);
         let cells = Frame::from_fn(240, 200, |x, y| {

@@ -55,7 +55,8 @@ pub(super) struct Match {
 pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOptions) -> Vec<Option<Match>> {
     let (least, greatest) = options.disparity_range;
     let count = (greatest - least + 1) as usize;
-    // To the right of the left view's first candidate lie smaller disparities, to the right of the right view's greater ones.
+    // To the right of the left view's first candidate lie smaller disparities, to the right of the right
+    // view's greater ones.
     let from_left = Candidates { first: -greatest, count };
     let from_right = Candidates { first: least, count };
     let reach = from_left.reach().max(from_right.reach());

@@ -1,8 +1,9 @@
 //! Fractions of a pixel by Lucas-Kanade steps along x: section 6.3.
 //!
-//! With the left slope `g` less its mean over the window, and the right window summed with it, `A(t) = sum g R(x' + t)`, a step is `(A(t) - sum g L) / sum g^2`; a difference in brightness
-//! drops out because the weights sum to 0. `A` at whole pixels says all there is about the right view: between them it is interpolated just as the view would be, by cubic convolution,
-//! and steps cost next to nothing.
+//! With the left slope `g` less its mean over the window, and the right window summed with it, `A(t) = sum g
+//! R(x' + t)`, a step is `(A(t) - sum g L) / sum g^2`; a difference in brightness drops out because the
+//! weights sum to 0. `A` at whole pixels says all there is about the right view: between them it is
+//! interpolated just as the view would be, by cubic convolution, and steps cost next to nothing.
 
 use super::semi_global::{Match, View};
 use crate::image::{Border, GaussianSmoother, Interpolation};
@@ -22,14 +23,16 @@ const STEPS: usize = 5;
 const FARTHEST: f32 = 1.0;
 /// A step as short as this is the last, px.
 const SHORT: f32 = 0.005;
-/// Whole pixels round the start at which the right window is looked at: enough for cubic convolution anywhere within [`FARTHEST`].
+/// Whole pixels round the start at which the right window is looked at: enough for cubic convolution anywhere
+/// within [`FARTHEST`].
 const PLACES: usize = 6;
 /// Least `sum g^2` over the window, (grey levels/px)^2: less is noise.
 const LEAST_SLOPE: f32 = 4.0;
 /// Edge pixels of one task.
 const TASK: usize = 256;
 
-/// Refines every match; one that does not come to rest within 1 px, or whose window is not inside both views, stays as it is.
+/// Refines every match; one that does not come to rest within 1 px, or whose window is not inside both views,
+/// stays as it is.
 pub(super) fn refine(left: &Frame<f32>, view: &View, right: &Frame<f32>, matches: &mut [Option<Match>]) {
     // The right view is smoothed as the slopes are, so that noise does not bias the steps.
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
@@ -106,7 +109,8 @@ impl Task<'_> {
         Some(at - from)
     }
 
-    /// The left slopes less their mean, their products with the left view summed, and their squares summed; none where they are too flat.
+    /// The left slopes less their mean, their products with the left view summed, and their squares summed;
+    /// none where they are too flat.
     #[inline(always)]
     fn template(&self, x: usize, y: usize) -> Option<([[f32; ROW]; SIDE], f32, f32)> {
         let mut slopes = [[0.0f32; ROW]; SIDE];

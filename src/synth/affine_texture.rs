@@ -5,12 +5,14 @@ use super::motion::AffineField;
 use super::texture::Noise;
 use crate::error::Result;
 
-/// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`; the truth at a fixed pixel is the same at every time.
+/// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`; the truth at a fixed pixel is the same at
+/// every time.
 pub type AffineTexture = Carried<Noise, AffineField>;
 
 impl AffineTexture {
     /// Noise of standard deviation 40 grey levels about 128, filtered by a Gaussian of 2 px, moving by
-    /// `motion = (u, v, u_x, v_x, u_y, v_y)` at the centre of the frame, `((width - 1) / 2, (height - 1) / 2)`.
+    /// `motion = (u, v, u_x, v_x, u_y, v_y)` at the centre of the frame, `((width - 1) / 2, (height - 1) /
+    /// 2)`.
     ///
     /// # Errors
     /// None with these settings; passes on what [`Noise::new`] reports.
@@ -24,8 +26,8 @@ impl AffineTexture {
         Carried::new("affine", size, noise, AffineField::new(motion, centre))
     }
 
-    /// The settings that the estimators' accuracy is quoted for: `M = [[0.01, -0.02], [0.02, 0.01]]`, `(u, v) = (0.3, -0.2)` at the
-    /// centre, noise filtered by 2 px with a standard deviation of 40 grey levels.
+    /// The settings that the estimators' accuracy is quoted for: `M = [[0.01, -0.02], [0.02, 0.01]]`, `(u, v)
+    /// = (0.3, -0.2)` at the centre, noise filtered by 2 px with a standard deviation of 40 grey levels.
     ///
     /// # Errors
     /// As [`AffineTexture::moving`].

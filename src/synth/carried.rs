@@ -65,7 +65,8 @@ impl<X: Texture, M: Motion> Scene for Carried<X, M> {
 pub(super) mod conformance {
     use super::Scene;
 
-    /// `I_t + u I_x + v I_y` by central differences must vanish beside the size of its terms; frames must equal the brightness function.
+    /// `I_t + u I_x + v I_y` by central differences must vanish beside the size of its terms; frames must
+    /// equal the brightness function.
     pub fn check(scene: &dyn Scene, tolerance: f64) {
         let (origin, (width, height)) = (scene.origin(), scene.size());
         let h = 1e-3;

@@ -1,8 +1,10 @@
 //! Moving scenes with exact truth: brightness, flow and Jacobian at every point and time.
 //!
-//! A scene is a function `I(x, y, t)`; a frame is that function at integer pixels. Most scenes are a [`Texture`](texture::Texture) carried
-//! by a [`Motion`](motion::Motion): any of the one goes with any of the other ([`Carried`]). Everything random comes from a seed through
-//! [`CounterRng`](crate::math::random::CounterRng), so a scene is the same on any machine and number of threads.
+//! A scene is a function `I(x, y, t)`; a frame is that function at integer pixels. Most scenes are a
+//! [`Texture`](texture::Texture) carried by a [`Motion`](motion::Motion): any of the one goes with any of the
+//! other ([`Carried`]). Everything random comes from a seed through
+//! [`CounterRng`](crate::math::random::CounterRng), so a scene is the same on any machine and number of
+//! threads.
 
 mod affine_texture;
 mod carried;

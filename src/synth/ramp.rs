@@ -4,10 +4,11 @@ use super::Scene;
 use crate::types::AffineFlow;
 use std::f64::consts::PI;
 
-/// `I(x, y, t) = beta (x cos wt + y sin wt) + I0` (WO2010/098160, (45)), the scene whose Hessian vanishes everywhere.
+/// `I(x, y, t) = beta (x cos wt + y sin wt) + I0` (WO2010/098160, (45)), the scene whose Hessian vanishes
+/// everywhere.
 ///
-/// Truth (46): `u = -w y`, `v = w x`, `u_y = -w`, `v_x = w`, `u_x = v_y = 0`, at every time. The scene is an unbounded plane;
-/// `origin` and the size choose the window that frames show.
+/// Truth (46): `u = -w y`, `v = w x`, `u_y = -w`, `v_x = w`, `u_x = v_y = 0`, at every time. The scene is an
+/// unbounded plane; `origin` and the size choose the window that frames show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotatingRamp {
     /// Columns of a frame, px.
@@ -25,7 +26,8 @@ pub struct RotatingRamp {
 }
 
 impl RotatingRamp {
-    /// The patent's settings, beta = 0.2, w = pi/100 (400 frames are two turns), I0 = 128, seen from scene point (0, 0) on.
+    /// The patent's settings, beta = 0.2, w = pi/100 (400 frames are two turns), I0 = 128, seen from scene
+    /// point (0, 0) on.
     pub fn reference(width: usize, height: usize) -> Self {
         Self { width, height, origin: (0.0, 0.0), slope: 0.2, angular_velocity: PI / 100.0, offset: 128.0 }
     }

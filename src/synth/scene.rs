@@ -5,8 +5,8 @@ use crate::types::{AffineFlow, Frame};
 
 /// A moving picture with exact truth.
 ///
-/// Coordinates `(x, y)` are scene coordinates in px, x right and y down; pixel `(column, row)` of a frame lies at
-/// `origin + (column, row)`. Time `t` is in frames.
+/// Coordinates `(x, y)` are scene coordinates in px, x right and y down; pixel `(column, row)` of a frame
+/// lies at `origin + (column, row)`. Time `t` is in frames.
 pub trait Scene: Send + Sync {
     /// The scene's name in the registry.
     fn name(&self) -> &'static str;
@@ -22,18 +22,19 @@ pub trait Scene: Send + Sync {
     /// Brightness at a point and time, grey levels of an 8-bit scale (not quantised, not clipped).
     fn brightness(&self, x: f64, y: f64, t: f64) -> f64;
 
-    /// Velocity and its Jacobian at a point and time, px/frame and 1/frame; `None` where there is no single truth
-    /// (an edge between motions).
+    /// Velocity and its Jacobian at a point and time, px/frame and 1/frame; `None` where there is no single
+    /// truth (an edge between motions).
     fn motion(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>>;
 
-    /// How far the matter at `(x, y)` at time `t` has gone `duration` frames later, px. It differs from `duration` times the velocity
-    /// wherever paths are curved. `None` where the scene does not know.
+    /// How far the matter at `(x, y)` at time `t` has gone `duration` frames later, px. It differs from
+    /// `duration` times the velocity wherever paths are curved. `None` where the scene does not know.
     fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
         let _ = (x, y, t, duration);
         None
     }
 
-    /// The frame of time `t`; rows are spread over the threads of the current pool, the samples do not depend on how many.
+    /// The frame of time `t`; rows are spread over the threads of the current pool, the samples do not depend
+    /// on how many.
     fn frame(&self, t: f64) -> Frame<f64> {
         let origin = self.origin();
         render(self.size(), |column, row| self.brightness(origin.0 + column as f64, origin.1 + row as f64, t))

@@ -3,12 +3,14 @@
 use super::Scene;
 use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
-use crate::types::{AffineFlow, FieldLayout, FlowField, MOTION_NAMES, Sites, Status};
+use crate::types::{AffineFlow, FieldLayout, FlowField, MOTION_NAMES, SamplingGrid, Status};
 
-/// Half the step of the central differences of displacements, px: errors of the paths' third derivatives and of rounding are both near 1e-9.
+/// Half the step of the central differences of displacements, px: errors of the paths' third derivatives and
+/// of rounding are both near 1e-9.
 const STEP: f64 = 1e-3;
 
-/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN where the scene has none.
+/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN
+/// where the scene has none.
 ///
 /// # Errors
 /// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
@@ -16,12 +18,15 @@ pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
     field(scene, t, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
 }
 
-/// What two frames can tell of the motion: the mean velocity, between the times `t + from` and `t + to`, of the matter that is at each pixel at time `t`.
+/// What two frames can tell of the motion: the mean velocity, between the times `t + from` and `t + to`, of
+/// the matter that is at each pixel at time `t`.
 ///
-/// With `d(t1)` the displacement since time `t` the flow is `(d(t + to) - d(t + from)) / (to - from)`, px/frame; the Jacobian is its derivative with
-/// respect to the place at time `t`, by central differences (good to 1e-8 /frame). `(0, 1)` is the displacement from a frame to the next,
-/// `(-1, 1)` the mean of the displacements since the last frame and to the next, `(-0.5, 0.5)` with `t` in the middle of two frames what
-/// joins them. It differs from [`truth`] wherever paths are curved. [`Status::Masked`] and NaN where the scene does not know.
+/// With `d(t1)` the displacement since time `t` the flow is `(d(t + to) - d(t + from)) / (to - from)`,
+/// px/frame; the Jacobian is its derivative with respect to the place at time `t`, by central differences
+/// (good to 1e-8 /frame). `(0, 1)` is the displacement from a frame to the next, `(-1, 1)` the mean of the
+/// displacements since the last frame and to the next, `(-0.5, 0.5)` with `t` in the middle of two frames
+/// what joins them. It differs from [`truth`] wherever paths are curved. [`Status::Masked`] and NaN where the
+/// scene does not know.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `between` where its times are not finite or equal.
@@ -47,11 +52,12 @@ pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<F
     })
 }
 
-/// The field whose motion at scene point `(x, y)` is `motion(x, y)`; rows are spread over the threads of the current pool.
+/// The field whose motion at scene point `(x, y)` is `motion(x, y)`; rows are spread over the threads of the
+/// current pool.
 fn field(scene: &dyn Scene, t: f64, motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync) -> Result<FlowField<f64>> {
     let layout = FieldLayout {
         frame_size: scene.size(),
-        sites: Sites::default(),
+        sites: SamplingGrid::default(),
         model: "truth".into(),
         parameters: MOTION_NAMES.map(String::from).to_vec(),
         frame_period: None,

@@ -1,6 +1,8 @@
-//! The affine-flow dynamical system of one pixel (WO2010/098160, (11)), its step over one frame, and the Jacobians of both.
+//! The affine-flow dynamical system of one pixel (WO2010/098160, (11)), its step over one frame, and the
+//! Jacobians of both.
 //!
-//! State `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`; the motion stands still, the brightness follows it: `i' = J(i) m = A(m) i`.
+//! State `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`; the motion stands still, the brightness
+//! follows it: `i' = J(i) m = A(m) i`.
 
 use super::kernel::transition::{Exact, Rk4, Step};
 
@@ -47,7 +49,8 @@ pub fn rate_jacobian(q: &State) -> Matrix {
     f
 }
 
-/// One frame of `q' = f(q) + w` by one classical Runge-Kutta step, the drift `w` held constant inside it, (54).
+/// One frame of `q' = f(q) + w` by one classical Runge-Kutta step, the drift `w` held constant inside it,
+/// (54).
 pub fn rk4(q: &State, w: &State) -> State {
     let add = |a: &State, s: f64, b: &State| -> State { std::array::from_fn(|k| a[k] + s * b[k]) };
     let slope = |q: &State| add(&rate(q), 1.0, w);
@@ -65,8 +68,8 @@ pub fn rk4_jacobian(q: &State) -> Matrix {
 
 /// One frame of `q' = f(q)` in closed form.
 ///
-/// With `[E e; 0 1] = expm(-[[M, (u, v)^T], [0, 0]])`, `g = (Ix, Iy)` and `H` the Hessian: `H <- E^T H E`, `g <- E^T (g + H e)`,
-/// `I <- I + g.e + e^T H e / 2`, right sides with the old values.
+/// With `[E e; 0 1] = expm(-[[M, (u, v)^T], [0, 0]])`, `g = (Ix, Iy)` and `H` the Hessian: `H <- E^T H E`, `g
+/// <- E^T (g + H e)`, `I <- I + g.e + e^T H e / 2`, right sides with the old values.
 pub fn exact(q: &State) -> State {
     step::<Exact>(q)
 }
@@ -142,7 +145,8 @@ mod tests {
 
     #[test]
     fn brightness_moves_with_the_flow() {
-        // After the step, the brightness at p is the old one at the place from which the flow carried it to p: follow many small exact steps.
+        // After the step, the brightness at p is the old one at the place from which the flow carried it to
+        // p: follow many small exact steps.
         let q = random_state(3, 0.5);
         let fine = {
             let mut state = q;

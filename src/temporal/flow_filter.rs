@@ -15,9 +15,10 @@ use rayon::prelude::*;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
 ///
-/// Each frame, the first included, is a prediction and an update. `T` is the working precision: `f32` is stable for a measurement noise of 0.25
-/// grey levels squared and more; with smaller noise, or a process noise far below it, use `f64` (in `f32` such filters keep running, but may need
-/// repairs, which are counted).
+/// Each frame, the first included, is a prediction and an update. `T` is the working precision: `f32` is
+/// stable for a measurement noise of 0.25 grey levels squared and more; with smaller noise, or a process
+/// noise far below it, use `f64` (in `f32` such filters keep running, but may need repairs, which are
+/// counted).
 ///
 /// ```
 /// use jacoflow::temporal::{FlowFilter, FlowFilterOptions};
@@ -50,8 +51,8 @@ impl<T: SimdReal> FlowFilter<T> {
     /// Filters that start, for frames of `frame_size = (width, height)`.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming the option that no filter can run with, or `frame_size` when the sites and their neighbourhoods have no room at all
-    /// (frames under 3x3).
+    /// [`Error::Argument`] naming the option that no filter can run with, or `frame_size` when the sites and
+    /// their neighbourhoods have no room at all (frames under 3x3).
     pub fn new(frame_size: (usize, usize), options: FlowFilterOptions) -> Result<Self> {
         options.check(frame_size)?;
         if frame_size.0 < 3 || frame_size.1 < 3 {
@@ -70,7 +71,8 @@ impl<T: SimdReal> FlowFilter<T> {
         Ok(Self { options, frame_size, frames: 0, repairs: 0, store, constants, decorrelation, fit })
     }
 
-    /// The same filter with other threads and, where one is given, another instruction set: for a filter that was saved elsewhere.
+    /// The same filter with other threads and, where one is given, another instruction set: for a filter that
+    /// was saved elsewhere.
     pub fn with_computation(mut self, threads: Threads, simd: Option<Level>) -> Self {
         self.options.threads = threads;
         self.options.simd = simd.or(self.options.simd);
@@ -106,15 +108,18 @@ impl<T: SimdReal> FlowFilter<T> {
         self.len() == 0
     }
 
-    /// Mean `q` (12) and covariance (12 x 12) at result site `site` (row by row), in grey levels, px and frames; `None` where there is no filter (border, mask).
+    /// Mean `q` (12) and covariance (12 x 12) at result site `site` (row by row), in grey levels, px and
+    /// frames; `None` where there is no filter (border, mask).
     pub fn state(&self, site: usize) -> Option<([f64; 12], [[f64; 12]; 12])> {
         let index = self.store.sites.binary_search(&site).ok()?;
         Some(self.store.state(index))
     }
 
-    /// Takes in the next frame: predicts, updates, and returns flow and Jacobian with the `Status` of each site.
+    /// Takes in the next frame: predicts, updates, and returns flow and Jacobian with the `Status` of each
+    /// site.
     ///
-    /// Where a neighbourhood holds a NaN the filter only predicts; that frame's result is NaN there, with status `NonFinite`.
+    /// Where a neighbourhood holds a NaN the filter only predicts; that frame's result is NaN there, with
+    /// status `NonFinite`.
     ///
     /// # Errors
     /// [`Error::Argument`] for a frame of another size; the filter is then unchanged.

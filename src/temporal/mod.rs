@@ -2,7 +2,8 @@
 //!
 //! [`recursive`] fuses the estimates of [`flow`](crate::flow) over time.
 //!
-//! [`dynamics`] is the dynamical system itself, for one pixel; [`FlowFilter`] runs it for every site of a frame, many pixels at once.
+//! [`dynamics`] is the dynamical system itself, for one pixel; [`FlowFilter`] runs it for every site of a
+//! frame, many pixels at once.
 
 pub mod dynamics;
 mod flow_filter;

@@ -5,20 +5,22 @@ use crate::filter::SigmaPoints;
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, Sites};
+use crate::types::{Mask, SamplingGrid};
 use serde::{Deserialize, Serialize};
 
 /// How the non-linear prediction is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FilterForm {
-    /// Sigma points of the state together with its process noise: 24 dimensions, 49 points, the noise held constant inside the step. The patent's form.
+    /// Sigma points of the state together with its process noise: 24 dimensions, 49 points, the noise held
+    /// constant inside the step. The patent's form.
     #[default]
     Augmented,
     /// Sigma points of the state alone (25), the process noise added to their covariance.
     NonAugmented,
-    /// Sigma points of the motion alone (13); given the motion the brightness part is linear, so its conditional covariance is carried exactly. The same
-    /// numbers as [`Self::NonAugmented`] with [`SquareRoot::MotionFirst`], but for rounding; see there how far that is from its default.
+    /// Sigma points of the motion alone (13); given the motion the brightness part is linear, so its
+    /// conditional covariance is carried exactly. The same numbers as [`Self::NonAugmented`] with
+    /// [`SquareRoot::MotionFirst`], but for rounding; see there how far that is from its default.
     Fast,
     /// Extended Kalman filter: linearised at the mean.
     Extended,
@@ -57,7 +59,8 @@ pub enum Transition {
     /// One step of the classical Runge-Kutta method; the patent's.
     #[default]
     Rk4,
-    /// The closed form: an affine velocity field maps quadratics to quadratics. Process noise is added at the end of the frame.
+    /// The closed form: an affine velocity field maps quadratics to quadratics. Process noise is added at the
+    /// end of the frame.
     Exact,
 }
 
@@ -84,15 +87,19 @@ impl Transition {
     }
 }
 
-/// In which order the Cholesky factor that spreads the sigma points takes the state: which of the many square roots `L`, `L L^T = P`, it is.
+/// In which order the Cholesky factor that spreads the sigma points takes the state: which of the many square
+/// roots `L`, `L L^T = P`, it is.
 ///
-/// To second order the points have the same moments with any root, beyond that not. On the patent's ramp (frames 200 to 399, `tests/filter_forms.rs` prints
-/// these figures) 25 points with the profile `measured` have rms errors of `u` that differ by less than 0.3 % between the two orders; while the
-/// filter settles the states are up to 1.9 standard deviations apart, then up to 0.12. With the patent's large process noise the order matters: the rms error of `u` is
-/// 0.063 px with the brightness first and 0.30 px with the motion first.
+/// To second order the points have the same moments with any root, beyond that not. On the patent's ramp
+/// (frames 200 to 399, `tests/filter_forms.rs` prints these figures) 25 points with the profile `measured`
+/// have rms errors of `u` that differ by less than 0.3 % between the two orders; while the filter settles the
+/// states are up to 1.9 standard deviations apart, then up to 0.12. With the patent's large process noise the
+/// order matters: the rms error of `u` is 0.063 px with the brightness first and 0.30 px with the motion
+/// first.
 ///
-/// Brightness first cannot be had from fewer points: each of its twelve columns moves the motion, in which the step is a polynomial of
-/// fourth degree, so that the step must be evaluated at 25 motions. Motion first, six of the columns leave the motion alone, and there the step is linear.
+/// Brightness first cannot be had from fewer points: each of its twelve columns moves the motion, in which
+/// the step is a polynomial of fourth degree, so that the step must be evaluated at 25 motions. Motion first,
+/// six of the columns leave the motion alone, and there the step is linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SquareRoot {
@@ -127,17 +134,19 @@ impl SquareRoot {
 
 /// Options of [`FlowFilter`](super::FlowFilter). The default is [`FlowFilterOptions::patent`].
 ///
-/// States are ordered `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, in 8-bit grey levels, px and frames.
+/// States are ordered `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, in 8-bit grey levels, px
+/// and frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowFilterOptions {
-    /// Pixels that a measurement takes in; 3x3. Weights, where it has any, make the measurement's noise the weighted fit's.
+    /// Pixels that a measurement takes in; 3x3. Weights, where it has any, make the measurement's noise the
+    /// weighted fit's.
     pub neighbourhood: Neighbourhood,
     /// How the prediction is carried out.
     pub form: FilterForm,
     /// How a state moves over one frame.
     pub transition: Transition,
-    /// Order of the square root; `None`: motion first for [`FilterForm::Fast`], which knows no other, else brightness first. Without meaning for
-    /// [`FilterForm::Extended`].
+    /// Order of the square root; `None`: motion first for [`FilterForm::Fast`], which knows no other, else
+    /// brightness first. Without meaning for [`FilterForm::Extended`].
     pub square_root: Option<SquareRoot>,
     /// Diagonal of the process noise Q, variances a frame; each >= 0.
     pub process_noise: [f64; 12],
@@ -149,15 +158,17 @@ pub struct FlowFilterOptions {
     pub initial_covariance: [f64; 12],
     /// Constants of the sigma points.
     pub sigma_points: SigmaPoints,
-    /// The sample value that stands for 255 grey levels: 255 for `u8` and for floats in grey levels, 65535 for `u16`, 1 for floats in [0, 1].
+    /// The sample value that stands for 255 grey levels: 255 for `u8` and for floats in grey levels, 65535
+    /// for `u16`, 1 for floats in [0, 1].
     pub full_scale: f64,
     /// Where the filters are; every pixel by default.
-    pub sites: Sites,
+    pub sites: SamplingGrid,
     /// Which pixels may be used; `None`: all.
     pub mask: Option<Mask>,
     /// Deliver the 6x6 covariance of the motion with each field (21 planes).
     pub covariance: bool,
-    /// Deliver the root mean square residual of the quadratic fit, grey levels: an estimate of the pixel noise, for free.
+    /// Deliver the root mean square residual of the quadratic fit, grey levels: an estimate of the pixel
+    /// noise, for free.
     pub residual: bool,
     /// Physical size `(dx, dy)` of a pixel: fields come in these units. States stay in px.
     pub pixel_pitch: (f64, f64),
@@ -176,10 +187,12 @@ impl Default for FlowFilterOptions {
 }
 
 impl FlowFilterOptions {
-    /// The patent's constants (embodiment 2): `Q = diag(1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3, 1e-3, 1e-3, 1e-3)`, `R = 1e-3`, start at 0, with what the
-    /// patent leaves open: `P0 = I`, `alpha = 1, beta = 2, kappa = 0`. Augmented, Runge-Kutta, 3x3.
+    /// The patent's constants (embodiment 2): `Q = diag(1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3,
+    /// 1e-3, 1e-3, 1e-3)`, `R = 1e-3`, start at 0, with what the patent leaves open: `P0 = I`, `alpha = 1,
+    /// beta = 2, kappa = 0`. Augmented, Runge-Kutta, 3x3.
     ///
-    /// Its process noise biases the divergence: on the patent's own scene `u_x` and `v_y` come out near +0.09 where the truth is 0.
+    /// Its process noise biases the divergence: on the patent's own scene `u_x` and `v_y` come out near +0.09
+    /// where the truth is 0.
     pub fn patent() -> Self {
         Self {
             neighbourhood: Neighbourhood::default(),
@@ -192,7 +205,7 @@ impl FlowFilterOptions {
             initial_covariance: [1.0; 12],
             sigma_points: SigmaPoints::default(),
             full_scale: 255.0,
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             mask: None,
             covariance: false,
             residual: true,
@@ -203,8 +216,9 @@ impl FlowFilterOptions {
         }
     }
 
-    /// Constants for raw 8-bit frames, not smoothed: 9x9 pixels, `R = 1/12` (the variance of rounding), and process noise small enough not to bias the
-    /// divergence. On the patent's scene its error is about a third of the patent's in `u` and a fiftieth in the Jacobian.
+    /// Constants for raw 8-bit frames, not smoothed: 9x9 pixels, `R = 1/12` (the variance of rounding), and
+    /// process noise small enough not to bias the divergence. On the patent's scene its error is about a
+    /// third of the patent's in `u` and a fiftieth in the Jacobian.
     pub fn measured() -> Self {
         Self {
             neighbourhood: Neighbourhood::square(9),

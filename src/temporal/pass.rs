@@ -21,8 +21,8 @@ const PASS_BLOCKS: usize = 2;
 
 /// Takes every block through measurement, prediction and update.
 ///
-/// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence functions that are not generic, and the
-/// detour through [`Any`].
+/// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence
+/// functions that are not generic, and the detour through [`Any`].
 #[allow(clippy::ptr_arg)] // A slice is no `Any`.
 pub(super) fn run<T: SimdReal>(
     filter: &mut FlowFilter<T>,
@@ -86,7 +86,8 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
     });
 }
 
-/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are wanted.
+/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are
+/// wanted.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows {
     pub covariance: usize,

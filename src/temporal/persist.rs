@@ -1,8 +1,8 @@
 //! Saving the filter's state and going on from it, bit for bit.
 //!
-//! One format, `.npz`: a text `header` (JSON: version, precision, sizes, options), `status` of every site (0 where there
-//! is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `covariance` `(filters, 78)` (lower triangles, row by row) and, where there is one,
-//! `mask` `(height, width)`. numpy can read it.
+//! One format, `.npz`: a text `header` (JSON: version, precision, sizes, options), `status` of every site (0
+//! where there is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `covariance` `(filters,
+//! 78)` (lower triangles, row by row) and, where there is one, `mask` `(height, width)`. numpy can read it.
 
 use super::flow_filter::FlowFilter;
 use super::kernel::{N, PACKED};
@@ -14,7 +14,7 @@ use crate::io::npz::{NpzReader, NpzWriter};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
-use crate::types::{Frame, Rect, Sites, Status};
+use crate::types::{Frame, Rect, SamplingGrid, Status};
 use serde::{Deserialize, Serialize};
 use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
@@ -83,10 +83,10 @@ impl SavedOptions {
             Neighbourhood::Points { offsets, sigma } => SavedNeighbourhood::Points { offsets, sigma },
         };
         let sites = match options.sites.clone() {
-            Sites::Grid { region, stride } => {
+            SamplingGrid::Grid { region, stride } => {
                 SavedSites::Grid { region: region.map(|r| [r.x, r.y, r.width, r.height]), stride }
             }
-            Sites::Points(points) => SavedSites::Points(points),
+            SamplingGrid::Points(points) => SavedSites::Points(points),
         };
         Self {
             neighbourhood,
@@ -116,9 +116,9 @@ impl SavedOptions {
         };
         let sites = match self.sites {
             SavedSites::Grid { region, stride } => {
-                Sites::Grid { region: region.map(|[x, y, width, height]| Rect { x, y, width, height }), stride }
+                SamplingGrid::Grid { region: region.map(|[x, y, width, height]| Rect { x, y, width, height }), stride }
             }
-            SavedSites::Points(points) => Sites::Points(points),
+            SavedSites::Points(points) => SamplingGrid::Points(points),
         };
         FlowFilterOptions {
             neighbourhood,
@@ -154,10 +154,12 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         Ok(self.write_to(writer)?.into_inner()?.into_inner())
     }
 
-    /// The filter that [`to_bytes`](Self::to_bytes) put down: on the same instruction set it goes on bit for bit.
+    /// The filter that [`to_bytes`](Self::to_bytes) put down: on the same instruction set it goes on bit for
+    /// bit.
     ///
     /// # Errors
-    /// [`Error::Format`] for bytes that are no filter state, of another version or of another precision than `T`.
+    /// [`Error::Format`] for bytes that are no filter state, of another version or of another precision than
+    /// `T`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         Self::read_from(NpzReader::new(Cursor::new(bytes), "filter state")?)
     }

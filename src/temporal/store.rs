@@ -7,7 +7,8 @@ use crate::jet::Reach;
 use crate::simd::SimdReal;
 use crate::types::Status;
 
-/// Sites that have a filter, and their states: per block of [`BLOCK`] sites, `PLANES` rows of `BLOCK` numbers. Border and masked sites have none.
+/// SamplingGrid that have a filter, and their states: per block of [`BLOCK`] sites, `PLANES` rows of `BLOCK`
+/// numbers. Border and masked sites have none.
 #[derive(Debug, Clone)]
 pub(super) struct Store<T> {
     /// Pixel index in the frame of each filter; padded to whole blocks with the last one.

@@ -4,24 +4,32 @@ use crate::types::{AnyFrame, Frame};
 
 /// Brightest value of a float picture whose white is 1, with room for noise and overshoot.
 const UNIT_WHITE: f64 = 1.5;
-/// Less is dark in a picture whose white is 1, and says little of it: black, noise, what a filter left round something bright.
+/// Less is dark in a picture whose white is 1, and says little of it: black, noise, what a filter left round
+/// something bright.
 const LIT: f64 = 0.1;
 /// Grey levels that no overshoot of a white of 1 reaches.
 const FAR_ABOVE: f64 = 16.0;
-/// Size of samples that are no brightness, grey levels or whatever they are in: such a frame is damaged, and sums over it lose all that the others say.
+/// Size of samples that are no brightness, grey levels or whatever they are in: such a frame is damaged, and
+/// sums over it lose all that the others say.
 pub const GREATEST: f64 = 1e9;
 /// Shares of the samples that may be hot or damaged: any at all, and those far above white.
 const DAMAGED: [f64; 2] = [1e-3, 1e-2];
 
-/// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast, gradient) are in these.
+/// How samples become 8-bit grey levels (0 to 255, not rounded): thresholds of trackers (noise, contrast,
+/// gradient) are in these.
 ///
-/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of their white. It is taken for 1, and they are multiplied by 255, unless more than a thousandth of a
-/// frame's samples up to 1e9 are above 1.5 and these are at least half of those that are not dark (above .1): then they are grey levels already. Where less than a hundredth is not dark, most of what exceeds 1.5 must
-/// also be above 16; and where what is above 16 is a hundredth of the frame and most of what exceeds 1.5, dim surroundings do not matter. So patches of hot pixels decide nothing.
+/// uint8 is taken as it is, uint16 is divided by 257, so that its white is 255 too. Floats say nothing of
+/// their white. It is taken for 1, and they are multiplied by 255, unless more than a thousandth of a frame's
+/// samples up to 1e9 are above 1.5 and these are at least half of those that are not dark (above .1): then
+/// they are grey levels already. Where less than a hundredth is not dark, most of what exceeds 1.5 must also
+/// be above 16; and where what is above 16 is a hundredth of the frame and most of what exceeds 1.5, dim
+/// surroundings do not matter. So patches of hot pixels decide nothing.
 ///
-/// A film may begin with black, which says nothing: the first frame of grey levels after it sets that right ([`revised`](Self::revised)). The other way there is none: brightness must not jump.
+/// A film may begin with black, which says nothing: the first frame of grey levels after it sets that right
+/// ([`revised`](Self::revised)). The other way there is none: brightness must not jump.
 ///
-/// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be scaled beforehand.
+/// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be
+/// scaled beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GreyLevels {
     /// What floats are multiplied by.
@@ -34,7 +42,8 @@ impl GreyLevels {
         Self::decide_together(std::slice::from_ref(first))
     }
 
-    /// Decides by frames of one moment, such as two views: grey levels if one of floats holds them, for the others' types say what white is.
+    /// Decides by frames of one moment, such as two views: grey levels if one of floats holds them, for the
+    /// others' types say what white is.
     pub fn decide_together(frames: &[AnyFrame]) -> Self {
         Self { float: 255.0 }.revised(frames)
     }
@@ -53,7 +62,8 @@ impl GreyLevels {
         }
     }
 
-    /// A frame in grey levels, as [`Tracker::update`](super::Tracker::update) takes it. NaN and infinities stay what they are.
+    /// A frame in grey levels, as [`Tracker::update`](super::Tracker::update) takes it. NaN and infinities
+    /// stay what they are.
     pub fn convert(&self, frame: &AnyFrame) -> Frame<f64> {
         Self::scaled(frame.to_real(), self.gain(frame))
     }

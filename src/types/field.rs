@@ -1,6 +1,6 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
-use super::{AffineFlow, Sites, Status};
+use super::{AffineFlow, SamplingGrid, Status};
 use crate::error::Result;
 use crate::math::Real;
 
@@ -10,7 +10,7 @@ pub struct FieldLayout {
     /// Size `(width, height)` of the frames.
     pub frame_size: (usize, usize),
     /// Where the estimates are.
-    pub sites: Sites,
+    pub sites: SamplingGrid,
     /// Name of the motion model.
     pub model: String,
     /// Names of the model's parameters, in plane order. The first two are always `u`, `v`.
@@ -21,15 +21,16 @@ pub struct FieldLayout {
     pub pixel_pitch: (f64, f64),
     /// Index of the frame the estimate belongs to, counted from the first frame of the sequence.
     pub frame_index: usize,
-    /// How far errors of neighbouring estimates go together, px: about `exp(-d^2 / (4 l^2))` at distance `d`, as with estimates from Gaussian windows of
-    /// standard deviation `l` that overlap. 0: independent, or not known.
+    /// How far errors of neighbouring estimates go together, px: about `exp(-d^2 / (4 l^2))` at distance `d`,
+    /// as with estimates from Gaussian windows of standard deviation `l` that overlap. 0: independent, or not
+    /// known.
     pub correlation_length: f64,
 }
 
 /// Flow with its Jacobian at `width x height` sites (points: one row), as planes.
 ///
-/// Plane `p` of `motion` is parameter `layout.parameters[p]`; each plane is row-major. For the affine model they
-/// are `u, v, u_x, v_x, u_y, v_y` in px/frame and 1/frame (or in `pixel_pitch` units per frame).
+/// Plane `p` of `motion` is parameter `layout.parameters[p]`; each plane is row-major. For the affine model
+/// they are `u, v, u_x, v_x, u_y, v_y` in px/frame and 1/frame (or in `pixel_pitch` units per frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowField<T> {
     /// What the planes mean.
@@ -42,8 +43,9 @@ pub struct FlowField<T> {
     pub motion: Vec<T>,
     /// `P (P + 1) / 2` planes: the upper triangle of the covariance, row by row (0,0), (0,1), ... (1,1) ...
     pub covariance: Option<Vec<T>>,
-    /// The part of `covariance` that repeats itself from one time to the next (biases, misfit) and does not average out; planes in the same order. Only where
-    /// the method tells it apart and `Common::systematic` asks for it.
+    /// The part of `covariance` that repeats itself from one time to the next (biases, misfit) and does not
+    /// average out; planes in the same order. Only where the method tells it apart and `EstimatorOptions::systematic`
+    /// asks for it.
     pub systematic: Option<Vec<T>>,
     /// Status of each site.
     pub status: Vec<Status>,
@@ -53,7 +55,8 @@ pub struct FlowField<T> {
     pub rank: Option<Vec<u8>>,
     /// Condition number of the (column-scaled) equations: largest over smallest singular value.
     pub condition: Option<Vec<T>>,
-    /// Standard deviation, px, of the Gaussian window that the slopes rest on; only where the method chooses one at each site.
+    /// Standard deviation, px, of the Gaussian window that the slopes rest on; only where the method chooses
+    /// one at each site.
     pub window: Option<Vec<T>>,
 }
 
@@ -61,12 +64,13 @@ impl<T: Real> FlowField<T> {
     /// A field of NaN with status `Border`, to be filled by an estimator.
     ///
     /// # Errors
-    /// As [`Sites::shape`].
+    /// As [`SamplingGrid::shape`].
     pub fn empty(layout: FieldLayout, covariance: bool) -> Result<Self> {
         Self::of(layout, covariance, T::nan())
     }
 
-    /// The same of zeros, for an estimator that writes every site: memory that is not written yet need not be there yet.
+    /// The same of zeros, for an estimator that writes every site: memory that is not written yet need not be
+    /// there yet.
     pub(crate) fn unwritten(layout: FieldLayout, covariance: bool) -> Result<Self> {
         Self::of(layout, covariance, T::from_f64(0.0))
     }
@@ -114,7 +118,8 @@ impl<T: Real> FlowField<T> {
         }
         if m[0].finite() { AffineFlow::from_array(m) } else { AffineFlow::from_array([T::nan(); 6]) }
     }
-    /// Standard deviation of the parameter called `name` at every site: the root of its variance. `None` without covariance or such a parameter.
+    /// Standard deviation of the parameter called `name` at every site: the root of its variance. `None`
+    /// without covariance or such a parameter.
     pub fn standard_deviation(&self, name: &str) -> Option<Vec<T>> {
         let (planes, n, p) = (self.covariance.as_ref()?, self.len(), self.layout.parameters.len());
         let k = self.layout.parameters.iter().position(|q| q == name)?;
@@ -122,8 +127,8 @@ impl<T: Real> FlowField<T> {
         let plane = k * p - k * k.saturating_sub(1) / 2;
         Some(planes[plane * n..(plane + 1) * n].iter().map(|v| T::from_f64(v.to_f64().sqrt())).collect())
     }
-    /// The six planes `u, v, u_x, v_x, u_y, v_y`, one after the other; parameters that the model lacks are zero where the flow is
-    /// known and NaN elsewhere.
+    /// The six planes `u, v, u_x, v_x, u_y, v_y`, one after the other; parameters that the model lacks are
+    /// zero where the flow is known and NaN elsewhere.
     pub fn affine_planes(&self) -> Vec<T> {
         let n = self.len();
         let mut planes = vec![T::nan(); 6 * n];
@@ -134,13 +139,15 @@ impl<T: Real> FlowField<T> {
         }
         planes
     }
-    /// Covariance matrices of `(u, v, u_x, v_x, u_y, v_y)`, 36 values a site, as [`FlowField::covariance_at`] gives them.
+    /// Covariance matrices of `(u, v, u_x, v_x, u_y, v_y)`, 36 values a site, as [`FlowField::covariance_at`]
+    /// gives them.
     pub fn covariance_matrices(&self) -> Option<Vec<T>> {
         self.covariance.as_ref()?;
         let matrices = (0..self.len()).filter_map(|site| self.covariance_at(site));
         Some(matrices.flatten().flatten().map(T::from_f64).collect())
     }
-    /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`, px/frame and 1/frame; rows of parameters that the model lacks are zero.
+    /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`, px/frame and 1/frame; rows of parameters
+    /// that the model lacks are zero.
     pub fn covariance_at(&self, index: usize) -> Option<[[f64; 6]; 6]> {
         let planes = self.covariance.as_ref()?;
         let (n, p) = (self.len(), self.layout.parameters.len());
@@ -174,7 +181,7 @@ mod tests {
     fn planes_are_found_by_name_and_missing_parameters_are_zero() {
         let layout = FieldLayout {
             frame_size: (3, 2),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "translational".into(),
             parameters: vec!["u".into(), "v".into()],
             frame_period: None,

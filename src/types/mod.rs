@@ -12,6 +12,6 @@ pub use colour::{AnyColourFrame, ColourFrame};
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};
-pub use region::{Rect, Sites};
+pub use region::{Rect, SamplingGrid};
 pub use status::Status;
 pub use track::{TargetBox, TrackState, TrackStatus};

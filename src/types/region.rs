@@ -17,7 +17,7 @@ pub struct Rect {
 
 /// The pixels at which estimates are made.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Sites {
+pub enum SamplingGrid {
     /// Every `stride`-th column and row of a region (`None`: the whole frame), from its upper left corner.
     Grid {
         /// The region.
@@ -29,13 +29,13 @@ pub enum Sites {
     Points(Vec<(usize, usize)>),
 }
 
-impl Default for Sites {
+impl Default for SamplingGrid {
     fn default() -> Self {
         Self::Grid { region: None, stride: 1 }
     }
 }
 
-impl Sites {
+impl SamplingGrid {
     /// Columns and rows of the result for frames of `size = (width, height)`: points come as one row.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl Sites {
         }
     }
 
-    /// The pixel `(x, y)` of result column `col`, row `row`. Call [`Sites::shape`] first.
+    /// The pixel `(x, y)` of result column `col`, row `row`. Call [`SamplingGrid::shape`] first.
     #[inline]
     pub fn pixel(&self, col: usize, row: usize) -> (usize, usize) {
         match self {
@@ -95,16 +95,16 @@ mod tests {
     #[test]
     fn grid_shape_and_pixels() {
         let region = Some(Rect { x: 2, y: 1, width: 5, height: 4 });
-        let sites = Sites::Grid { region, stride: 2 };
+        let sites = SamplingGrid::Grid { region, stride: 2 };
         assert_eq!(sites.shape((10, 6)).unwrap(), (3, 2));
         assert_eq!(sites.pixel(2, 1), (6, 3));
         assert!(sites.shape((6, 6)).unwrap_err().to_string().contains("region"));
-        assert!(Sites::Grid { region: None, stride: 0 }.shape((4, 4)).is_err());
+        assert!(SamplingGrid::Grid { region: None, stride: 0 }.shape((4, 4)).is_err());
     }
 
     #[test]
     fn points_outside_are_named() {
-        let sites = Sites::Points(vec![(1, 1), (4, 0)]);
+        let sites = SamplingGrid::Points(vec![(1, 1), (4, 0)]);
         assert!(sites.shape((4, 4)).unwrap_err().to_string().contains("(4, 0)"));
     }
 }

@@ -19,10 +19,12 @@ pub enum Status {
     MinNorm = 5,
     /// A filter lost its positive-definite covariance and was restarted here.
     Repaired = 6,
-    /// No estimate at this time: what the estimates before say, with a covariance that grows until the next one.
+    /// No estimate at this time: what the estimates before say, with a covariance that grows until the next
+    /// one.
     Predicted = 7,
-    /// A full estimate that the frames contradict: along it brightness changes by far more than usual. What is seen is hidden in another frame (occlusion), has changed, or
-    /// moves otherwise; the covariance does not know.
+    /// A full estimate that the frames contradict: along it brightness changes by far more than usual. What
+    /// is seen is hidden in another frame (occlusion), has changed, or moves otherwise; the covariance does
+    /// not know.
     Inconsistent = 8,
 }
 

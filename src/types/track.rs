@@ -1,6 +1,7 @@
 //! What a tracker says of its target, frame by frame.
 
-/// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that its centre is `(x + width / 2, y + height / 2)`.
+/// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that
+/// its centre is `(x + width / 2, y + height / 2)`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TargetBox {
     /// Left side, px.
@@ -71,7 +72,8 @@ impl TrackStatus {
     }
 }
 
-/// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is NaN or `None`.
+/// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is
+/// NaN or `None`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrackState {
     /// Which frame, counted from the one the tracker began with (0).

@@ -43,7 +43,8 @@ fn an_approach_gives_direction_focus_and_time_to_contact() {
     assert_eq!(rows.len(), 3);
     for row in &rows {
         let number = |name: &str| row[name].parse::<f64>().unwrap();
-        // The epipole sits among the points, where little is known of their depths, and errors of a small picture go together; that may be told.
+        // The epipole sits among the points, where little is known of their depths, and errors of a small
+        // picture go together; that may be told.
         assert!(["ok", "low_snr", "ill_conditioned"].contains(&row["status"].as_str()), "{row:?}");
         assert!(number("u_z") < -0.97, "{row:?}");
         for (name, truth) in [("foe_x", 64.0), ("foe_y", 48.0)] {
@@ -129,7 +130,8 @@ fn a_region_has_points_enough() {
 const NEARER: f64 = 1.03;
 const TURN: f64 = 0.01;
 
-/// Frames of a textured plane that is approached by a camera that turns, and of a thing before it, 72 x 60 px around (121, 82), that comes nearer faster; 192 x 144 px.
+/// Frames of a textured plane that is approached by a camera that turns, and of a thing before it, 72 x 60 px
+/// around (121, 82), that comes nearer faster; 192 x 144 px.
 fn thing_ahead(place: &Place, folder: &str, count: i32) {
     std::fs::create_dir(place.path(folder)).unwrap();
     let shade = |seed: f64, x: f64, y: f64| -> f64 {
@@ -153,7 +155,8 @@ fn thing_ahead(place: &Place, folder: &str, count: i32) {
     }
 }
 
-/// In a narrow field a rotation trades against a sideways motion and the approach: the rest of the picture tells the rotation.
+/// In a narrow field a rotation trades against a sideways motion and the approach: the rest of the picture
+/// tells the rotation.
 #[test]
 fn a_thing_ahead_has_its_own_time_to_contact() {
     let place = Place::new();
@@ -177,7 +180,8 @@ fn a_thing_ahead_has_its_own_time_to_contact() {
     assert!(ended.code == 2 && ended.err.contains("--region"), "{}", ended.err);
 }
 
-/// The bound is estimated, too, with the depths found: near the deviation where weights are good, and not told where depths are mostly noise.
+/// The bound is estimated, too, with the depths found: near the deviation where weights are good, and not
+/// told where depths are mostly noise.
 #[test]
 fn the_bound_stands_beside_the_deviations() {
     let place = Place::new();
@@ -193,7 +197,8 @@ fn the_bound_stands_beside_the_deviations() {
     }
 }
 
-/// A plane that faces the camera and is approached obliquely looks as if it were approached straight by a camera that turns.
+/// A plane that faces the camera and is approached obliquely looks as if it were approached straight by a
+/// camera that turns.
 #[test]
 fn other_motions_that_explain_the_flow_have_a_table_of_their_own() {
     let place = Place::new();

@@ -4,7 +4,8 @@ use super::support::Place;
 use jacoflow::io::{read_flo, read_npz};
 use std::path::PathBuf;
 
-/// A folder or file of the recorded sequences: `JACOFLOW_DATA`, or `../shared/data` beside the package; `None`, with a note, when it is not there.
+/// A folder or file of the recorded sequences: `JACOFLOW_DATA`, or `../shared/data` beside the package;
+/// `None`, with a note, when it is not there.
 fn data(part: &str) -> Option<String> {
     let root = std::env::var_os("JACOFLOW_DATA")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
@@ -16,7 +17,8 @@ fn data(part: &str) -> Option<String> {
     Some(path.to_string_lossy().into_owned())
 }
 
-/// Runs `flow` with pictures and returns the valid share; every picture must be there and not be of one colour.
+/// Runs `flow` with pictures and returns the valid share; every picture must be there and not be of one
+/// colour.
 fn to_pictures(place: &Place, input: &[String], more: &str, index: usize) -> f64 {
     let mut arguments: Vec<String> = vec!["flow".into()];
     arguments.extend_from_slice(input);
@@ -86,7 +88,8 @@ fn ranges(folder: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Its closing speed is that of one line through the ranges of the frames; the rotation of the rest of the picture is what makes its time to contact known.
+/// Its closing speed is that of one line through the ranges of the frames; the rotation of the rest of the
+/// picture is what makes its time to contact known.
 #[test]
 fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
     let Some(folder) = data("ttc_kitti_lidar") else { return };

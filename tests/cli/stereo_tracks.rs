@@ -1,4 +1,5 @@
-//! `jacoflow track --method stereo`: pairs in every layout, tables, the graph, pictures, mistakes, interruption.
+//! `jacoflow track --method stereo`: pairs in every layout, tables, the graph, pictures, mistakes,
+//! interruption.
 
 use super::stereo::{HEIGHT, WIDTH, cell, header, recorded_as};
 use super::support::{Place, temporary};
@@ -184,7 +185,8 @@ fn an_interrupted_run_of_pairs_leaves_no_half_file() {
         assert!(start.elapsed() < Duration::from_secs(60), "waited in vain for three pictures");
         std::thread::sleep(Duration::from_millis(10));
     }
-    // Pictures are written before the rows of the pair; the pipe stays open, so that the run waits for a pair when the signal comes.
+    // Pictures are written before the rows of the pair; the pipe stays open, so that the run waits for a pair
+    // when the signal comes.
     std::thread::sleep(Duration::from_millis(200));
     assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();

@@ -103,7 +103,8 @@ fn an_interrupted_single_file_does_not_appear() {
     let place = Place::new();
     let mut child = start(&place, "flow - -o one.npz");
     let mut pipe = child.stdin.take().unwrap();
-    // Two frames are more than a pipe holds: once they are written, the run is reading them, and a signal finds it at work.
+    // Two frames are more than a pipe holds: once they are written, the run is reading them, and a signal
+    // finds it at work.
     let (width, height) = (512, 512);
     pipe.write_all(format!("YUV4MPEG2 W{width} H{height} F25:1 Ip A1:1 Cmono\n").as_bytes()).unwrap();
     for _ in 0..2 {

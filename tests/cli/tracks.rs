@@ -230,7 +230,8 @@ fn an_interrupted_run_leaves_no_half_file() {
     pipe.write_all(&recording(4)).unwrap();
     pipe.flush().unwrap();
     wait_until("four pictures", || place.path("o/track_000003.png").exists());
-    // Pictures are written before the rows of the frame; the pipe stays open, so that the run waits for a frame when the signal comes.
+    // Pictures are written before the rows of the frame; the pipe stays open, so that the run waits for a
+    // frame when the signal comes.
     std::thread::sleep(Duration::from_millis(200));
     let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(kill.success());

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// The generic filter with the plain nine-pixel measurement: nothing shared with the dense filter but the system itself.
+/// The generic filter with the plain nine-pixel measurement: nothing shared with the dense filter but the
+/// system itself.
 fn oracle(
     frames: &[Frame<f64>],
     at: (usize, usize),
@@ -109,7 +110,7 @@ fn every_level_equals_the_generic_filter_with_every_pixel_measured() {
 fn thirteen_points_equal_twenty_five_that_take_the_motion_first() {
     let frames: Vec<_> = (0..25).map(|t| texture(16, 16, t)).collect();
     let want = oracle(&frames, (8, 8), FilterForm::NonAugmented, 3, true);
-    let sites = Sites::Points(vec![(8, 8)]);
+    let sites = SamplingGrid::Points(vec![(8, 8)]);
     let options = FlowFilterOptions { form: FilterForm::Fast, sites, ..FlowFilterOptions::patent() };
     let mut filter = FlowFilter::<f64>::new((16, 16), options).unwrap();
     for (frame, want) in frames.iter().zip(&want) {
@@ -126,11 +127,12 @@ fn any_neighbourhood_updates_as_its_pixels_would() {
     let options = FlowFilterOptions {
         neighbourhood: Neighbourhood::Points { offsets: offsets.clone(), sigma: None },
         form: FilterForm::NonAugmented,
-        sites: Sites::Points(vec![(8, 8)]),
+        sites: SamplingGrid::Points(vec![(8, 8)]),
         ..FlowFilterOptions::patent()
     };
     let mut filter = FlowFilter::<f64>::new((16, 16), options).unwrap();
-    // The first prediction keeps P0 and adds what the flow of unit variance does to nothing: P = I + Q, mean 0.
+    // The first prediction keeps P0 and adds what the flow of unit variance does to nothing: P = I + Q, mean
+    // 0.
     let frame = texture(16, 16, 0);
     filter.push(&frame).unwrap();
     let (mean, covariance) = filter.state(0).unwrap();
@@ -170,7 +172,7 @@ fn exact_transition_agrees_with_runge_kutta_where_motion_is_small() {
             let options = FlowFilterOptions {
                 form,
                 transition,
-                sites: Sites::Points(vec![(8, 8)]),
+                sites: SamplingGrid::Points(vec![(8, 8)]),
                 measurement_noise: 0.01,
                 process_noise: [1e-4, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8, 1e-8],
                 initial_covariance: [1e4, 10.0, 10.0, 1.0, 1.0, 1.0, 0.1, 0.1, 1e-3, 1e-3, 1e-3, 1e-3],

@@ -76,7 +76,7 @@ fn options_survive_saving() {
     let mask = Mask::from_fn(20, 12, |x, y| (x, y) != (7, 6));
     let options = FlowFilterOptions {
         neighbourhood: Neighbourhood::Rectangle { width: 5, height: 3, sigma: Some(1.5) },
-        sites: Sites::Grid { region: Some(Rect { x: 2, y: 1, width: 15, height: 9 }), stride: 2 },
+        sites: SamplingGrid::Grid { region: Some(Rect { x: 2, y: 1, width: 15, height: 9 }), stride: 2 },
         mask: Some(mask),
         form: FilterForm::Fast,
         transition: Transition::Exact,
@@ -157,13 +157,14 @@ fn bad_pixels_damage_only_what_they_touch_and_only_for_a_while() {
 fn points_regions_and_masks_compute_the_same_pixels() {
     let size = (40, 30);
     let points = vec![(5, 5), (20, 11), (0, 0), (39, 29), (20, 11)];
-    let with = |sites: Sites, mask: Option<Mask>| FlowFilterOptions { sites, mask, ..FlowFilterOptions::patent() };
+    let with =
+        |sites: SamplingGrid, mask: Option<Mask>| FlowFilterOptions { sites, mask, ..FlowFilterOptions::patent() };
     let mask = Mask::from_fn(size.0, size.1, |x, y| (x, y) != (10, 10));
-    let grid = Sites::Grid { region: Some(Rect { x: 4, y: 3, width: 20, height: 18 }), stride: 3 };
-    let mut dense = FlowFilter::<f64>::new(size, with(Sites::default(), None)).unwrap();
-    let mut at_points = FlowFilter::<f64>::new(size, with(Sites::Points(points.clone()), None)).unwrap();
+    let grid = SamplingGrid::Grid { region: Some(Rect { x: 4, y: 3, width: 20, height: 18 }), stride: 3 };
+    let mut dense = FlowFilter::<f64>::new(size, with(SamplingGrid::default(), None)).unwrap();
+    let mut at_points = FlowFilter::<f64>::new(size, with(SamplingGrid::Points(points.clone()), None)).unwrap();
     let mut on_grid = FlowFilter::<f64>::new(size, with(grid.clone(), None)).unwrap();
-    let mut masked = FlowFilter::<f64>::new(size, with(Sites::default(), Some(mask))).unwrap();
+    let mut masked = FlowFilter::<f64>::new(size, with(SamplingGrid::default(), Some(mask))).unwrap();
     for t in 0..3 {
         let frame = texture(size.0, size.1, t);
         let all = dense.push(&frame).unwrap();
@@ -202,7 +203,7 @@ fn p_status(filter: &mut FlowFilter<f64>, site: usize) -> Status {
 #[test]
 fn grey_scale_pitch_and_covariance_are_in_their_units() {
     let frames: Vec<_> = (0..4).map(|t| texture(16, 16, t)).collect();
-    let sites = Sites::Points(vec![(8, 8)]);
+    let sites = SamplingGrid::Points(vec![(8, 8)]);
     let options = FlowFilterOptions { sites, covariance: true, ..FlowFilterOptions::patent() };
     let scaled = FlowFilterOptions { full_scale: 1.0, pixel_pitch: (2.0, 0.5), ..options.clone() };
     let mut a = FlowFilter::<f64>::new((16, 16), options).unwrap();
@@ -256,7 +257,7 @@ fn unusable_options_and_frames_are_named() {
         (FlowFilterOptions { measurement_noise: 0.0, ..patent() }, "measurement_noise"),
         (FlowFilterOptions { full_scale: f64::NAN, ..patent() }, "full_scale"),
         (FlowFilterOptions { mask: Some(Mask::filled(3, 3, true)), ..patent() }, "mask"),
-        (FlowFilterOptions { sites: Sites::Points(vec![(9, 0)]), ..patent() }, "points"),
+        (FlowFilterOptions { sites: SamplingGrid::Points(vec![(9, 0)]), ..patent() }, "points"),
         (FlowFilterOptions { pixel_pitch: (0.0, 1.0), ..patent() }, "pixel_pitch"),
     ] {
         let text = message((8, 8), options);
@@ -275,7 +276,7 @@ fn constant_pictures_and_empty_site_lists_are_no_errors() {
         let field = filter.push(&Frame::filled(8, 8, 77.0f32)).unwrap();
         assert!(field.affine(27).to_array().iter().all(|v| v.is_finite()));
     }
-    let none = FlowFilterOptions { sites: Sites::Points(Vec::new()), ..FlowFilterOptions::patent() };
+    let none = FlowFilterOptions { sites: SamplingGrid::Points(Vec::new()), ..FlowFilterOptions::patent() };
     let mut filter = FlowFilter::<f32>::new((8, 8), none).unwrap();
     assert!(filter.push(&Frame::filled(8, 8, 1.0)).unwrap().is_empty());
     assert!(FlowFilter::<f32>::from_bytes(&filter.to_bytes().unwrap()).unwrap().is_empty());

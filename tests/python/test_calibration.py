@@ -130,7 +130,7 @@ def test_deviations_of_mirrored_frames_are_mirrored(size):
     mirrored = jacoflow.estimate([np.ascontiguousarray(frame[::-1, ::-1]) for frame in frames], time_scheme="pair").std("u")[::-1, ::-1]
     sides = [np.s_[:2], np.s_[-2:], np.s_[:, :2], np.s_[:, -2:]]
     for side in sides:
-        # Sites are every second pixel, so that the estimates themselves differ at an edge.
+        # SamplingGrid are every second pixel, so that the estimates themselves differ at an edge.
         assert 0.5 < np.median(mirrored[side]) / np.median(deviations[side]) < 2.0
         assert np.median(deviations[side]) > 1.5 * np.median(deviations)
     assert abs(np.log(mirrored / deviations)[16:-16, 16:-16]).mean() < 0.1

@@ -1,18 +1,19 @@
 //! Whether the covariance is as wide as the errors are.
 
 use super::{REFERENCE, TRIPLE, estimate, raw};
-use jacoflow::flow::Common;
+use jacoflow::flow::EstimatorOptions;
 use jacoflow::flow::windowed::{RowSet, WindowedOptions};
 use jacoflow::synth::texture::Noise;
 use jacoflow::synth::{AffineTexture, Rounding, Scene, Sensor};
-use jacoflow::types::{Frame, Rect, Sites};
+use jacoflow::types::{Frame, Rect, SamplingGrid};
 use nalgebra::{Matrix6, Vector6};
 
-/// Mean over noise realisations and sites of `e^T C^-1 e`, e being the error against the truth and against the realisations' mean.
+/// Mean over noise realisations and sites of `e^T C^-1 e`, e being the error against the truth and against
+/// the realisations' mean.
 fn nees(
     scene: &AffineTexture,
     options: &WindowedOptions,
-    common: &Common,
+    common: &EstimatorOptions,
     sensor: f64,
     realisations: u64,
 ) -> (f64, f64) {
@@ -65,8 +66,13 @@ impl Case {
     /// [`nees`] with the noise known and read from the frames.
     fn nees(&self, realisations: u64) -> [(f64, f64); 2] {
         let region = Some(Rect { x: 18, y: 18, width: 48, height: 48 });
-        let common = Common { sites: Sites::Grid { region, stride: 6 }, covariance: true, ..Common::default() };
-        let known = Common { noise: Some((self.noise * self.noise + 1.0 / 12.0_f64).sqrt()), ..common.clone() };
+        let common = EstimatorOptions {
+            sites: SamplingGrid::Grid { region, stride: 6 },
+            covariance: true,
+            ..EstimatorOptions::default()
+        };
+        let known =
+            EstimatorOptions { noise: Some((self.noise * self.noise + 1.0 / 12.0_f64).sqrt()), ..common.clone() };
         let options = WindowedOptions { rows: self.rows, sigma: self.sigma, presmooth: self.presmooth, ..raw() };
         let texture = Noise::new(self.grain, 40.0, 128.0, 5).unwrap();
         let scene = AffineTexture::with_noise((84, 84), self.motion, texture);
@@ -84,8 +90,9 @@ impl std::fmt::Display for Case {
 const SLOW: [f64; 6] = [0.1, 0.05, 0.003, 0.006, -0.006, 0.003];
 const SOURCES: [&str; 2] = ["known", "from the frames"];
 
-/// Over noise realisations the normalised error squared of the six parameters averages 6, and may lie between 5 and 7.5: the whole error, slow motion and the
-/// faster reference motion, the noise known and read from the frames.
+/// Over noise realisations the normalised error squared of the six parameters averages 6, and may lie between
+/// 5 and 7.5: the whole error, slow motion and the faster reference motion, the noise known and read from the
+/// frames.
 #[test]
 fn covariance_is_calibrated() {
     let fair = 5.0..=7.5;
@@ -104,7 +111,8 @@ fn covariance_is_calibrated() {
             for ((total, about), word) in case.nees(12).into_iter().zip(SOURCES) {
                 println!("{case}, noise {word}: {total:.2}, about the mean {about:.2}");
                 assert!(fair.contains(&total), "{case}, noise {word}: {total}");
-                // Where the covariance holds a bias that scatter does not, scatter alone makes up less than 6.
+                // Where the covariance holds a bias that scatter does not, scatter alone makes up less than
+                // 6.
                 assert!(motion != SLOW || about > 4.9, "{case}, noise {word}: {about} about the mean");
             }
         }
@@ -149,7 +157,8 @@ fn calibration_over_every_setting() {
     }
 }
 
-/// A grating does not tell the motion along its lines. With noise the equations have full rank all the same; the deviation must say what is known.
+/// A grating does not tell the motion along its lines. With noise the equations have full rank all the same;
+/// the deviation must say what is known.
 #[test]
 fn what_only_noise_determines_has_a_wide_deviation() {
     let grating = |t: f64| Frame::from_fn(64, 56, |x, _| 100.0 + 50.0 * ((x as f64 - 0.3 * t) / 4.0).sin());
@@ -157,7 +166,7 @@ fn what_only_noise_determines_has_a_wide_deviation() {
         let camera = Sensor::eight_bit(noise, 9);
         let frames: Vec<Frame<f64>> =
             TRIPLE.iter().enumerate().map(|(k, &t)| camera.apply(&grating(t), k as u64)).collect();
-        let common = Common { covariance: true, ..Common::default() };
+        let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
         let field = estimate(&frames, &WindowedOptions::default(), &common);
         let median = |k: usize| {
             let valid = (0..field.len()).filter(|&site| field.status[site].is_valid());

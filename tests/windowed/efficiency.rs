@@ -1,17 +1,21 @@
 //! How much of what the frames tell about the motion the estimate gets out of them.
 //!
-//! For a pixel with gradient `g` brightness constancy is one equation, `a . m = -d + e` with `a = (g_x, g_y, g_x dx, g_y dx, g_x dy, g_y dy)`, `d` the difference of the frames over time
-//! and `e` the noise of the frames in it: variance `2 s^2` for a pair, `s^2 / 2` for half the difference of the outer frames of a triple (the variance that least squares leaves of a velocity from three
-//! times, so that the middle frame cannot add to it). With weights `w` the weighted likelihood has the information `N = sum w a a^T / var(e)`, its score the variance `S = sum w^2 a a^T / var(e)`, and the bound for
-//! estimators of that weighting is `N^-1 S N^-1` (V. Godambe, 1960); for equal weights that is the Cramer-Rao bound. It knows the texture's exact gradients, and takes the window of the estimate; `N^-1`
-//! alone, as if pixels far from the centre were noisier, would be 2 (flow) to 4 times (Jacobian) as wide and no test.
+//! For a pixel with gradient `g` brightness constancy is one equation, `a . m = -d + e` with `a = (g_x, g_y,
+//! g_x dx, g_y dx, g_x dy, g_y dy)`, `d` the difference of the frames over time and `e` the noise of the
+//! frames in it: variance `2 s^2` for a pair, `s^2 / 2` for half the difference of the outer frames of a
+//! triple (the variance that least squares leaves of a velocity from three times, so that the middle frame
+//! cannot add to it). With weights `w` the weighted likelihood has the information `N = sum w a a^T /
+//! var(e)`, its score the variance `S = sum w^2 a a^T / var(e)`, and the bound for estimators of that
+//! weighting is `N^-1 S N^-1` (V. Godambe, 1960); for equal weights that is the Cramer-Rao bound. It knows
+//! the texture's exact gradients, and takes the window of the estimate; `N^-1` alone, as if pixels far from
+//! the centre were noisier, would be 2 (flow) to 4 times (Jacobian) as wide and no test.
 
 use super::{REFERENCE, TRIPLE, estimate};
 use jacoflow::flow::coarse_to_fine::CoarseToFineOptions;
 use jacoflow::flow::windowed::WindowedOptions;
-use jacoflow::flow::{Common, Estimator, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::synth::{AffineTexture, Rounding, Scene, Sensor};
-use jacoflow::types::{FlowField, Frame, Rect, Sites};
+use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid};
 use nalgebra::{Matrix6, Vector6};
 
 const SIDE: usize = 96;
@@ -43,16 +47,20 @@ fn bound(scene: &AffineTexture, sigma: f64, (x, y): (usize, usize)) -> Matrix6<f
     inverse * s * inverse
 }
 
-/// Mean over sites and realisations of `e^T C^-1 e / 6`, `C` the bound: by how much the mean squared error exceeds it.
+/// Mean over sites and realisations of `e^T C^-1 e / 6`, `C` the bound: by how much the mean squared error
+/// exceeds it.
 fn excess(
     motion: [f64; 6],
     (frames, noise, sigma): (usize, f64, f64),
-    estimate: impl Fn(&[Frame<f64>], Common) -> FlowField<f64>,
+    estimate: impl Fn(&[Frame<f64>], EstimatorOptions) -> FlowField<f64>,
 ) -> f64 {
     let scene = AffineTexture::moving((SIDE, SIDE), motion, 5).unwrap();
     let times: &[f64] = if frames == 2 { &[-0.5, 0.5] } else { &TRIPLE };
     let clean: Vec<Frame<f64>> = times.iter().map(|&t| scene.frame(t)).collect();
-    let common = Common { sites: Sites::Grid { region: Some(REGION.0), stride: REGION.1 }, ..Common::default() };
+    let common = EstimatorOptions {
+        sites: SamplingGrid::Grid { region: Some(REGION.0), stride: REGION.1 },
+        ..EstimatorOptions::default()
+    };
     let share = if frames == 2 { 2.0 } else { 0.5 };
     let mut inverses: Vec<Matrix6<f64>> = Vec::new();
     let (mut sum, mut count) = (0.0, 0.0);
@@ -75,7 +83,8 @@ fn excess(
     sum / count
 }
 
-/// Up to 0.1 px/frame, where the expansion in small motion holds, the default estimates of three frames and of two are within 1.3 times the bound.
+/// Up to 0.1 px/frame, where the expansion in small motion holds, the default estimates of three frames and
+/// of two are within 1.3 times the bound.
 #[test]
 fn the_error_is_near_the_cramer_rao_bound() {
     let (options, pair) = (WindowedOptions::default(), WindowedOptions::pair());
@@ -89,8 +98,9 @@ fn the_error_is_near_the_cramer_rao_bound() {
     }
 }
 
-/// At 0.4 px/frame the bias of the expansion (time differences, smoothing under strain) shows beside the noise, and the estimate at one level, without warping, does not come within 1.3 times the bound.
-/// These are the figures that it reaches.
+/// At 0.4 px/frame the bias of the expansion (time differences, smoothing under strain) shows beside the
+/// noise, and the estimate at one level, without warping, does not come within 1.3 times the bound. These are
+/// the figures that it reaches.
 #[test]
 fn beyond_small_motion_the_expansion_costs_more_than_the_noise() {
     let options = WindowedOptions::default();
@@ -102,7 +112,8 @@ fn beyond_small_motion_the_expansion_costs_more_than_the_noise() {
     }
 }
 
-/// Warping takes the expansion away: coarse to fine stays below the bound of a window of 4 px at any speed (it averages over wider windows where the flow lets it, so that this is no figure of efficiency).
+/// Warping takes the expansion away: coarse to fine stays below the bound of a window of 4 px at any speed
+/// (it averages over wider windows where the flow lets it, so that this is no figure of efficiency).
 #[test]
 fn coarse_to_fine_is_below_the_bound_of_a_small_window_at_any_speed() {
     for motion in [SLOW, REFERENCE, [3.3, -2.2, 0.003, 0.006, -0.006, 0.003]] {

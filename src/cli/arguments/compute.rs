@@ -5,7 +5,8 @@ use clap::{Args, ValueEnum};
 /// The precision of the computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Precision {
-    /// Single for 8-bit, 16-bit and single-precision frames, double for double-precision frames and for filters whose measurement noise is below 0.25
+    /// Single for 8-bit, 16-bit and single-precision frames, double for double-precision frames and for
+    /// filters whose measurement noise is below 0.25
     Auto,
     /// 32-bit floating point
     Single,

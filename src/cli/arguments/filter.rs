@@ -11,19 +11,19 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Filter")]
 pub struct FilterArguments {
-    /// Set of constants: patent (embodiment 2 of WO2010/098160: quantised frames, smoothed by 3 px) or measured (9x9 pixels, raw 8-bit
-    /// frames, unbiased divergence)
+    /// Set of constants: patent (embodiment 2 of WO2010/098160: quantised frames, smoothed by 3 px) or
+    /// measured (9x9 pixels, raw 8-bit frames, unbiased divergence)
     #[arg(long, value_name = "NAME", default_value = "patent")]
     pub profile: String,
-    /// Prediction: augmented (49 sigma points), non-augmented (25), fast (13: the numbers of the 25 with the motion first,
-    /// for the profile measured) or extended
+    /// Prediction: augmented (49 sigma points), non-augmented (25), fast (13: the numbers of the 25 with the
+    /// motion first, for the profile measured) or extended
     #[arg(long, value_name = "NAME")]
     pub form: Option<String>,
     /// State transition: rk4 or exact
     #[arg(long, value_name = "NAME")]
     pub transition: Option<String>,
-    /// Order of the square root that spreads the sigma points: brightness-first or motion-first [default: motion-first for the form
-    /// fast, which knows no other, else brightness-first]
+    /// Order of the square root that spreads the sigma points: brightness-first or motion-first [default:
+    /// motion-first for the form fast, which knows no other, else brightness-first]
     #[arg(long, value_name = "NAME")]
     pub square_root: Option<String>,
     /// Pixels of one measurement

@@ -34,7 +34,8 @@ impl SelectionArguments {
         }
     }
 
-    /// Which frames of the input these are: `given` frames per second of the input, or those that the source tells of the frames it delivers.
+    /// Which frames of the input these are: `given` frames per second of the input, or those that the source
+    /// tells of the frames it delivers.
     pub fn numbering(&self, given: Option<f64>, delivered: Option<f64>) -> Numbering {
         let rate = given.or_else(|| delivered.map(|rate| rate * self.step as f64));
         Numbering { first: self.first, step: self.step, rate }
@@ -45,8 +46,8 @@ impl SelectionArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Input")]
 pub struct InputArguments {
-    /// Frames: a folder (natural order), a pattern ('frames/*.png'), several images, a .y4m or .npy file, `-` (Y4M on standard input),
-    /// or a video file (needs ffmpeg on the PATH)
+    /// Frames: a folder (natural order), a pattern ('frames/*.png'), several images, a .y4m or .npy file, `-`
+    /// (Y4M on standard input), or a video file (needs ffmpeg on the PATH)
     #[arg(required = true, value_name = "INPUT")]
     pub input: Vec<String>,
     #[command(flatten)]

@@ -13,12 +13,14 @@ use crate::temporal::RecursiveOptions;
 use clap::Args;
 use serde_json::{Value, json};
 
-/// Estimator options. Those that are not given keep the estimator's own default; those that the estimator does not know are refused.
+/// Estimator options. Those that are not given keep the estimator's own default; those that the estimator
+/// does not know are refused.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct MethodArguments {
-    /// Estimator: coarse-to-fine (large motions, edges, untextured areas), windowed (one window, motions of a pixel or two), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the baselines
-    /// lucas-kanade and horn-schunck
+    /// Estimator: coarse-to-fine (large motions, edges, untextured areas), windowed (one window, motions of a
+    /// pixel or two), instantaneous (per pixel, for locally quadratic, nearly noise-free images), or the
+    /// baselines lucas-kanade and horn-schunck
     #[arg(long, value_name = "NAME", default_value = "coarse-to-fine")]
     pub method: String,
     /// coarse-to-fine: cost against error, fast, balanced (default) or accurate
@@ -30,7 +32,8 @@ pub struct MethodArguments {
     /// instantaneous: motion model, affine (default), translational or accelerating
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
-    /// Time differences: forward (coarse-to-fine, its default), central (default of the others) or backward (windowed, instantaneous)
+    /// Time differences: forward (coarse-to-fine, its default), central (default of the others) or backward
+    /// (windowed, instantaneous)
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// windowed, baselines: estimate from two frames instead of three (also chosen when there are just two)
@@ -42,19 +45,23 @@ pub struct MethodArguments {
     /// windowed, lucas-kanade: standard deviation of the Gaussian window, px [default: 4]
     #[arg(long, value_name = "SIGMA", value_parser = parse_positive)]
     pub window: Option<f64>,
-    /// windowed: equations used, brightness (1), gradient (3), jet (6) or all (12) [default: all, for a pair gradient]
+    /// windowed: equations used, brightness (1), gradient (3), jet (6) or all (12) [default: all, for a pair
+    /// gradient]
     #[arg(long, value_name = "SET")]
     pub rows: Option<String>,
     /// horn-schunck: weight of smoothness, in units of the frame's root mean square gradient [default: 1]
     #[arg(long, value_name = "WEIGHT", value_parser = parse_positive)]
     pub smoothness: Option<f64>,
-    /// windowed, instantaneous: what becomes of pixels whose equations do not determine every unknown, nan (default) or min-norm
+    /// windowed, instantaneous: what becomes of pixels whose equations do not determine every unknown, nan
+    /// (default) or min-norm
     #[arg(long, value_name = "POLICY")]
     pub rank_deficient: Option<String>,
-    /// recursive: fuse the estimates of all frames so far, for motion that is steady in the picture (windowed, coarse-to-fine, instantaneous); none (default): each frame by itself
+    /// recursive: fuse the estimates of all frames so far, for motion that is steady in the picture
+    /// (windowed, coarse-to-fine, instantaneous); none (default): each frame by itself
     #[arg(long, value_name = "WHAT")]
     pub temporal: Option<String>,
-    /// recursive: by what the information of the past is multiplied each frame, above 0 and at most 1; the memory is 1/(1 - F) frames [default: 0.95]
+    /// recursive: by what the information of the past is multiplied each frame, above 0 and at most 1; the
+    /// memory is 1/(1 - F) frames [default: 0.95]
     #[arg(long, value_name = "F")]
     pub forgetting: Option<f64>,
     /// Leave the covariance out: faster, smaller files
@@ -79,7 +86,8 @@ pub fn rectangle((width, height): (usize, usize)) -> Neighbourhood {
 }
 
 impl MethodArguments {
-    /// The method with its options, for a sequence of `frames` frames (if known) that are to be smoothed by `smooth` px.
+    /// The method with its options, for a sequence of `frames` frames (if known) that are to be smoothed by
+    /// `smooth` px.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option that is unusable, or that this method does not know.

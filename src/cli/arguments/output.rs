@@ -9,9 +9,10 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArguments {
-    /// A folder for numbered files (one per field: 000001.npz, ...), or one file (.npz .flo .png .pfm .csv) when exactly one field
-    /// comes; a .csv takes any number of fields, and `-` is CSV on standard output. Needed, except with --points (then `-`), for the summary of
-    /// --json alone, or where a filter's state is all that is saved. A new folder with a dot in its name needs a / at its end
+    /// A folder for numbered files (one per field: 000001.npz, ...), or one file (.npz .flo .png .pfm .csv)
+    /// when exactly one field comes; a .csv takes any number of fields, and `-` is CSV on standard output.
+    /// Needed, except with --points (then `-`), for the summary of --json alone, or where a filter's state is
+    /// all that is saved. A new folder with a dot in its name needs a / at its end
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Formats in a folder: npz (everything), flo, kitti (PNG), pfm, csv [default: npz]
@@ -20,11 +21,12 @@ pub struct OutputArguments {
     /// Pictures (PNG): colour, quiver, divergence, curl
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub picture: Vec<String>,
-    /// Speed of the full colour (and of the usual arrow) in pictures, px/frame [default: from the first field]
+    /// Speed of the full colour (and of the usual arrow) in pictures, px/frame [default: from the first
+    /// field]
     #[arg(long, value_name = "SPEED", value_parser = parse_positive)]
     pub max_speed: Option<f64>,
-    /// Divergence or curl of the full red and blue in pictures, 1/s where the frame rate is known, else 1/frame [default: from the
-    /// first field]
+    /// Divergence or curl of the full red and blue in pictures, 1/s where the frame rate is known, else
+    /// 1/frame [default: from the first field]
     #[arg(long, value_name = "RATE", value_parser = parse_positive)]
     pub max_rate: Option<f64>,
     /// Replace files that exist

@@ -1,7 +1,7 @@
 //! Where in the frame estimates are wanted.
 
 use crate::error::{Error, Result};
-use crate::types::{Rect, Sites};
+use crate::types::{Rect, SamplingGrid};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -28,9 +28,9 @@ impl SiteArguments {
     ///
     /// # Errors
     /// A points file that cannot be read or holds anything but pixels.
-    pub fn sites(&self) -> Result<Sites> {
+    pub fn sites(&self) -> Result<SamplingGrid> {
         if self.points.is_empty() {
-            return Ok(Sites::Grid { region: self.region, stride: self.stride.unwrap_or(1) });
+            return Ok(SamplingGrid::Grid { region: self.region, stride: self.stride.unwrap_or(1) });
         }
         let mut points = Vec::new();
         for word in &self.points {
@@ -42,7 +42,7 @@ impl SiteArguments {
                 None => read_points(Path::new(word), &mut points)?,
             }
         }
-        Ok(Sites::Points(points))
+        Ok(SamplingGrid::Points(points))
     }
 }
 
@@ -120,7 +120,7 @@ mod tests {
             points: vec!["7,8".into(), file.to_string_lossy().into()],
             mask: None,
         };
-        assert_eq!(arguments.sites().unwrap(), Sites::Points(vec![(7, 8), (1, 2), (3, 4)]));
+        assert_eq!(arguments.sites().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
         std::fs::write(&file, "1,2\n3,-4\n").unwrap();
         assert!(arguments.sites().unwrap_err().to_string().contains("line 2"));
         let negative = SiteArguments { points: vec!["-1,2".into()], ..arguments };

@@ -27,22 +27,28 @@ pub struct StereoTrackerArguments {
     /// Fits from different seeds of which the best is kept [default: 1]
     #[arg(long, value_name = "N")]
     pub n_init: Option<usize>,
-    /// The mixture's rounds end when its bound grows by less than this for each pixel; none: never [default: 1e-4, paper none]
+    /// The mixture's rounds end when its bound grows by less than this for each pixel; none: never [default:
+    /// 1e-4, paper none]
     #[arg(long, value_name = "GROWTH|none", value_parser = parse_tol)]
     pub tol: Option<Tolerance>,
-    /// Cells along y and x over the picture and layers of disparity [default: 60,80 and a layer for each disparity]
+    /// Cells along y and x over the picture and layers of disparity [default: 60,80 and a layer for each
+    /// disparity]
     #[arg(long, value_name = "ROWS,COLUMNS[,LAYERS]", value_parser = parse_grid)]
     pub grid: Option<CellGrid>,
     /// How far templates and depths are searched, cells and disparities [default: 8]
     #[arg(long, value_name = "CELLS")]
     pub search: Option<usize>,
-    /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and velocities in space
+    /// Focal length, px, distance of the cameras, in any unit, and disparity at infinity, px: for depths and
+    /// velocities in space
     #[arg(long, value_name = "FOCAL,BASELINE[,INFINITY]", allow_hyphen_values = true, value_parser = parse_cameras)]
     pub cameras: Option<StereoCamera>,
-    /// When every pair of the input was recorded, where frames are missing or come unevenly: a file with a time in each line, s, further columns being ignored. Motion is then px for an ordinary (the median) step
+    /// When every pair of the input was recorded, where frames are missing or come unevenly: a file with a
+    /// time in each line, s, further columns being ignored. Motion is then px for an ordinary (the median)
+    /// step
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
-    /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a film *.y4m
+    /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a
+    /// film *.y4m
     #[arg(long, value_name = "FOLDER|FILM")]
     pub disparity_overlay: Option<PathBuf>,
     /// Draw the graph of all clusters over time: a .png file
@@ -109,11 +115,13 @@ impl StereoTrackerArguments {
     /// When the pairs were recorded, where that is told.
     ///
     /// # Errors
-    /// A file that cannot be read or has other lines; [`Error::Argument`] named `times` for times that do not ascend.
+    /// A file that cannot be read or has other lines; [`Error::Argument`] named `times` for times that do not
+    /// ascend.
     pub fn times(&self, numbering: Numbering) -> Result<Option<PairTimes>> {
         let Some(path) = &self.times else { return Ok(None) };
         let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
-        // A time that is missing must not move the later ones to other pairs, so that only the end may be blank.
+        // A time that is missing must not move the later ones to other pairs, so that only the end may be
+        // blank.
         let lines = text.trim_end().lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
         let read = |(number, line): (usize, &str)| {
             let first = line.split(|c: char| c.is_whitespace() || c == ',').find(|word| !word.is_empty());

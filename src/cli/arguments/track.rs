@@ -12,10 +12,12 @@ use clap::{Args, ValueEnum};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Targets")]
 pub struct TargetArguments {
-    /// A target's box in the first frame, px: left and upper side, width, height, where pixel k reaches from k - 1/2 to k + 1/2; may be repeated
+    /// A target's box in the first frame, px: left and upper side, width, height, where pixel k reaches from
+    /// k - 1/2 to k + 1/2; may be repeated
     #[arg(long = "box", value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse_box, allow_hyphen_values = true)]
     pub boxes: Vec<TargetBox>,
-    /// A point on a target in the first frame, px: what moves nearest to it is followed; may be repeated. Targets are numbered from 1, boxes first
+    /// A point on a target in the first frame, px: what moves nearest to it is followed; may be repeated.
+    /// Targets are numbered from 1, boxes first
     #[arg(long = "point", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     pub points: Vec<[f64; 2]>,
 }
@@ -38,8 +40,8 @@ impl TargetArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Method")]
 pub struct TrackerArguments {
-    /// Tracker: gradient (given targets in one view), particle (given targets that may look alike and cross, in colour) or stereo (everything that moves
-    /// before two cameras)
+    /// Tracker: gradient (given targets in one view), particle (given targets that may look alike and cross,
+    /// in colour) or stereo (everything that moves before two cameras)
     #[arg(long, value_name = "NAME", default_value = "gradient")]
     pub method: String,
     /// Which system follows the targets [default: layered, stereo and particle improved]
@@ -78,7 +80,8 @@ pub enum ModeWord {
     Layered,
     /// Local flow in a moving window, with the repairs that it needs; the fastest
     Local,
-    /// Stereo: motion to fractions of a pixel carries the clusters along; particle: corner tracks must move with their target
+    /// Stereo: motion to fractions of a pixel carries the clusters along; particle: corner tracks must move
+    /// with their target
     Improved,
     /// The paper's text to the letter, for comparison
     Paper,

@@ -70,7 +70,8 @@ pub struct SearchArguments {
     /// Least and greatest row offset that are searched, rows [default: -4,4]
     #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
     pub rows: Option<(i32, i32)>,
-    /// How many rows lower the right view shows a point [default: estimated from the first pair that shows enough, and again where views contradict it (sgm), searched at every pixel (classes)]
+    /// How many rows lower the right view shows a point [default: estimated from the first pair that shows
+    /// enough, and again where views contradict it (sgm), searched at every pixel (classes)]
     #[arg(long, value_name = "ROWS")]
     pub row_offset: Option<f64>,
 }

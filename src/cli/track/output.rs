@@ -12,13 +12,16 @@ const FILM_RATE: f64 = 25.0;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub struct TrackOutputArguments {
-    /// A folder (for tracks.csv, ...), a file by the extension of its format, or - for standard output [default: -, but none with --json or pictures]
+    /// A folder (for tracks.csv, ...), a file by the extension of its format, or - for standard output
+    /// [default: -, but none with --json or pictures]
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
-    /// Formats. gradient, particle: csv (everything), mot (boxes, .txt); stereo: csv (a row a cluster), json (the graph) [default: by the file's name, else csv]
+    /// Formats. gradient, particle: csv (everything), mot (boxes, .txt); stereo: csv (a row a cluster), json
+    /// (the graph) [default: by the file's name, else csv]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub format: Vec<String>,
-    /// Draw the targets, or clusters, over every frame: a folder for track_000000.png, ..., or a film by the name *.y4m
+    /// Draw the targets, or clusters, over every frame: a folder for track_000000.png, ..., or a film by the
+    /// name *.y4m
     #[arg(long, value_name = "FOLDER|FILM")]
     pub overlay: Option<PathBuf>,
     /// Enlarge the drawn pictures N times, for small targets
@@ -46,13 +49,15 @@ impl TrackOutputArguments {
         }
     }
 
-    /// Whether a file is to lie in the folder that texts go to, and that folder is not there yet: it is made before anything is written, and nothing is in the way there.
+    /// Whether a file is to lie in the folder that texts go to, and that folder is not there yet: it is made
+    /// before anything is written, and nothing is in the way there.
     pub fn is_in_new_folder(&self, path: &Path) -> bool {
         let folder = self.output.as_deref().filter(|folder| is_folder(folder) && !folder.exists());
         folder.is_some_and(|folder| path.parent() == Some(folder))
     }
 
-    /// The texts to write, checked before any work is done. `otherwise`: the summary or pictures are wanted, so that no text need be; `json`: standard output is for the summary.
+    /// The texts to write, checked before any work is done. `otherwise`: the summary or pictures are wanted,
+    /// so that no text need be; `json`: standard output is for the summary.
     pub fn wanted<F: TextFormat>(&self, json: bool, otherwise: bool) -> Result<Vec<Wanted<F>>> {
         let formats: Vec<F> = self.format.iter().map(|name| F::parse(name)).collect::<Result<_>>()?;
         let path = match &self.output {
@@ -102,7 +107,8 @@ impl TrackOutputArguments {
         Ok(vec![(TableTarget::File(path.to_path_buf()), by_name)])
     }
 
-    /// The place that a summary tells: what was asked for, or the other name that the file of a run which was stopped has.
+    /// The place that a summary tells: what was asked for, or the other name that the file of a run which was
+    /// stopped has.
     pub fn place<'a>(&'a self, latest: Option<&'a PathBuf>) -> Option<&'a PathBuf> {
         match (latest, &self.output) {
             (Some(file), Some(asked)) if !is_folder(asked) && file.extension() == asked.extension() => Some(file),

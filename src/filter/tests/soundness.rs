@@ -20,7 +20,8 @@ fn a_lost_covariance_is_mended_and_counted() {
 
 #[test]
 fn a_covariance_lost_in_a_step_is_mended_and_counted() {
-    // Points close to the centre, which has a large negative weight: the square's variance comes out negative.
+    // Points close to the centre, which has a large negative weight: the square's variance comes out
+    // negative.
     let near = SigmaPoints::new(1.0, 0.0, -1.9).unwrap();
     let mut filter = UnscentedFilter::new(1, 2, 1, near).unwrap();
     filter.Q = vec![0.0; 4];

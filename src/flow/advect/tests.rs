@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 const MOTION: [f64; 6] = [1.2, -0.7, 0.05, 0.04, -0.06, 0.03];
 
-fn layout(sites: Sites, parameters: &[&str]) -> FieldLayout {
+fn layout(sites: SamplingGrid, parameters: &[&str]) -> FieldLayout {
     FieldLayout {
         frame_size: (30, 24),
         sites,
@@ -19,7 +19,7 @@ fn layout(sites: Sites, parameters: &[&str]) -> FieldLayout {
 }
 
 /// The affine motion `MOTION` about pixel (0, 0), as every site tells it.
-fn affine(sites: Sites, parameters: &[&str]) -> FlowField<f64> {
+fn affine(sites: SamplingGrid, parameters: &[&str]) -> FlowField<f64> {
     let mut field = FlowField::empty(layout(sites, parameters), true).unwrap();
     let n = field.len();
     for site in 0..n {
@@ -38,8 +38,8 @@ fn flow_at([x, y]: [f64; 2]) -> [f64; 2] {
     [MOTION[0] + MOTION[2] * x + MOTION[4] * y, MOTION[1] + MOTION[3] * x + MOTION[5] * y]
 }
 
-fn region() -> Sites {
-    Sites::Grid { region: Some(Rect { x: 3, y: 2, width: 25, height: 19 }), stride: 4 }
+fn region() -> SamplingGrid {
+    SamplingGrid::Grid { region: Some(Rect { x: 3, y: 2, width: 25, height: 19 }), stride: 4 }
 }
 
 proptest! {
@@ -78,7 +78,8 @@ fn outside_and_invalid_is_nan_and_edges_are_inside() {
     }
     let nan = advect(&field, &[[0.0, 0.0]], Some(&[[[1.0, 0.0], [0.0, 1.0]]])).unwrap();
     assert!(nan.covariances.unwrap()[0][1][1].is_nan());
-    let one = affine(Sites::Grid { region: Some(Rect { x: 5, y: 6, width: 1, height: 1 }), stride: 1 }, &MOTION_NAMES);
+    let one =
+        affine(SamplingGrid::Grid { region: Some(Rect { x: 5, y: 6, width: 1, height: 1 }), stride: 1 }, &MOTION_NAMES);
     assert!(advect(&one, &[[5.0, 6.0]], None).unwrap().points[0][1].is_finite());
 }
 
@@ -139,7 +140,7 @@ fn between_sites_the_slopes_errors_count_too() {
 
 #[test]
 fn fields_without_a_grid_or_in_other_units_are_refused() {
-    let mut field = affine(Sites::Points(vec![(4, 5), (6, 7)]), &MOTION_NAMES);
+    let mut field = affine(SamplingGrid::Points(vec![(4, 5), (6, 7)]), &MOTION_NAMES);
     assert!(advect(&field, &[], None).unwrap_err().to_string().starts_with("field: "));
     field = affine(region(), &MOTION_NAMES);
     assert!(advect(&field, &[[5.0, 5.0]], Some(&[])).unwrap_err().to_string().starts_with("covariance: "));

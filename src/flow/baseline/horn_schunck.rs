@@ -1,12 +1,12 @@
 //! Horn and Schunck (1981): globally smooth flow.
 //!
-//! The energy's Euler-Lagrange equations with free boundary are a symmetric positive (semi-)definite linear system, solved by conjugate gradients with
-//! the inverse of each pixel's 2x2 block as preconditioner. Sums run over fixed bands in a fixed order, so the result does not depend on the
-//! number of threads.
+//! The energy's Euler-Lagrange equations with free boundary are a symmetric positive (semi-)definite linear
+//! system, solved by conjugate gradients with the inverse of each pixel's 2x2 block as preconditioner. Sums
+//! run over fixed bands in a fixed order, so the result does not depend on the number of threads.
 
 use super::pair::{Crop, Differences, Gradients, magnitude};
 use crate::error::{Error, Result};
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{MaskCounts, bands};
 use crate::jet::Reach;
 use crate::simd::SimdReal;
@@ -16,7 +16,8 @@ use rayon::prelude::*;
 /// The smoothness weight g of the energy `sum (Ix u + Iy v + It)^2 + g^2 (|grad u|^2 + |grad v|^2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Smoothness {
-    /// In units of the frame's root mean square gradient, so that the flow does not depend on the intensity gain.
+    /// In units of the frame's root mean square gradient, so that the flow does not depend on the intensity
+    /// gain.
     Relative(f64),
     /// In grey levels per px.
     Absolute(f64),
@@ -57,7 +58,7 @@ pub(in crate::flow) struct HornSchunck {
 
 impl HornSchunck {
     /// Checks the options.
-    pub fn new(options: &HornSchunckOptions, common: &Common) -> Result<Self> {
+    pub fn new(options: &HornSchunckOptions, common: &EstimatorOptions) -> Result<Self> {
         let (Smoothness::Relative(g) | Smoothness::Absolute(g)) = options.smoothness;
         if !(g.is_finite() && g > 0.0) {
             return Err(Error::argument("smoothness", "a positive weight", g));
@@ -88,12 +89,13 @@ impl HornSchunck {
 
     /// Fills `field`, in px and frames.
     ///
-    /// The domain is the frame without its outermost pixels, which have no gradient. Masked and bad pixels contribute no data there and get no
-    /// estimate. Where all gradients of the frame are parallel one component is free up to a constant: the status is then `MinNorm`.
+    /// The domain is the frame without its outermost pixels, which have no gradient. Masked and bad pixels
+    /// contribute no data there and get no estimate. Where all gradients of the frame are parallel one
+    /// component is free up to a constant: the status is then `MinNorm`.
     pub fn estimate_into<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
-        common: &Common,
+        common: &EstimatorOptions,
         field: &mut FlowField<T>,
     ) -> Result<()> {
         let (w, h) = frames[0].size();

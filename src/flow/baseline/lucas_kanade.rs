@@ -1,18 +1,19 @@
 //! Lucas and Kanade (1981): flow constant in a window, least squares.
 //!
-//! At the frame's edge the window is cut off and normalised by the weight that remains, as that of the windowed method: only the outermost pixels,
-//! which have no gradient, get status `Border`, and what has less than a tenth of the window's weight around it (in frames smaller than the window).
-//! Masked and bad pixels, in contrast, take every window with them that touches them.
+//! At the frame's edge the window is cut off and normalised by the weight that remains, as that of the
+//! windowed method: only the outermost pixels, which have no gradient, get status `Border`, and what has less
+//! than a tenth of the window's weight around it (in frames smaller than the window). Masked and bad pixels,
+//! in contrast, take every window with them that touches them.
 
 use super::pair::{Crop, Differences, Gradients, magnitude};
 use crate::error::{Error, Result};
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, MaskCounts, bands};
 use crate::jet::Reach;
 use crate::math::Real;
 use crate::parallel::Threads;
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Rect, Sites, Status};
+use crate::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -40,7 +41,8 @@ impl Default for LucasKanadeOptions {
     }
 }
 
-/// Smallest eigenvalue of the window's gradient matrix, relative to its largest, that counts as two-dimensional structure.
+/// Smallest eigenvalue of the window's gradient matrix, relative to its largest, that counts as
+/// two-dimensional structure.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Least share of the window's weight that must lie inside the frame; that of the windowed method.
@@ -63,7 +65,8 @@ struct Sums {
     weight: f64,
 }
 
-/// The taps of a kernel centred at `centre` that fall on pixels with a gradient: all of a crop of `n` but its outermost.
+/// The taps of a kernel centred at `centre` that fall on pixels with a gradient: all of a crop of `n` but its
+/// outermost.
 fn taps(kernel: &[f64], centre: usize, n: usize) -> Range<usize> {
     let radius = kernel.len() / 2;
     (radius + 1).saturating_sub(centre)..kernel.len().min((n + radius).saturating_sub(centre + 1))
@@ -71,7 +74,7 @@ fn taps(kernel: &[f64], centre: usize, n: usize) -> Range<usize> {
 
 impl LucasKanade {
     /// Checks the options.
-    pub fn new(options: &LucasKanadeOptions, _common: &Common) -> Result<Self> {
+    pub fn new(options: &LucasKanadeOptions, _common: &EstimatorOptions) -> Result<Self> {
         let kernel = match options.window {
             Window::Gaussian(sigma) if sigma > 0.0 && sigma <= 100.0 => {
                 let radius = (3.0 * sigma + 0.5) as i32;
@@ -112,7 +115,7 @@ impl LucasKanade {
     pub fn estimate_into<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
-        common: &Common,
+        common: &EstimatorOptions,
         field: &mut FlowField<T>,
     ) -> Result<()> {
         let (w, h) = frames[0].size();
@@ -135,8 +138,8 @@ impl LucasKanade {
             Gradients::new(frames, self.options.differences, crop, threads, common.level())
         };
         let region = match sites {
-            Sites::Grid { region, .. } => Some(region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h })),
-            Sites::Points(_) => None,
+            SamplingGrid::Grid { region, .. } => Some(region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h })),
+            SamplingGrid::Points(_) => None,
         };
         let whole = match region {
             Some(q) => {

@@ -10,10 +10,12 @@ use crate::types::Frame;
 /// Which frames a baseline differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Differences {
-    /// Three frames: `It` half the outer difference, gradient from the middle frame. The flow belongs to the middle frame.
+    /// Three frames: `It` half the outer difference, gradient from the middle frame. The flow belongs to the
+    /// middle frame.
     #[default]
     Central,
-    /// Two frames: `It` their difference, gradient the mean of theirs. The flow belongs to the instant between them and is filed under the first.
+    /// Two frames: `It` their difference, gradient the mean of theirs. The flow belongs to the instant
+    /// between them and is filed under the first.
     Pair,
 }
 
@@ -72,7 +74,8 @@ pub(super) struct Gradients {
     pub brightness: f64,
 }
 
-/// The power of two just below a positive number: dividing by it brings any gain in intensity near 1, and loses no bit. 1 for what has none.
+/// The power of two just below a positive number: dividing by it brings any gain in intensity near 1, and
+/// loses no bit. 1 for what has none.
 pub(super) fn magnitude(value: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     let power = f64::from_bits(value.to_bits() & EXPONENT);

@@ -6,9 +6,11 @@ use super::levels::{Compared, PyramidLevel};
 use super::memory::Space;
 use crate::simd::{Level, SimdReal};
 
-/// A motion must leave so many times less of the frames than the one that it replaces, what is usually left added to both: less is chance.
+/// A motion must leave so many times less of the frames than the one that it replaces, what is usually left
+/// added to both: less is chance.
 const ADVANTAGE: f64 = 1.1;
-/// Where less of a window than this is seen, less than in a corner of the frame, what a motion leaves there tells nothing.
+/// Where less of a window than this is seen, less than in a corner of the frame, what a motion leaves there
+/// tells nothing.
 const LEAST_SEEN: f64 = 0.1;
 
 /// What motions are compared by.
@@ -25,8 +27,8 @@ pub(super) struct Comparison<'a, T> {
 }
 
 impl<T: SimdReal> Comparison<'_, T> {
-    /// Lets `other` replace the `motion` where it is further from it than `apart`, px of the level, and explains the frames better; beside such sites both
-    /// are blended. Whether there are such sites.
+    /// Lets `other` replace the `motion` where it is further from it than `apart`, px of the level, and
+    /// explains the frames better; beside such sites both are blended. Whether there are such sites.
     pub fn take_better(&self, motion: &mut Planes<T>, other: &Planes<T>, apart: f64) -> bool {
         let (known, found) = (self.left(motion), self.left(other));
         let usual = median(known.iter().copied().filter(|left| !left.is_nan()).collect());
@@ -54,7 +56,8 @@ impl<T: SimdReal> Comparison<'_, T> {
         true
     }
 
-    /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is seen.
+    /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is
+    /// seen.
     fn left(&self, motion: &Planes<T>) -> Vec<f64> {
         let mut data = self.space.planes(motion.width, motion.height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), self.pool);
@@ -122,7 +125,8 @@ mod tests {
                 assert!(u[2..12].iter().all(|u| *u == 0.0) && u[20..].iter().all(|u| *u == 1.0), "{y}: {u:?}");
             }
         }
-        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better than itself, or than what is as near as that.
+        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better
+        // than itself, or than what is as near as that.
         for (other, apart) in [(&moved, 0.0), (&still, 1.0)] {
             let mut same = moved.clone();
             assert!(!comparison.take_better(&mut same, other, apart));

@@ -1,8 +1,9 @@
 //! What a triple's step to the next frame differs by from the mean of its two steps.
 //!
-//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a scene, that follows from the flow alone ([`steady`]); where things
-//! go on as they are, as objects do, it is nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left is measured like motion itself
-//! and believed as far as noise does not explain it.
+//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a
+//! scene, that follows from the flow alone ([`steady`]); where things go on as they are, as objects do, it is
+//! nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left
+//! is measured like motion itself and believed as far as noise does not explain it.
 
 mod steady;
 
@@ -19,13 +20,16 @@ use crate::simd::SimdReal;
 /// Rounds of reweighing.
 const ROUNDS: usize = 4;
 
-/// A flow whose change is steady to this share is steady, and one that lacks this share of it is not steady at all: the rest is what estimates smooth away.
+/// A flow whose change is steady to this share is steady, and one that lacks this share of it is not steady
+/// at all: the rest is what estimates smooth away.
 const STEADY: f64 = 0.9;
 
-/// Brings the `motion` of a triple to the pixels of the middle frame; `coupled` is what it was before it was refined. It becomes the mean of the two steps (`central`) or the step to the
-/// next frame, whether or not things go on as they came. Returns what the windows of the change were chosen by.
+/// Brings the `motion` of a triple to the pixels of the middle frame; `coupled` is what it was before it was
+/// refined. It becomes the mean of the two steps (`central`) or the step to the next frame, whether or not
+/// things go on as they came. Returns what the windows of the change were chosen by.
 ///
-/// Frames that are warped by equal and opposite motions meet between where things were and will be, which is where the middle frame has them only if they do not accelerate.
+/// Frames that are warped by equal and opposite motions meet between where things were and will be, which is
+/// where the middle frame has them only if they do not accelerate.
 pub(super) fn settle<T: SimdReal>(
     plan: &Plan,
     workspace: &mut Workspace<T>,
@@ -65,7 +69,8 @@ pub(super) fn settle<T: SimdReal>(
             space.keep(planes);
         }
         evidence = chosen;
-        // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or turns back does not go on as it came.
+        // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or
+        // turns back does not go on as it came.
         workspace.give_back_large();
         let (own, chosen) = refine(simd, space, &Options::default(), &ahead, &data);
         chosen.into_iter().flat_map(Evidence::into_planes).for_each(|planes| space.keep(planes));
@@ -89,7 +94,8 @@ fn difference<T: SimdReal>(space: &Space<T>, ahead: &Planes<T>, known: &Planes<T
     out
 }
 
-/// Half the acceleration of that part of the `motion` which is steady, if the `change` from its mean step to the next shows any.
+/// Half the acceleration of that part of the `motion` which is steady, if the `change` from its mean step to
+/// the next shows any.
 fn acceleration<T: SimdReal>(space: &Space<T>, motion: &Planes<T>, change: &Planes<T>) -> Option<Planes<T>> {
     let slow = steady::half_acceleration(space, motion);
     let mut whole = steady::next_step(space, motion, &slow);
@@ -116,11 +122,12 @@ fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     }
 }
 
-/// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of two estimates is one of extrapolations.
+/// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of
+/// two estimates is one of extrapolations.
 const WHOLE: f64 = 0.95;
 
-/// Gives the sites whose windows are not whole the flow of the nearest in their row and in their column whose are, by their nearness; in corners without such that of the
-/// nearest in the nearest row.
+/// Gives the sites whose windows are not whole the flow of the nearest in their row and in their column whose
+/// are, by their nearness; in corners without such that of the nearest in the nearest row.
 fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
     let (width, height) = (data.width, data.height);
     let is_whole = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= WHOLE;
@@ -153,7 +160,8 @@ fn nearest(numbers: &[usize], to: usize) -> usize {
     if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
 }
 
-/// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights that fall where the rest is larger than usual (Cauchy's).
+/// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights
+/// that fall where the rest is larger than usual (Cauchy's).
 fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     let (mut share, mut usual) = (0.0, f64::INFINITY);
     for _ in 0..ROUNDS {

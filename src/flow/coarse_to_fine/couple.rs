@@ -1,13 +1,15 @@
 //! Neighbouring sites' affine motions, bound together.
 //!
-//! Each site has a data term of its own, `m^T N m - 2 m^T r` over the noise there, and each pair of neighbours a bond: their affine models should give
-//! the same flow in the middle between them, and have the same Jacobian. The sum
+//! Each site has a data term of its own, `m^T N m - 2 m^T r` over the noise there, and each pair of
+//! neighbours a bond: their affine models should give the same flow in the middle between them, and have the
+//! same Jacobian. The sum
 //!
 //! `sum_sites (m^T N m - 2 m^T r) / (s^2 + e) + sum_edges omega (flow |du|^2 + jacobian |dJ|^2)`
 //!
-//! is made smaller site by site: each visit solves the 6x6 equations of one site, its neighbours fixed (block Gauss-Seidel in zebra order). A bond
-//! weakens the more it is strained, `omega = 1 / (1 + (flow |du|^2 + jacobian |dJ|^2) / break_at)` (iteratively reweighted least squares with the
-//! weights of Cauchy's function), so that two motions may meet at an edge. Sites without data take what their neighbours tell.
+//! is made smaller site by site: each visit solves the 6x6 equations of one site, its neighbours fixed (block
+//! Gauss-Seidel in zebra order). A bond weakens the more it is strained, `omega = 1 / (1 + (flow |du|^2 +
+//! jacobian |dJ|^2) / break_at)` (iteratively reweighted least squares with the weights of Cauchy's
+//! function), so that two motions may meet at an edge. SamplingGrid without data take what their neighbours tell.
 
 mod solve;
 mod visit;
@@ -46,7 +48,8 @@ pub(super) struct Coupling {
 }
 
 impl Default for Coupling {
-    /// 20 px^-2, 2000, 0.1 and 6 sweeps, reweighed at every second: chosen on recorded and made sequences together.
+    /// 20 px^-2, 2000, 0.1 and 6 sweeps, reweighed at every second: chosen on recorded and made sequences
+    /// together.
     fn default() -> Self {
         Self { flow: 20.0, jacobian: 2000.0, break_at: 0.1, sweeps: 6, reweigh: 2 }
     }
@@ -63,11 +66,13 @@ pub(super) struct CoupleScratch<T> {
     rings: Vec<wave::Ring<T>>,
 }
 
-/// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the sites. `s^2` is the median over the sites with
-/// data of their residual energy, at least `floor` (positive), grey^2. Returns the root mean square over the sites of the change of the flow, px.
+/// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the
+/// sites. `s^2` is the median over the sites with data of their residual energy, at least `floor` (positive),
+/// grey^2. Returns the root mean square over the sites of the change of the flow, px.
 ///
-/// The flow ends no further than 2 px from where it was. Where neither data nor neighbours say anything the motion stays. The result is the same for any
-/// number of threads; call it inside [`Threads::install`](crate::parallel::Threads::install).
+/// The flow ends no further than 2 px from where it was. Where neither data nor neighbours say anything the
+/// motion stays. The result is the same for any number of threads; call it inside
+/// [`Threads::install`](crate::parallel::Threads::install).
 pub(super) fn couple<T: SimdReal>(
     level: Level,
     data: &Planes<T>,

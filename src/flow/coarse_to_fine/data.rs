@@ -1,7 +1,8 @@
-//! The data term of one linearisation on one level: the views warped by the present motion, rows 1-3 of the equations of affine flow at every pixel, and
-//! their windowed normal equations at every site.
+//! The data term of one linearisation on one level: the views warped by the present motion, rows 1-3 of the
+//! equations of affine flow at every pixel, and their windowed normal equations at every site.
 //!
-//! A site (X, Y) is the pixel (2X, 2Y). With `A` the mean and `R` the rate of the warped views and `m` the motion they were warped by, a pixel says
+//! A site (X, Y) is the pixel (2X, 2Y). With `A` the mean and `R` the rate of the warped views and `m` the
+//! motion they were warped by, a pixel says
 //!
 //! ```text
 //! A_x u + A_y v = -R + A_x u_m + A_y v_m
@@ -9,10 +10,12 @@
 //! g (A_xy u + A_yy v) = g (-R_y + A_xy u_m + A_yy v_m)
 //! ```
 //!
-//! of the whole motion `u = u_0 + u_x x + u_y y` at its offset `(x, y)` from a site. These are rows 1 to 3 of `J(i)` (21) of WO2010/098160, transported to the
-//! site; how `A_x` changes the gradient along a deforming motion is already in the warped views. Warping is that of B. D. Lucas and T. Kanade, "An iterative
-//! image registration technique with an application to stereo vision", 1981, towards the middle of the views. The right side holds the whole motion and not
-//! only its increment, so that the smoothing by the window is applied once and not undone by the iterations.
+//! of the whole motion `u = u_0 + u_x x + u_y y` at its offset `(x, y)` from a site. These are rows 1 to 3 of
+//! `J(i)` (21) of WO2010/098160, transported to the site; how `A_x` changes the gradient along a deforming
+//! motion is already in the warped views. Warping is that of B. D. Lucas and T. Kanade, "An iterative image
+//! registration technique with an application to stereo vision", 1981, towards the middle of the views. The
+//! right side holds the whole motion and not only its increment, so that the smoothing by the window is
+//! applied once and not undone by the iterations.
 
 mod band;
 mod dense;
@@ -40,10 +43,12 @@ use rayon::prelude::*;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
 
-/// Most site rows of a band: the halo above and below costs a sixth of 32 rows, a tenth of 48; more would leave threads without work.
+/// Most site rows of a band: the halo above and below costs a sixth of 32 rows, a tenth of 48; more would
+/// leave threads without work.
 const BAND: usize = 48;
 
-/// Rows of each band: all alike, and as many bands as two threads can share. The split depends on the size alone.
+/// Rows of each band: all alike, and as many bands as two threads can share. The split depends on the size
+/// alone.
 fn band_rows(height: usize) -> usize {
     let bands = height.div_ceil(BAND);
     height.div_ceil(if bands > 1 { bands.next_multiple_of(2) } else { bands })
@@ -80,7 +85,8 @@ impl<'a, T: SimdReal> View<'a, T> {
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
     }
 
-    /// Two frames, at the first one's time: what differs from [`View::pair`] is whose pixels the motion belongs to.
+    /// Two frames, at the first one's time: what differs from [`View::pair`] is whose pixels the motion
+    /// belongs to.
     pub fn ahead(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
         let parts = [(0.0, 0.5, -1.0), (1.0, 0.5, 1.0)];
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
@@ -127,11 +133,13 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         Self { level, options, taps: taps(options.sigma), pool }
     }
 
-    /// The [`COUNT`] planes of moments of a level of `size` pixels, in `out`; and `|R|` at every fourth usable pixel of every fourth row.
+    /// The [`COUNT`] planes of moments of a level of `size` pixels, in `out`; and `|R|` at every fourth
+    /// usable pixel of every fourth row.
     ///
-    /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is the standard deviation of `R` where brightness
-    /// is constant; without it every usable pixel weighs 1. Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on
-    /// the number of threads.
+    /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
+    /// the standard deviation of `R` where brightness is constant; without it every usable pixel weighs 1.
+    /// Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on the
+    /// number of threads.
     pub fn linearise(
         &self,
         size: (usize, usize),

@@ -63,8 +63,9 @@ impl Plan {
         )
     }
 
-    /// The way for the step to the next frame alone, from two levels above the finest down. It begins with what is known of all frames together, the `motion`, but for what the next
-    /// frame alone tells better on the levels above: things may turn back.
+    /// The way for the step to the next frame alone, from two levels above the finest down. It begins with
+    /// what is known of all frames together, the `motion`, but for what the next frame alone tells better on
+    /// the levels above: things may turn back.
     pub fn ahead<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> Found<T> {
         let coarsest = workspace.pyramid.levels().len() - 1;
         let first = coarsest.min(self.last + self.effort.ahead.len() - 1);
@@ -82,7 +83,8 @@ impl Plan {
         Self { traced: false, ..*self }
     }
 
-    /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one above, tells better.
+    /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one
+    /// above, tells better.
     fn take_own<T: SimdReal>(&self, workspace: &mut Workspace<T>, level: usize, motion: &mut Planes<T>) {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
@@ -159,7 +161,7 @@ fn raised<T: SimdReal>(workspace: &Workspace<T>, motion: &Planes<T>, levels: Ran
     out
 }
 
-/// Sites along x and y of a level of `size` pixels.
+/// SamplingGrid along x and y of a level of `size` pixels.
 fn sites(size: (usize, usize)) -> (usize, usize) {
     (size.0.div_ceil(2), size.1.div_ceil(2))
 }

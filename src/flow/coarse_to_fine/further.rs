@@ -8,7 +8,8 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Refinement that moves a site this far, px of the level, counts half: it takes noise away, while what it would move by more is a small object's own motion.
+/// Refinement that moves a site this far, px of the level, counts half: it takes noise away, while what it
+/// would move by more is a small object's own motion.
 const CLOSE: f64 = 0.35;
 
 /// Refines the `motion` of a level, given the `data` it was coupled with, for a finer one to begin with.

@@ -7,7 +7,8 @@ pub(super) const LEFT: usize = 16;
 /// Rows are as long as a multiple of this many samples (plus [`LEFT`]), so that no kernel needs a tail.
 pub(super) const CHUNK: usize = 32;
 
-/// Some planes of `width x height` values. The planes of one row lie together, row after row: kernels walk along rows and need all planes of a site.
+/// Some planes of `width x height` values. The planes of one row lie together, row after row: kernels walk
+/// along rows and need all planes of a site.
 ///
 /// What lies beside the sites of a row ([`LEFT`] before, at least one after) may hold anything finite.
 #[derive(Debug, Clone, Default)]
@@ -27,7 +28,8 @@ impl<T: SimdReal> Planes<T> {
         planes
     }
 
-    /// Becomes planes of another size, in the same memory if that is large enough. Content: anything finite, for whoever writes all sites.
+    /// Becomes planes of another size, in the same memory if that is large enough. Content: anything finite,
+    /// for whoever writes all sites.
     pub fn reshape(&mut self, width: usize, height: usize, count: usize) {
         (self.width, self.height, self.count) = (width, height, count);
         let len = self.row_len() * height;
@@ -49,7 +51,7 @@ impl<T: SimdReal> Planes<T> {
         self.data.len()
     }
 
-    /// Sites that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
+    /// SamplingGrid that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
     pub fn padded(&self) -> usize {
         self.width.div_ceil(CHUNK) * CHUNK
     }

@@ -11,11 +11,14 @@ use rayon::prelude::*;
 /// Samples of a task.
 const CHUNK: usize = 1 << 16;
 
-/// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of the stencils.
+/// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of
+/// the stencils.
 const REACH: usize = 3;
-/// So many of the 49 pixels within that reach are usable where one is used: all but what a straight edge at that distance takes, or scattered dead pixels.
+/// So many of the 49 pixels within that reach are usable where one is used: all but what a straight edge at
+/// that distance takes, or scattered dead pixels.
 const MOST: usize = 40;
-/// So many of nine; on levels that motion is only handed down from that is all, else small areas between holes would not be seen there.
+/// So many of nine; on levels that motion is only handed down from that is all, else small areas between
+/// holes would not be seen there.
 const NEAR: usize = 6;
 
 /// Which frames are compared.
@@ -71,8 +74,8 @@ impl<T: SimdReal> Pyramid<T> {
         self.levels.iter().map(|level| (1 + level.splines.len()) * level.size.0 * level.size.1).sum()
     }
 
-    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below [`LEAST_SIDE`] px. Returns which is the finest that can be
-    /// warped: `last`, if there are so many.
+    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below
+    /// [`LEAST_SIDE`] px. Returns which is the finest that can be warped: `last`, if there are so many.
     pub fn fill(
         &mut self,
         simd: Level,
@@ -155,8 +158,9 @@ fn holes<T: SimdReal>(frame: &Frame<T>, range: Range, mask: Option<&Mask>) -> Op
     usable.data().contains(&false).then_some(usable)
 }
 
-/// The pixels that so much around them is usable of that what holes were filled with counts little: most of the three by three and, unless motion is only looked for
-/// roughly, most of what the splines and stencils read.
+/// The pixels that so much around them is usable of that what holes were filled with counts little: most of
+/// the three by three and, unless motion is only looked for roughly, most of what the splines and stencils
+/// read.
 fn usable_around(mask: &Mask, roughly: bool) -> Mask {
     let near = usable_counts(mask, 1);
     if roughly {

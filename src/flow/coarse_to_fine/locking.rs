@@ -1,12 +1,16 @@
-//! Peak locking: how texture that is too fine for the pixels draws the motion, measured in the frames and taken out.
+//! Peak locking: how texture that is too fine for the pixels draws the motion, measured in the frames and
+//! taken out.
 //!
-//! Detail of more than half a cycle per pixel is recorded at a wrong wave number, `k - 2 pi` instead of `k`. Shifting a frame by `d` px turns the true wave by
-//! `k d`, but the recorded one by `(k - 2 pi) d`. A pair is warped by `-u / 2` and `u / 2`, so what remains between the two is proportional to
-//! `sin(pi u)`, and draws the flow by `A sin(pi u)` towards half-integer displacements; where a frame stays as it is (a triple, warped by `-u`, 0 and `u`) by `A sin(2 pi u)`. Particle images
-//! show it most (M. Raffel et al., *Particle Image Velocimetry*, on peak locking).
+//! Detail of more than half a cycle per pixel is recorded at a wrong wave number, `k - 2 pi` instead of `k`.
+//! Shifting a frame by `d` px turns the true wave by `k d`, but the recorded one by `(k - 2 pi) d`. A pair is
+//! warped by `-u / 2` and `u / 2`, so what remains between the two is proportional to `sin(pi u)`, and draws
+//! the flow by `A sin(pi u)` towards half-integer displacements; where a frame stays as it is (a triple,
+//! warped by `-u`, 0 and `u`) by `A sin(2 pi u)`. Particle images show it most (M. Raffel et al., *Particle
+//! Image Velocimetry*, on peak locking).
 //!
-//! `A` is a property of the texture, and can be seen: with the warped frames sampled half a pixel aside, the wrong waves change their sign and everything else stays.
-//! Half the difference of the two right sides is what the wrong waves add, regressed here on the sine over patches all over the frame.
+//! `A` is a property of the texture, and can be seen: with the warped frames sampled half a pixel aside, the
+//! wrong waves change their sign and everything else stays. Half the difference of the two right sides is
+//! what the wrong waves add, regressed here on the sine over patches all over the frame.
 
 use super::data::{DataOptions, View};
 use super::grid::{LEFT, Planes};
@@ -38,7 +42,8 @@ pub(super) struct Locking {
 }
 
 impl Locking {
-    /// Measures it on the finest `level`, whose motion is known. `scale`: the standard deviation of the residual, for the robust weights of the rows.
+    /// Measures it on the finest `level`, whose motion is known. `scale`: the standard deviation of the
+    /// residual, for the robust weights of the rows.
     pub fn measure<T: SimdReal>(
         simd: Level,
         (level, compared): (&PyramidLevel<T>, Compared),
@@ -84,14 +89,16 @@ impl Locking {
         });
     }
 
-    /// What is left in the flow and in its derivatives, as shares of the amplitude: `sin` and, per unit of the derivative, `2 pi cycles cos`.
+    /// What is left in the flow and in its derivatives, as shares of the amplitude: `sin` and, per unit of
+    /// the derivative, `2 pi cycles cos`.
     pub fn phase(&self, flow: f64) -> (f64, f64) {
         let (sine, cosine) = (TAU * self.cycles * flow).sin_cos();
         (sine, TAU * self.cycles * cosine)
     }
 }
 
-/// Amplitude and its variance from the sums of patches: their scatter tells how far they can be trusted, and what is no more than scatter is shrunk away.
+/// Amplitude and its variance from the sums of patches: their scatter tells how far they can be trusted, and
+/// what is no more than scatter is shrunk away.
 fn regress<'a>(sums: impl Iterator<Item = &'a Sums> + Clone) -> (f64, f64) {
     let (pull, weight) = sums.clone().fold((0.0, 0.0), |(p, w), s| (p + s.pull, w + s.weight));
     if weight <= 0.0 {
@@ -204,7 +211,8 @@ struct Warped {
 }
 
 impl Warped {
-    /// Residual, entry of the normal matrix and of the right side along the axis `c`, of the rows that the data term has.
+    /// Residual, entry of the normal matrix and of the right side along the axis `c`, of the rows that the
+    /// data term has.
     fn row(&self, i: usize, c: usize) -> (f64, f64, f64) {
         let gradient = DataOptions::default().gradient.powi(2);
         // Steps along the axis and across it.

@@ -1,4 +1,5 @@
-//! Memory that one estimate leaves for the next: fresh memory costs about as much time as the work done in it.
+//! Memory that one estimate leaves for the next: fresh memory costs about as much time as the work done in
+//! it.
 
 use super::couple::CoupleScratch;
 use super::data::Pool;
@@ -35,7 +36,8 @@ impl<T: SimdReal> Space<T> {
         }
     }
 
-    /// Takes planes back that are most of an estimate's memory: of large frames they are let go of, since what comes next needs the memory.
+    /// Takes planes back that are most of an estimate's memory: of large frames they are let go of, since
+    /// what comes next needs the memory.
     pub fn keep_small(&self, planes: Planes<T>) {
         if planes.room() * size_of::<T>() <= LIMIT / 4 {
             self.keep(planes);
@@ -75,7 +77,8 @@ impl<T: SimdReal> Workspace<T> {
         lock(&self.space.free).clear();
     }
 
-    /// Gives what is free back to the system if there is so much memory that it matters more than the time to get it again: blocks of other sizes would not fit into it.
+    /// Gives what is free back to the system if there is so much memory that it matters more than the time to
+    /// get it again: blocks of other sizes would not fit into it.
     pub fn give_back_large(&self) {
         if self.is_large() {
             self.clear();
@@ -83,7 +86,8 @@ impl<T: SimdReal> Workspace<T> {
         }
     }
 
-    /// Gives all but what is `needed` back to the system. That takes time, since the next estimate has to ask for it again.
+    /// Gives all but what is `needed` back to the system. That takes time, since the next estimate has to ask
+    /// for it again.
     pub fn give_back<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
         *self = Self::default();
         needed.for_each(Planes::shrink);
@@ -95,7 +99,8 @@ impl<T: SimdReal> Workspace<T> {
     }
 }
 
-/// Hands freed memory back to the system. The GNU allocator keeps blocks of up to 32 MiB for later, among them most of ours, while results are too large to fit in.
+/// Hands freed memory back to the system. The GNU allocator keeps blocks of up to 32 MiB for later, among
+/// them most of ours, while results are too large to fit in.
 fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: takes no pointer, and may be called at any time from any thread.

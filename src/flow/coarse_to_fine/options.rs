@@ -88,16 +88,20 @@ pub(super) struct Effort {
     pub iterations: [usize; 3],
     /// The same for what a triple's next frame alone says, which begins on the third of these levels.
     pub ahead: [usize; 3],
-    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root mean square): that level, and every coarser one.
+    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root
+    /// mean square): that level, and every coarser one.
     pub settled: [f64; 2],
     /// After each iteration.
     pub coupling: Coupling,
-    /// Sweeps of the coupling on the finest level: they cost a fraction of what a linearisation does, and most of what is left after one is theirs to do.
+    /// Sweeps of the coupling on the finest level: they cost a fraction of what a linearisation does, and
+    /// most of what is left after one is theirs to do.
     pub finest_sweeps: usize,
-    /// From so many levels above that one on, bonds are loosened at the end, for small objects to come free; `None`: nowhere.
+    /// From so many levels above that one on, bonds are loosened at the end, for small objects to come free;
+    /// `None`: nowhere.
     pub loosened: Option<usize>,
-    /// Whether the motion of the level above the finest is refined before it is taken further: what it begins with has less noise then, and slopes that wider windows tell. Half the
-    /// resolution does without: the level above it sees too little for windows to be chosen well.
+    /// Whether the motion of the level above the finest is refined before it is taken further: what it begins
+    /// with has less noise then, and slopes that wider windows tell. Half the resolution does without: the
+    /// level above it sees too little for windows to be chosen well.
     pub refined_above: bool,
 }
 
@@ -107,7 +111,8 @@ const SMALL: usize = 2500;
 const COARSE_ITERATIONS: usize = 20;
 /// Sweeps there.
 const COARSE_SWEEPS: usize = 10;
-/// Bonds there break at this strain, if not at less: neighbours are far from each other, and under a fast rotation move differently.
+/// Bonds there break at this strain, if not at less: neighbours are far from each other, and under a fast
+/// rotation move differently.
 const COARSE_BREAK: f64 = 0.07;
 
 /// When a level is done.
@@ -115,7 +120,8 @@ const COARSE_BREAK: f64 = 0.07;
 pub(super) struct Limits {
     /// Most iterations.
     pub most: usize,
-    /// An iteration that changes the flow by no more than this was the last, px of the level (root mean square).
+    /// An iteration that changes the flow by no more than this was the last, px of the level (root mean
+    /// square).
     pub settled: f64,
     /// After each iteration.
     pub coupling: Coupling,
@@ -126,7 +132,8 @@ pub(super) struct Limits {
 }
 
 impl Effort {
-    /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is known yet.
+    /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is
+    /// known yet.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> Limits {
         let loosened = self.loosened.is_some_and(|above| k >= self.last + above);
         let refined = self.refined_above && k == self.last + 1;
@@ -163,14 +170,14 @@ impl Effort {
 pub struct CoarseToFineOptions {
     /// Cost against error. Default [`Preset::Balanced`].
     pub preset: Preset,
-    /// Frames of one estimate: 3 (default) or 2. The field tells where the pixels of the middle frame (of the first of two) are in the next; a frame before
-    /// helps as far as motion goes on as it was.
+    /// Frames of one estimate: 3 (default) or 2. The field tells where the pixels of the middle frame (of the
+    /// first of two) are in the next; a frame before helps as far as motion goes on as it was.
     pub frames: usize,
-    /// Whether three frames tell the mean of both steps instead, `(-1, 1) / 2`: the velocity at the middle frame, to second order in time where it
-    /// accelerates. Default: no.
+    /// Whether three frames tell the mean of both steps instead, `(-1, 1) / 2`: the velocity at the middle
+    /// frame, to second order in time where it accelerates. Default: no.
     pub central: bool,
-    /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels` px. `None` (default): as many as the frame
-    /// allows, down to [`LEAST_SIDE`] px.
+    /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels`
+    /// px. `None` (default): as many as the frame allows, down to [`LEAST_SIDE`] px.
     pub levels: Option<usize>,
 }
 
@@ -191,7 +198,8 @@ impl CoarseToFineOptions {
         Self { frames: 2, ..Self::default() }
     }
 
-    /// Tells three frames' motion as the time scheme called `name` has it: `forward` to the next frame or `central`.
+    /// Tells three frames' motion as the time scheme called `name` has it: `forward` to the next frame or
+    /// `central`.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `scheme` for another word.

@@ -11,12 +11,12 @@ use super::refine::{Evidence, SPACING};
 use super::resample::{finer, motion_at};
 use super::rows::RowReader;
 use super::run::Estimate;
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, bands};
 use crate::flow::windowed::run::are_rounded;
 use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use crate::types::{FlowField, Frame, Mask, Sites, Status};
+use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
 use rayon::prelude::*;
 
@@ -29,8 +29,13 @@ fn rows() -> f64 {
 }
 
 /// The covariance of the estimate, wherever it may be asked for.
-pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], common: &Common) -> Spreads<T> {
-    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth in a triple's.
+pub(super) fn spread<T: SimdReal>(
+    estimate: &Estimate<T>,
+    frames: &[&Frame<T>],
+    common: &EstimatorOptions,
+) -> Spreads<T> {
+    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth
+    // in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let left = halved_noise().powi(estimate.level as i32);
     let energy_of = |variance: f64| share * rows() * left * variance * estimate.range.gain.powi(2);
@@ -42,12 +47,13 @@ pub(super) fn spread<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>], 
     covariance(estimate, noise, frames.len() == 2, common.systematic)
 }
 
-/// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to the first frame.
+/// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to
+/// the first frame.
 pub(super) fn fill<T: SimdReal>(
     (estimate, spreads): (&Estimate<T>, Option<Spreads<T>>),
     space: &Space<T>,
     frames: &[&Frame<T>],
-    common: &Common,
+    common: &EstimatorOptions,
     field: &mut FlowField<T>,
 ) {
     let simd = common.level();
@@ -69,8 +75,10 @@ pub(super) fn fill<T: SimdReal>(
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
     bands(field).into_par_iter().for_each(|mut band| match &sites {
-        Sites::Points(points) => writer.points(points, &mut band),
-        Sites::Grid { .. } => dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band }),
+        SamplingGrid::Points(points) => writer.points(points, &mut band),
+        SamplingGrid::Grid { .. } => {
+            dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band })
+        }
     });
     moved.into_iter().chain(full).for_each(|planes| space.keep(planes));
 }
@@ -141,7 +149,8 @@ impl<T: SimdReal> Writer<'_, T> {
         whole.zip(Some(&mut band.covariance)).into_iter().chain(systematic.zip(Some(&mut band.systematic)))
     }
 
-    /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken back.
+    /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken
+    /// back.
     fn close(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
         let status = self.status(pixel);
         band.status[at] = status;
@@ -161,7 +170,8 @@ impl<T: SimdReal> Writer<'_, T> {
         bare && agrees && self.observable && self.mask.is_none() && finite()
     }
 
-    /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest site.
+    /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest
+    /// site.
     fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
         let (x, y) = (x / self.pitch, y / self.pitch);
         if let Some(window) = &mut band.window {
@@ -182,7 +192,8 @@ impl<T: SimdReal> Writer<'_, T> {
         }
     }
 
-    /// The window of the slopes around a site, px of the frame: that of the nearest place where windows were chosen.
+    /// The window of the slopes around a site, px of the frame: that of the nearest place where windows were
+    /// chosen.
     fn window_at(&self, evidence: &Evidence<T>, (x, y): (usize, usize)) -> T {
         let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
         let (columns, rows) = evidence.size();
@@ -209,7 +220,7 @@ impl<T: SimdReal> Writer<'_, T> {
 /// The sites of a band of whole rows.
 struct Rows<'a, 'b, T: Clone> {
     writer: &'a Writer<'a, T>,
-    sites: &'a Sites,
+    sites: &'a SamplingGrid,
     width: usize,
     band: &'a mut FieldBand<'b, T>,
 }

@@ -3,7 +3,8 @@
 use crate::simd::SimdReal;
 use crate::types::{Frame, Mask};
 
-/// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is then the same for frames of every range.
+/// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is
+/// then the same for frames of every range.
 const CONTRAST: f64 = 40.0;
 
 /// Samples that the range is taken from, about.
@@ -18,7 +19,8 @@ const ENDS: usize = 200;
 /// Deviation over mean that is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// What all but a few of the sorted `values` range over. Marks for missing data, which are the most extreme value and many times the same, are no values.
+/// What all but a few of the sorted `values` range over. Marks for missing data, which are the most extreme
+/// value and many times the same, are no values.
 fn nearly_all(values: &[f64]) -> f64 {
     let (low, high) = (values[0], values[values.len() - 1]);
     let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };
@@ -43,8 +45,9 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// That of the frames' finite samples that may be used: of the middle nine tenths of them, since a single no-data value may be as large as 1e9; but no less than a share
-    /// of what nearly all of them range over, since pictures may be dark but for a few spots.
+    /// That of the frames' finite samples that may be used: of the middle nine tenths of them, since a single
+    /// no-data value may be as large as 1e9; but no less than a share of what nearly all of them range over,
+    /// since pictures may be dark but for a few spots.
     pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
         let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
         let mut values: Vec<f64> = Vec::new();

@@ -17,8 +17,9 @@ const FOLDED: f64 = 0.1;
 
 /// The motion of the pixels of the first frame, from that of the places half way to the second.
 ///
-/// The pixel `p` goes by `u_1(p) = u(p + u_1(p) / 2)`: its match lies half its own way off. The implicit equation is started from the affine model
-/// about `p` and iterated once; its derivative is `M_1 = (I - M / 2)^-1 M`, `M` at the place midway.
+/// The pixel `p` goes by `u_1(p) = u(p + u_1(p) / 2)`: its match lies half its own way off. The implicit
+/// equation is started from the affine model about `p` and iterated once; its derivative is `M_1 = (I - M /
+/// 2)^-1 M`, `M` at the place midway.
 pub(super) fn at_first_frame<T: SimdReal>(simd: Level, space: &Space<T>, motion: &Planes<T>) -> Planes<T> {
     let mut out = space.planes(motion.width, motion.height, MOTION);
     if motion.width == 0 || motion.height == 0 {
@@ -83,8 +84,8 @@ fn solve<V: Lanes>(motion: &[V; MOTION], [a, b]: [V; 2]) -> [V; 2] {
     [V::select(open, x, a), V::select(open, y, b)]
 }
 
-/// Where a coordinate lies among `count` sites: the site before it, the lever of that site's slope (px), and the next site's share. Beyond the last site its own
-/// model goes on.
+/// Where a coordinate lies among `count` sites: the site before it, the lever of that site's slope (px), and
+/// the next site's share. Beyond the last site its own model goes on.
 #[inline(always)]
 fn split<V: Lanes>(at: V, count: usize) -> (V, V, V) {
     let site = (at * V::constant(1.0 / STEP)).max(V::zero()).min(V::constant(count as f64 - 1.0));

@@ -1,18 +1,25 @@
 //! The last stage: how far around each site the motion may be averaged, and across which sites it may not.
 //!
-//! The coupled motion is as good as its data at each site, hence noisy. Wider windows suppress noise, but smooth away what is not affine in them. Three parts decide:
+//! The coupled motion is as good as its data at each site, hence noisy. Wider windows suppress noise, but
+//! smooth away what is not affine in them. Three parts decide:
 //!
-//! * *Ladder.* Affine fits `K_l` to the flow in Gaussian windows of growing sigma, each repeated on what it leaves: `1 - (1 - K)^4`. Once more is J. W. Tukey's twicing
-//!   (*Exploratory Data Analysis*, 1977), often more is P. Buehlmann and B. Yu's boosting ("Boosting with the L2 loss", 2003): bias of sixth order cancels too, and where
-//!   waves are to be told from noise the window may be half as wide again as a single one.
-//! * *Choice* ([`choose`]). O. V. Lepski's comparison of scales (1991), softened: from one window to the next the flow may change by what noise explains. With `D_l` the squared change,
-//!   `d_l` its variance for white noise of unit density and `a` the noise density of the flow, `R_l = level(D_l) / (d_l a)`, the acceptance is
-//!   `A_0 = 1`, `A_{l+1} = A_l / (1 + (R_l / kappa)^4)`, and window l has the weight `A_l - A_{l+1}`.
-//! * *Edges* ([`mix`]). Nine windows around the site, each fit transported to it, weighed by how affine the flow is in the window and how near the fit comes to the site's flow
-//!   (after M. Kuwahara et al., 1976). They take over where the misfit of the plain window stands out of its region. Slopes there are those of wider windows:
-//!   what lies right beside a step knows the flow best, and the slope least.
+//! * *Ladder.* Affine fits `K_l` to the flow in Gaussian windows of growing sigma, each repeated on what it
+//!   leaves: `1 - (1 - K)^4`. Once more is J. W. Tukey's twicing (*Exploratory Data Analysis*, 1977), often
+//!   more is P. Buehlmann and B. Yu's boosting ("Boosting with the L2 loss", 2003): bias of sixth order
+//!   cancels too, and where waves are to be told from noise the window may be half as wide again as a single
+//!   one.
+//! * *Choice* ([`choose`]). O. V. Lepski's comparison of scales (1991), softened: from one window to the next
+//!   the flow may change by what noise explains. With `D_l` the squared change, `d_l` its variance for white
+//!   noise of unit density and `a` the noise density of the flow, `R_l = level(D_l) / (d_l a)`, the
+//!   acceptance is `A_0 = 1`, `A_{l+1} = A_l / (1 + (R_l / kappa)^4)`, and window l has the weight `A_l -
+//!   A_{l+1}`.
+//! * *Edges* ([`mix`]). Nine windows around the site, each fit transported to it, weighed by how affine the
+//!   flow is in the window and how near the fit comes to the site's flow (after M. Kuwahara et al., 1976).
+//!   They take over where the misfit of the plain window stands out of its region. Slopes there are those of
+//!   wider windows: what lies right beside a step knows the flow best, and the slope least.
 //!
-//! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before taking sites is part of the window, since variances of Gaussians add.
+//! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before
+//! taking sites is part of the window, since variances of Gaussians add.
 
 mod choose;
 mod edges;
@@ -54,8 +61,9 @@ pub(super) struct Options {
     pub kappa: f64,
     /// The same for their slopes, where noise is white.
     pub kappa_slopes: f64,
-    /// By how much slopes may accept more where the flow is restless, at most: noise that is not white (that of particle images) reaches wider windows than its density tells, and in
-    /// turbulence no window is free of bias. 1 does without.
+    /// By how much slopes may accept more where the flow is restless, at most: noise that is not white (that
+    /// of particle images) reaches wider windows than its density tells, and in turbulence no window is free
+    /// of bias. 1 does without.
     pub restless: f64,
     /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,
@@ -71,20 +79,24 @@ pub(super) struct Options {
     pub noise_region: f64,
     /// Relative misfit at which edge fits and plain fits count equally.
     pub gate: f64,
-    /// Relative misfit at which slopes are half those of wider edge fits: a motion boundary is a step, and the slope of what the windows make of it is none.
+    /// Relative misfit at which slopes are half those of wider edge fits: a motion boundary is a step, and
+    /// the slope of what the windows make of it is none.
     pub step_gate: f64,
-    /// Whether the field may be nothing but affine over the whole frame: beyond the widest window there is then one more choice.
+    /// Whether the field may be nothing but affine over the whole frame: beyond the widest window there is
+    /// then one more choice.
     pub may_vanish: bool,
 }
 
 impl Options {
-    /// For motion that a finer level begins with: that level's few iterations take noise away, but not what a window has smoothed away over many of its pixels.
+    /// For motion that a finer level begins with: that level's few iterations take noise away, but not what a
+    /// window has smoothed away over many of its pixels.
     pub fn further() -> Self {
         let Self { ladder, kappa, .. } = Self::default();
         Self { ladder: ladder.get(..FURTHER).unwrap_or(ladder), kappa: 3.0 / 8.0 * kappa, ..Self::default() }
     }
 
-    /// For motion whose last linearisation was about one that had been refined: what is left of the residual is noise then, and slopes need no more room than it explains.
+    /// For motion whose last linearisation was about one that had been refined: what is left of the residual
+    /// is noise then, and slopes need no more room than it explains.
     pub fn again() -> Self {
         Self { kappa_slopes: 2.0, ..Self::default() }
     }
@@ -124,14 +136,18 @@ impl Default for Options {
     }
 }
 
-/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the last plane is the noise density `a`, px^4.
+/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the
+/// last plane is the noise density `a`, px^4.
 #[cfg(test)]
 pub(super) const SIGMA: usize = 6;
 
-/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given the summary of the last data term.
+/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given
+/// the summary of the last data term.
 ///
-/// Eight planes: the motion, the mean sigma, the noise density of the flow that came in (its variance times the area over which the noise is independent). Both inputs must have the same size and be finite; without sites there is nothing to do.
-/// Bit-identical for any number of threads. With them comes what the choice of windows rested on, if there was one.
+/// Eight planes: the motion, the mean sigma, the noise density of the flow that came in (its variance times
+/// the area over which the noise is independent). Both inputs must have the same size and be finite; without
+/// sites there is nothing to do. Bit-identical for any number of threads. With them comes what the choice of
+/// windows rested on, if there was one.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
     space: &Space<T>,
@@ -224,7 +240,8 @@ fn grids<T: SimdReal>(
     grids
 }
 
-/// The affine motion nearest to all sites, about site (0, 0): u, v, u_x, v_x, u_y, v_y. Without it, squares of large motion would drown the misfits of single precision.
+/// The affine motion nearest to all sites, about site (0, 0): u, v, u_x, v_x, u_y, v_y. Without it, squares
+/// of large motion would drown the misfits of single precision.
 fn mean_motion<T: SimdReal>(motion: &Planes<T>) -> [f64; 6] {
     let (width, height) = (motion.width as f64, motion.height as f64);
     let (middle_x, middle_y) = ((width - 1.0) / 2.0, (height - 1.0) / 2.0);

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 /// Rows of one task.
 const ROWS: usize = 32;
 
-/// The affine motions of the sites around a place, each carried there with half its lever, blended by their distance: exact where slopes turn evenly.
+/// The affine motions of the sites around a place, each carried there with half its lever, blended by their
+/// distance: exact where slopes turn evenly.
 ///
 /// `(x, y)`: in px of the level whose sites are `step` px apart; beyond the last site its own model goes on.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
@@ -40,7 +41,8 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f
     blend
 }
 
-/// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles, the Jacobian stays.
+/// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles,
+/// the Jacobian stays.
 ///
 /// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
 pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
@@ -83,7 +85,8 @@ impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
     }
 }
 
-/// The motion on the `size` sites of the level half as fine: that of every second site, flow halved. The inverse of [`finer`].
+/// The motion on the `size` sites of the level half as fine: that of every second site, flow halved. The
+/// inverse of [`finer`].
 pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coarse: &mut Planes<T>) {
     coarse.reshape(size.0, size.1, MOTION);
     for (k, y) in (0..MOTION).flat_map(|k| (0..size.1).map(move |y| (k, y))) {
@@ -93,10 +96,11 @@ pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coars
     }
 }
 
-/// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference over two pixels of the blend of the sites'
-/// affine models. Sites of the rim keep theirs across it.
+/// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference
+/// over two pixels of the blend of the sites' affine models. SamplingGrid of the rim keep theirs across it.
 ///
-/// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the Jacobian catch up.
+/// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the
+/// Jacobian catch up.
 pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
     out.reshape(old.width, old.height, old.count);
     let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);

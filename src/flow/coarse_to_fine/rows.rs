@@ -25,14 +25,16 @@ impl<T: SimdReal> RowReader<T> {
         &self.pixels[k * self.width..(k + 1) * self.width]
     }
 
-    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites parabolas that have their values and the turn of their slopes.
+    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites parabolas that
+    /// have their values and the turn of their slopes.
     #[inline(always)]
     pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
         self.read(motion, y);
         let quarter = T::from_f64(0.25);
         let n = motion.width;
         if y % 2 == 1 {
-            // What the slopes along y add: a quarter of their difference between the rows; beyond the last all of it.
+            // What the slopes along y add: a quarter of their difference between the rows; beyond the last
+            // all of it.
             let (above, below) = (y / 2, y / 2 + 1);
             for c in 0..2 {
                 let (first, flow) = (motion.line(4 + c, above), &mut self.sites[c * n..(c + 1) * n]);
@@ -66,7 +68,8 @@ impl<T: SimdReal> RowReader<T> {
     }
 }
 
-/// Pixels of a row from its sites; with their slopes those of the parabola that has the values of both and turns as they say.
+/// Pixels of a row from its sites; with their slopes those of the parabola that has the values of both and
+/// turns as they say.
 #[inline(always)]
 fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
     let (half, quarter) = (T::from_f64(0.5), T::from_f64(0.25));

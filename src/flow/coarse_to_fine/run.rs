@@ -12,7 +12,7 @@ use super::output;
 use super::range::Range;
 use super::refine::{Evidence, Options as Refinement, refine};
 use crate::error::Result;
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
 
@@ -41,7 +41,12 @@ impl CoarseToFine {
     }
 
     /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
-    pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
+    pub fn estimate_into<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        common: &EstimatorOptions,
+        field: &mut FlowField<T>,
+    ) {
         common.threads.install(|| {
             let simd = common.level();
             let range = Range::of(frames, common.mask.as_ref());
@@ -59,11 +64,12 @@ impl CoarseToFine {
     }
 }
 
-/// The covariance, if it is wanted. It takes so many planes that of large frames whatever else there is goes back to the system, before and after.
+/// The covariance, if it is wanted. It takes so many planes that of large frames whatever else there is goes
+/// back to the system, before and after.
 fn spread<T: SimdReal>(
     estimate: &mut Estimate<T>,
     workspace: &mut Workspace<T>,
-    (frames, common): (&[&Frame<T>], &Common),
+    (frames, common): (&[&Frame<T>], &EstimatorOptions),
     field: &FlowField<T>,
 ) -> Option<Spreads<T>> {
     if field.covariance.is_none() {
@@ -88,7 +94,8 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
     let mut found = plan.all(workspace);
     let (mut motion, mut evidence) = refine(simd, &workspace.space, &Refinement::default(), &found.motion, &found.data);
     if is_triple {
-        // About the refined motion the residual is noise; about the coupled one it is also what the windows of the data smooth away.
+        // About the refined motion the residual is noise; about the coupled one it is also what the windows
+        // of the data smooth away.
         evidence.into_iter().flat_map(Evidence::into_planes).for_each(|planes| workspace.space.keep(planes));
         // The data term and what refinement leaves would be the most memory there ever is.
         workspace.give_back_large();
@@ -118,7 +125,8 @@ fn estimate<T: SimdReal>(plan: &Plan, is_triple: bool, central: bool, workspace:
 pub(super) struct Estimate<T> {
     /// The level of the pyramid that all lengths are in pixels of.
     pub level: usize,
-    /// `u, v, u_x, v_x, u_y, v_y` on every second pixel: of a pair midway in time, of a triple at the middle frame.
+    /// `u, v, u_x, v_x, u_y, v_y` on every second pixel: of a pair midway in time, of a triple at the middle
+    /// frame.
     pub motion: Planes<T>,
     /// The summary of the last data term.
     pub data: Planes<T>,

@@ -20,15 +20,17 @@ const LEAST_SCALE: f64 = 4e-3;
 const FAR: f64 = 0.1;
 /// So many of those may be an object that is too small to be felt in the mean over the frame.
 const OBJECT: usize = 4;
-/// Sites along the edge that do not count, at least and at most: what leaves the frame there may drift for ever, and leads the further the more sites there are.
+/// SamplingGrid along the edge that do not count, at least and at most: what leaves the frame there may drift for
+/// ever, and leads the further the more sites there are.
 const RIM: (usize, usize) = (2, 4);
 /// A sixteenth of the sites, within those bounds.
 const RIM_SHARE: usize = 16;
 
-/// Iterations with loose bonds, and these: each site follows its own data. A small object that moves before a still ground is held back by the usual ones, but the
-/// ground could not be told as well.
+/// Iterations with loose bonds, and these: each site follows its own data. A small object that moves before a
+/// still ground is held back by the usual ones, but the ground could not be told as well.
 const LOOSE: (usize, Coupling) = (3, Coupling { flow: 1.0, jacobian: 100.0, break_at: 0.1, sweeps: 4, reweigh: 2 });
-/// What they find is another motion when it is further away than this, px of the level; nearer, it is the same with more noise.
+/// What they find is another motion when it is further away than this, px of the level; nearer, it is the
+/// same with more noise.
 const ANOTHER: f64 = 0.5;
 /// Where the first of them moves no site by this much, none is on its way to another motion, px of the level.
 const LEAVING: f64 = 0.25;
@@ -72,7 +74,8 @@ impl<T: SimdReal> Step<'_, T> {
         }
     }
 
-    /// Tries sites without their neighbours, and gives the `motion` what explains the frames better: small objects come free.
+    /// Tries sites without their neighbours, and gives the `motion` what explains the frames better: small
+    /// objects come free.
     pub fn loosen(
         &mut self,
         level: &PyramidLevel<T>,
@@ -115,7 +118,8 @@ impl<T: SimdReal> Step<'_, T> {
     }
 }
 
-/// Whether no object is on its way any more, after an iteration `from` a motion `to` another. Sites of the rim do not count.
+/// Whether no object is on its way any more, after an iteration `from` a motion `to` another. SamplingGrid of the
+/// rim do not count.
 pub(super) fn has_settled<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> bool {
     inner(from, to) < OBJECT
 }

@@ -1,5 +1,6 @@
-//! What people want the flow and its Jacobian for: divergence, curl, shear, rotation, time to contact; each with the standard deviation that
-//! the covariance of the motion gives it to first order, `sd^2 = grad^T Cov(m) grad`.
+//! What people want the flow and its Jacobian for: divergence, curl, shear, rotation, time to contact; each
+//! with the standard deviation that the covariance of the motion gives it to first order, `sd^2 = grad^T
+//! Cov(m) grad`.
 
 mod gradient;
 mod quantity;

@@ -8,11 +8,14 @@ use crate::error::{Error, Result};
 pub enum Quantity {
     /// `u_x + v_y`, 1/frame or 1/s: relative growth of area.
     Divergence,
-    /// `v_x - u_y`, 1/frame or 1/s: twice the angular velocity; positive turns x towards y (clockwise on the screen).
+    /// `v_x - u_y`, 1/frame or 1/s: twice the angular velocity; positive turns x towards y (clockwise on the
+    /// screen).
     Curl,
-    /// `sqrt((u_x - v_y)^2 + (u_y + v_x)^2)`, 1/frame or 1/s: difference of the two principal rates of strain.
+    /// `sqrt((u_x - v_y)^2 + (u_y + v_x)^2)`, 1/frame or 1/s: difference of the two principal rates of
+    /// strain.
     ShearMagnitude,
-    /// `atan2(u_y + v_x, u_x - v_y) / 2`, rad in (-pi/2, pi/2]: direction of the greatest stretch, from x towards y.
+    /// `atan2(u_y + v_x, u_x - v_y) / 2`, rad in (-pi/2, pi/2]: direction of the greatest stretch, from x
+    /// towards y.
     ShearAxis,
     /// `u_x`, 1/frame or 1/s: normal strain rate along x.
     StrainXx,
@@ -24,13 +27,15 @@ pub enum Quantity {
     AngularVelocity,
     /// Angular velocity in revolutions per minute; needs the frame period.
     Rpm,
-    /// x of the point that does not move, `p - M^-1 (u, v)` (WO2010/098160, 0104); it need not be in the picture. px or units of the pitch.
+    /// x of the point that does not move, `p - M^-1 (u, v)` (WO2010/098160, 0104); it need not be in the
+    /// picture. px or units of the pitch.
     RotationCentreX,
     /// y of that point.
     RotationCentreY,
     /// Distance `|M^-1 (u, v)|` of that point.
     CentreDistance,
-    /// `2 / (u_x + v_y)`, frames or s: until contact with an approaching surface parallel to the image; negative while it recedes.
+    /// `2 / (u_x + v_y)`, frames or s: until contact with an approaching surface parallel to the image;
+    /// negative while it recedes.
     TimeToContact,
     /// `sqrt(u^2 + v^2)`, px/frame or px/s.
     Speed,
@@ -123,12 +128,13 @@ impl Quantity {
     }
 }
 
-/// Value of `quantity` for the motion `m = (u, v, u_x, v_x, u_y, v_y)` at the point `at = (x, y)`, with its standard deviation where the
-/// covariance of m is given.
+/// Value of `quantity` for the motion `m = (u, v, u_x, v_x, u_y, v_y)` at the point `at = (x, y)`, with its
+/// standard deviation where the covariance of m is given.
 ///
-/// Per second where `frame_period` (seconds) is given, else per frame; positions and speed in the unit of `m` and `at` (px, or units of the pitch).
-/// [`Quantity::Rpm`] without a frame period is NaN. Quantities that do not exist for this motion (the centre of a motion without one, the shear axis of no shear)
-/// are NaN or infinite. The standard deviation is first-order: `sqrt(grad^T Cov(m) grad)`.
+/// Per second where `frame_period` (seconds) is given, else per frame; positions and speed in the unit of `m`
+/// and `at` (px, or units of the pitch). [`Quantity::Rpm`] without a frame period is NaN. Quantities that do
+/// not exist for this motion (the centre of a motion without one, the shear axis of no shear) are NaN or
+/// infinite. The standard deviation is first-order: `sqrt(grad^T Cov(m) grad)`.
 pub fn value_and_std(
     quantity: Quantity,
     m: [f64; 6],

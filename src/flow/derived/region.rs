@@ -4,7 +4,7 @@ use super::sharing::{in_common, sharing_among};
 use super::{Quantity, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Rect, Sites};
+use crate::types::{FlowField, Rect, SamplingGrid};
 
 /// How the sites of a region are combined into one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,8 +12,8 @@ pub enum Aggregate {
     /// Weighted by the inverse of each site's variance, which needs the field's covariance.
     #[default]
     InverseVariance,
-    /// The median, with 1.2533 times the standard error of the mean (its spread for normal errors) as standard deviation, the spread taken from
-    /// the median absolute deviation.
+    /// The median, with 1.2533 times the standard error of the mean (its spread for normal errors) as
+    /// standard deviation, the spread taken from the median absolute deviation.
     Median,
 }
 
@@ -22,10 +22,11 @@ pub enum Aggregate {
 pub struct Mean {
     /// The value; NaN when no site has one.
     pub value: f64,
-    /// Its standard deviation, with the correlation of neighbouring estimates ([`sharing`](super::sharing())): at least what their scatter shows, and with [`Aggregate::InverseVariance`] what
-    /// they claim and do not scatter, which they must have in common.
+    /// Its standard deviation, with the correlation of neighbouring estimates
+    /// ([`sharing`](super::sharing())): at least what their scatter shows, and with
+    /// [`Aggregate::InverseVariance`] what they claim and do not scatter, which they must have in common.
     pub std: f64,
-    /// Sites that took part.
+    /// SamplingGrid that took part.
     pub count: usize,
 }
 
@@ -36,7 +37,8 @@ fn position<T: Real>(field: &FlowField<T>, index: usize) -> (f64, f64) {
     (x as f64 * dx, y as f64 * dy)
 }
 
-/// Values of a quantity at every site, row-major; NaN where the field has no estimate or its model no Jacobian.
+/// Values of a quantity at every site, row-major; NaN where the field has no estimate or its model no
+/// Jacobian.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `quantity` for one that needs the frame period of a field without.
@@ -81,7 +83,8 @@ fn at_site<T: Real>(field: &FlowField<T>, quantity: Quantity, index: usize) -> (
 /// One value of a quantity for the sites inside `region` (pixels of the frame; `None`: all sites).
 ///
 /// # Errors
-/// As [`plane()`]; [`Error::Argument`] naming `region` for one that leaves the frame, and `aggregate` for [`Aggregate::InverseVariance`] on a field without covariance.
+/// As [`plane()`]; [`Error::Argument`] naming `region` for one that leaves the frame, and `aggregate` for
+/// [`Aggregate::InverseVariance`] on a field without covariance.
 pub fn region_mean<T: Real>(
     field: &FlowField<T>,
     quantity: Quantity,
@@ -123,7 +126,7 @@ fn mean_of<T: Real>(
         ));
     }
     if let Some(r) = region {
-        Sites::Grid { region: Some(r), stride: 1 }.shape(field.layout.frame_size)?;
+        SamplingGrid::Grid { region: Some(r), stride: 1 }.shape(field.layout.frame_size)?;
     }
     let inside = |&index: &usize| {
         let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
@@ -184,11 +187,12 @@ mod tests {
     use super::*;
     use crate::types::{FieldLayout, MOTION_NAMES, Status};
 
-    /// 3 x 2 sites with divergence 0.1, 0.2, ... 0.6 and standard deviation sd each of u_x, none of the others.
+    /// 3 x 2 sites with divergence 0.1, 0.2, ... 0.6 and standard deviation sd each of u_x, none of the
+    /// others.
     fn field(sd: Option<f64>, period: Option<f64>) -> FlowField<f64> {
         let layout = FieldLayout {
             frame_size: (6, 4),
-            sites: Sites::Grid { region: None, stride: 2 },
+            sites: SamplingGrid::Grid { region: None, stride: 2 },
             model: "affine".into(),
             parameters: MOTION_NAMES.map(String::from).to_vec(),
             frame_period: period,

@@ -3,7 +3,7 @@
 use super::sharing;
 use super::sharing::in_common;
 use crate::math::Real;
-use crate::types::{FlowField, Rect, Sites};
+use crate::types::{FlowField, Rect, SamplingGrid};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
 
 /// Variance added to every estimate, (px/frame)^2 and 1/frame^2: no estimate is taken for exact.
@@ -18,9 +18,9 @@ pub struct RegionMotion {
     pub covariance: [[f64; 6]; 6],
     /// The centre in pixels.
     pub centre: (f64, f64),
-    /// Sites that took part.
+    /// SamplingGrid that took part.
     pub count: usize,
-    /// Sites in the region.
+    /// SamplingGrid in the region.
     pub sites: usize,
 }
 
@@ -31,13 +31,15 @@ impl RegionMotion {
     }
 }
 
-/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of a field's valid sites:
-/// `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine motion from the centre to the site.
+/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of a field's valid
+/// sites: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine motion from the
+/// centre to the site.
 ///
-/// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing). Where the estimates
-/// scatter more than their covariances allow, it is enlarged by that ratio too (R. T. Birge, "The calculation of errors by the method of least squares", 1932), so that a region
-/// that does not move as one affine motion shows in the standard deviation. Where they scatter less, they have an error in common, which does not
-/// shrink with their number: the covariance holds it in full.
+/// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing).
+/// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
+/// Birge, "The calculation of errors by the method of least squares", 1932), so that a region that does not
+/// move as one affine motion shows in the standard deviation. Where they scatter less, they have an error in
+/// common, which does not shrink with their number: the covariance holds it in full.
 ///
 /// The motion is NaN where the field has no covariance or the sites do not determine six parameters.
 pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
@@ -116,12 +118,12 @@ fn invert_scaled(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
 /// The middle of the sites in pixels; of points, their mean.
 fn centre_of<T>(field: &FlowField<T>) -> (f64, f64) {
     match &field.layout.sites {
-        Sites::Grid { region, .. } => {
+        SamplingGrid::Grid { region, .. } => {
             let (width, height) = field.layout.frame_size;
             let r = region.unwrap_or(Rect { x: 0, y: 0, width, height });
             (r.x as f64 + (r.width as f64 - 1.0) / 2.0, r.y as f64 + (r.height as f64 - 1.0) / 2.0)
         }
-        Sites::Points(points) => {
+        SamplingGrid::Points(points) => {
             let n = points.len().max(1) as f64;
             let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 as f64, y + point.1 as f64));
             (sum.0 / n, sum.1 / n)
@@ -140,7 +142,7 @@ mod tests {
     fn field(noise: f64, claimed: f64, seed: u64) -> FlowField<f64> {
         let layout = FieldLayout {
             frame_size: (40, 30),
-            sites: Sites::Grid { region: Some(Rect { x: 10, y: 5, width: 21, height: 11 }), stride: 2 },
+            sites: SamplingGrid::Grid { region: Some(Rect { x: 10, y: 5, width: 21, height: 11 }), stride: 2 },
             model: "affine".into(),
             parameters: MOTION_NAMES.map(String::from).to_vec(),
             frame_period: None,

@@ -1,15 +1,16 @@
 //! How many estimates share one independent one.
 
-use crate::types::{FieldLayout, Rect, Sites};
+use crate::types::{FieldLayout, Rect, SamplingGrid};
 
 /// Most sites of a list whose correlations with all others are summed.
 const SAMPLE: usize = 512;
 
-/// By how much the variance of a mean over the sites exceeds that of independent estimates: the mean over the sites of their summed
-/// correlations `exp(-d^2 / (4 l^2))`, with the field's correlation length `l`. At least 1.
+/// By how much the variance of a mean over the sites exceeds that of independent estimates: the mean over the
+/// sites of their summed correlations `exp(-d^2 / (4 l^2))`, with the field's correlation length `l`. At
+/// least 1.
 ///
-/// Exact for the flow; for its derivatives, whose correlations change sign at `sqrt(2) l` and cancel over a large region, an upper bound that
-/// also covers what does not cancel there (bias).
+/// Exact for the flow; for its derivatives, whose correlations change sign at `sqrt(2) l` and cancel over a
+/// large region, an upper bound that also covers what does not cancel there (bias).
 pub fn sharing(layout: &FieldLayout) -> f64 {
     let length = layout.correlation_length;
     if !(length.is_finite() && length > 0.0) {
@@ -17,13 +18,13 @@ pub fn sharing(layout: &FieldLayout) -> f64 {
     }
     let correlation = |squared: f64| (-squared / (4.0 * length * length)).exp();
     match &layout.sites {
-        Sites::Grid { region, stride } => {
+        SamplingGrid::Grid { region, stride } => {
             let (width, height) = layout.frame_size;
             let r = region.unwrap_or(Rect { x: 0, y: 0, width, height });
             let along = |side: usize| along(side.div_ceil((*stride).max(1)), *stride as f64, &correlation);
             along(r.width) * along(r.height)
         }
-        Sites::Points(points) => scattered(points, &correlation),
+        SamplingGrid::Points(points) => scattered(points, &correlation),
     }
 }
 
@@ -34,18 +35,20 @@ pub fn sharing_among(layout: &FieldLayout, width: usize, used: &[usize]) -> f64 
         return 1.0;
     }
     match &layout.sites {
-        Sites::Points(points) => {
+        SamplingGrid::Points(points) => {
             let points: Vec<_> = used.iter().map(|&index| points[index]).collect();
-            sharing(&FieldLayout { sites: Sites::Points(points), ..layout.clone() })
+            sharing(&FieldLayout { sites: SamplingGrid::Points(points), ..layout.clone() })
         }
-        Sites::Grid { stride, .. } => on_lattice(width, used, length / *stride as f64),
+        SamplingGrid::Grid { stride, .. } => on_lattice(width, used, length / *stride as f64),
     }
 }
 
 /// The share of the claimed variance that all estimates have in common: what they claim and do not scatter.
 ///
-/// A covariance that holds a bias claims more than estimates with one bias scatter about their mean. `scatter` is the sum of squares of `count` sites in units of the claimed variance, over
-/// its degrees of freedom, `values` the estimates of each; of it [`sharing`] leaves `1 - sharing / count`. What chance explains (one deviation of the ratio) is not counted.
+/// A covariance that holds a bias claims more than estimates with one bias scatter about their mean.
+/// `scatter` is the sum of squares of `count` sites in units of the claimed variance, over its degrees of
+/// freedom, `values` the estimates of each; of it [`sharing`] leaves `1 - sharing / count`. What chance
+/// explains (one deviation of the ratio) is not counted.
 pub(super) fn in_common(scatter: f64, (count, values): (usize, usize), sharing: f64) -> f64 {
     let independent = count as f64 / sharing;
     let left = 1.0 - 1.0 / independent;
@@ -56,7 +59,8 @@ pub(super) fn in_common(scatter: f64, (count, values): (usize, usize), sharing: 
     (1.0 - chance - scatter / left).max(0.0)
 }
 
-/// Sums over the neighbourhood of some of the sites in which correlations count; `length` in steps of the lattice.
+/// Sums over the neighbourhood of some of the sites in which correlations count; `length` in steps of the
+/// lattice.
 fn on_lattice(width: usize, used: &[usize], length: f64) -> f64 {
     let rows = used.iter().max().map_or(0, |last| last / width + 1);
     let mut present = vec![false; rows * width];
@@ -98,7 +102,7 @@ fn scattered(points: &[(usize, usize)], correlation: &dyn Fn(f64) -> f64) -> f64
 mod tests {
     use super::*;
 
-    fn layout(sites: Sites, correlation_length: f64) -> FieldLayout {
+    fn layout(sites: SamplingGrid, correlation_length: f64) -> FieldLayout {
         FieldLayout {
             frame_size: (9, 5),
             sites,
@@ -114,18 +118,18 @@ mod tests {
     #[test]
     fn a_grid_and_the_list_of_its_pixels_share_alike() {
         let pixels: Vec<_> = (0..5).step_by(2).flat_map(|y| (0..9).step_by(2).map(move |x| (x, y))).collect();
-        let grid = sharing(&layout(Sites::Grid { region: None, stride: 2 }, 1.5));
-        let list = sharing(&layout(Sites::Points(pixels), 1.5));
+        let grid = sharing(&layout(SamplingGrid::Grid { region: None, stride: 2 }, 1.5));
+        let list = sharing(&layout(SamplingGrid::Points(pixels), 1.5));
         assert!((grid - list).abs() < 1e-12 && grid > 2.0, "{grid} {list}");
         let all: Vec<usize> = (0..5 * 3).collect();
-        let among = sharing_among(&layout(Sites::Grid { region: None, stride: 2 }, 1.5), 5, &all);
+        let among = sharing_among(&layout(SamplingGrid::Grid { region: None, stride: 2 }, 1.5), 5, &all);
         assert!((grid - among).abs() < 1e-3, "{grid} {among}");
     }
 
     #[test]
     fn independent_and_far_estimates_share_nothing() {
-        assert_eq!(sharing(&layout(Sites::default(), 0.0)), 1.0);
-        assert_eq!(sharing(&layout(Sites::default(), f64::NAN)), 1.0);
-        assert!((sharing(&layout(Sites::Points(vec![(0, 0), (8, 4)]), 0.5)) - 1.0).abs() < 1e-12);
+        assert_eq!(sharing(&layout(SamplingGrid::default(), 0.0)), 1.0);
+        assert_eq!(sharing(&layout(SamplingGrid::default(), f64::NAN)), 1.0);
+        assert!((sharing(&layout(SamplingGrid::Points(vec![(0, 0), (8, 4)]), 0.5)) - 1.0).abs() < 1e-12);
     }
 }

@@ -20,7 +20,8 @@ pub(super) struct Mat<V> {
 }
 
 impl<V: Lanes> Sym<V> {
-    /// The inverse, and how far the determinant is above what is trusted, for columns of squared lengths `n0`, `n1`.
+    /// The inverse, and how far the determinant is above what is trusted, for columns of squared lengths
+    /// `n0`, `n1`.
     #[inline(always)]
     pub fn invert(self, n0: V, n1: V, tolerance: V, noise: V) -> (Self, V) {
         let det = self.b.neg_mul_add(self.b, self.a * self.c);

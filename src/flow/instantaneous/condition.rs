@@ -1,9 +1,11 @@
-//! The condition number of the column-scaled equations, in lanes: cyclic Jacobi on their correlation matrix, whose eigenvalues are squared singular values.
+//! The condition number of the column-scaled equations, in lanes: cyclic Jacobi on their correlation matrix,
+//! whose eigenvalues are squared singular values.
 
 use crate::math::Real;
 use crate::simd::{Lanes, SimdReal};
 
-/// Sweeps after which what is left beside the diagonal is rounding; convergence is quadratic (J. Wilkinson 1962).
+/// Sweeps after which what is left beside the diagonal is rounding; convergence is quadratic (J. Wilkinson
+/// 1962).
 fn sweeps<T: Real>() -> usize {
     if size_of::<T>() == 4 { 5 } else { 7 }
 }
@@ -13,7 +15,8 @@ fn least_eigenvalue<T: Real>() -> f64 {
     if size_of::<T>() == 4 { 1e-4 } else { 1e-12 }
 }
 
-/// Largest over smallest singular value, from the upper triangle of the normal matrix; and whether (positive) to trust it.
+/// Largest over smallest singular value, from the upper triangle of the normal matrix; and whether (positive)
+/// to trust it.
 #[inline(always)]
 pub(super) fn condition<T: SimdReal, V: Lanes<Scalar = T>>(normal: &[V; 21]) -> (V, V) {
     let mut a = correlation(normal);

@@ -83,7 +83,8 @@ impl<T: SimdReal> RowKernel<'_, T> {
         }
     }
 
-    /// 3x3: sums, differences and second differences down the columns of the three combinations in time, then across.
+    /// 3x3: sums, differences and second differences down the columns of the three combinations in time, then
+    /// across.
     #[inline(always)]
     fn three<V: Lanes<Scalar = T>>(mut self) {
         let w = self.frames[0].width();
@@ -156,7 +157,8 @@ impl<T: SimdReal> RowKernel<'_, T> {
     }
 }
 
-/// The jet from column sums `s`, differences `d` and second differences `c` of three rows, for lanes whose left neighbours start at `x`.
+/// The jet from column sums `s`, differences `d` and second differences `c` of three rows, for lanes whose
+/// left neighbours start at `x`.
 #[inline(always)]
 fn across<T: SimdReal, V: Lanes<Scalar = T>>(s: &[T], d: &[T], c: &[T], x: usize) -> [V; 6] {
     let at = |row: &[T], k: usize| V::load(&row[x + k..]);

@@ -1,6 +1,7 @@
 //! A row of estimates with covariance and diagnostics, from a row of coefficients.
 //!
-//! Apart from the kernel of the plain estimate, so that the many registers these need do not slow it down, and so that all neighbourhoods share one.
+//! Apart from the kernel of the plain estimate, so that the many registers these need do not slow it down,
+//! and so that all neighbourhoods share one.
 
 use super::lane_noise::LaneNoise;
 use super::normal::{LaneRates, noise_square};
@@ -61,8 +62,8 @@ impl<T: SimdReal> RatesRow<&[T]> {
     }
 }
 
-/// Sites whose covariance is collected before it goes to its planes: these are often a multiple of 4 KiB apart, and a vector written to each
-/// in turn would drive the one before it out of the first-level cache.
+/// SamplingGrid whose covariance is collected before it goes to its planes: these are often a multiple of 4 KiB
+/// apart, and a vector written to each in turn would drive the one before it out of the first-level cache.
 const BLOCK: usize = 64;
 /// Values from one entry of the covariance to the next, for the same reason not a power of two.
 const BLOCK_STEP: usize = BLOCK + 16;

@@ -11,14 +11,14 @@ use super::output::{clear, write};
 use super::point::{Asked, PointVisitor, rounding_floor};
 use super::propagation::factor_memory;
 use super::uncertainty::{Detail, LaneEstimate, estimate_affine};
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, MaskCounts};
 use crate::jet::{JetRates, TimeScheme};
 use crate::simd::{SimdReal, dispatch};
 use crate::types::{Frame, Mask, Rect, Status};
 use std::ops::Range;
 
-/// Sites that are looked at together before each on its own.
+/// SamplingGrid that are looked at together before each on its own.
 const GROUP: usize = 64;
 
 /// How a grid is walked row by row.
@@ -44,7 +44,7 @@ impl<'a> SiteMask<'a> {
 pub(super) struct Job<'a, T> {
     pub owner: &'a Instantaneous,
     pub frames: [&'a Frame<T>; 3],
-    pub common: &'a Common,
+    pub common: &'a EstimatorOptions,
     pub mask: Option<SiteMask<'a>>,
     /// Where covariance or diagnostics are wanted: the noise for the lanes.
     pub noise: Option<LaneNoise<T>>,
@@ -137,7 +137,8 @@ impl<T: SimdReal> Job<'_, T> {
         }
     }
 
-    /// Motion, covariance and diagnostics: first the coefficients of all columns, then the estimates of the sites among them.
+    /// Motion, covariance and diagnostics: first the coefficients of all columns, then the estimates of the
+    /// sites among them.
     fn detailed_row(
         &self,
         source: &Source<T>,
@@ -191,7 +192,8 @@ impl<T: SimdReal> Job<'_, T> {
         self.owner.options.scheme
     }
 
-    /// One site of the affine model: normal equations in double precision, and the careful path where even those are doubtful.
+    /// One site of the affine model: normal equations in double precision, and the careful path where even
+    /// those are doubtful.
     pub fn site(&self, band: &mut FieldBand<'_, T>, index: usize, at: (usize, usize)) {
         let local = index - band.sites.start;
         if let Some(status) = self.obstacle(at) {

@@ -1,4 +1,5 @@
-//! The noise of the jets, prepared for the lanes: factored, so that the covariance of the motion becomes a sum of squares.
+//! The noise of the jets, prepared for the lanes: factored, so that the covariance of the motion becomes a
+//! sum of squares.
 
 use crate::flow::model::Affine;
 use crate::math::Real;
@@ -6,11 +7,13 @@ use crate::math::Real;
 /// The noise of the jets as the lanes use it.
 #[derive(Debug, Clone)]
 pub(super) struct LaneNoise<T> {
-    /// Entries of R above its diagonal that are not zero: row, column, value for columns already times the root of S. Last columns first.
+    /// Entries of R above its diagonal that are not zero: row, column, value for columns already times the
+    /// root of S. Last columns first.
     pub mixing: Vec<(usize, usize, T)>,
     /// K, lower triangle row by row, times the root of S.
     pub gains: [[T; 6]; 6],
-    /// `sum_f |G_f C^(1/2)|^2` as a polynomial in m: constant, linear, upper triangle of the quadratic part with its mirror image added.
+    /// `sum_f |G_f C^(1/2)|^2` as a polynomial in m: constant, linear, upper triangle of the quadratic part
+    /// with its mirror image added.
     pub constant: T,
     pub linear: [T; 6],
     pub quadratic: [T; 21],
@@ -19,7 +22,8 @@ pub(super) struct LaneNoise<T> {
 }
 
 impl LaneNoise<f64> {
-    /// From the covariance of a jet for unit noise, the weights of three frames in i, i', i'', and the pixel noise.
+    /// From the covariance of a jet for unit noise, the weights of three frames in i, i', i'', and the pixel
+    /// noise.
     pub fn new(jet: &[[f64; 6]; 6], weights: &[[f64; 3]; 3], pixel: Option<f64>) -> Self {
         let product = |a: usize, b: usize| -> f64 { (0..3).map(|f| weights[a][f] * weights[b][f]).sum() };
         let (mut mixing, spread) = factor(jet);

@@ -1,11 +1,14 @@
-//! The per-pixel estimate, WO2010/098160 (34): `[J(i); J(i')] m = [i'; i'']`, least squares at each pixel on its own.
+//! The per-pixel estimate, WO2010/098160 (34): `[J(i); J(i')] m = [i'; i'']`, least squares at each pixel on
+//! its own.
 //!
-//! Two paths. The careful one ([`point`]) solves one pixel by orthogonal transformations in double precision and can say everything about
-//! it: rank, condition, residual, covariance. The fast one (`dense`) runs the affine model over rows in lanes by normal
-//! equations, with covariance, residual and condition where they are wanted; pixels whose pivots are too small for its precision are done again in double precision, at last by the careful path. What is reported as
-//! unobservable is always the careful path's decision.
+//! Two paths. The careful one ([`point`]) solves one pixel by orthogonal transformations in double precision
+//! and can say everything about it: rank, condition, residual, covariance. The fast one (`dense`) runs the
+//! affine model over rows in lanes by normal equations, with covariance, residual and condition where they
+//! are wanted; pixels whose pivots are too small for its precision are done again in double precision, at
+//! last by the careful path. What is reported as unobservable is always the careful path's decision.
 //!
-//! Equations are formed per px and frame whatever the pixel pitch is, so that the pitch scales results and never changes a decision.
+//! Equations are formed per px and frame whatever the pixel pitch is, so that the pitch scales results and
+//! never changes a decision.
 
 mod blocks;
 mod buffers;
@@ -22,12 +25,12 @@ mod propagation;
 mod uncertainty;
 
 use super::model::ModelKind;
-use super::options::{Common, RankPolicy};
+use super::options::{EstimatorOptions, RankPolicy};
 use super::site::bands;
 use crate::error::Result;
 use crate::jet::{JetRows, JetStencil, Neighbourhood, TimeScheme};
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Rect, Sites};
+use crate::types::{FlowField, Frame, Rect, SamplingGrid};
 use dense::Source;
 use job::{Job, RowPlan, SiteMask};
 use lane_noise::LaneNoise;
@@ -60,7 +63,7 @@ pub(super) struct Instantaneous {
 
 impl Instantaneous {
     /// Prepares the stencil.
-    pub fn new(options: &InstantaneousOptions, common: &Common) -> Result<Self> {
+    pub fn new(options: &InstantaneousOptions, common: &EstimatorOptions) -> Result<Self> {
         let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
         let noise = NoiseModel::new(&stencil, options.scheme, common.noise);
         let lane_noise = noise.lanes();
@@ -78,14 +81,19 @@ impl Instantaneous {
     }
 
     /// Fills `field`, in px and frames. `frames`: three of one size, oldest first.
-    pub fn estimate_into<T: SimdReal>(&self, frames: [&Frame<T>; 3], common: &Common, field: &mut FlowField<T>) {
+    pub fn estimate_into<T: SimdReal>(
+        &self,
+        frames: [&Frame<T>; 3],
+        common: &EstimatorOptions,
+        field: &mut FlowField<T>,
+    ) {
         let mask = common.mask.as_ref().map(SiteMask::new);
         let noise = (common.covariance || common.diagnostics).then(|| self.lane_noise.cast());
         let job = Job { owner: self, frames, common, mask, noise };
         let (width, sites) = (field.width, field.layout.sites.clone());
         let quick = self.options.model == ModelKind::Affine;
         let rows = match (&sites, quick) {
-            (&Sites::Grid { region, stride }, true) => {
+            (&SamplingGrid::Grid { region, stride }, true) => {
                 let (w, h) = frames[0].size();
                 let region = region.unwrap_or(Rect { x: 0, y: 0, width: w, height: h });
                 Some(RowPlan { region, stride, source: self.source::<T>() })

@@ -1,8 +1,8 @@
 //! How pixel noise becomes uncertainty of the motion.
 //!
-//! The error of the equations, `e = b - A m`, is linear in the jets of the three frames for a given m. White pixel noise of variance s2
-//! gives each frame's jet the covariance `s2 C`, so `Cov(e) = s2 sum_f G_f C G_f^T` with `G_f = de / d(jet of frame f)`,
-//! and `Cov(m) = A^+ Cov(e) A^+T` to first order.
+//! The error of the equations, `e = b - A m`, is linear in the jets of the three frames for a given m. White
+//! pixel noise of variance s2 gives each frame's jet the covariance `s2 C`, so `Cov(e) = s2 sum_f G_f C
+//! G_f^T` with `G_f = de / d(jet of frame f)`, and `Cov(m) = A^+ Cov(e) A^+T` to first order.
 
 use super::lane_noise::LaneNoise;
 use crate::flow::least_squares::Solution;
@@ -35,15 +35,16 @@ impl NoiseModel {
         LaneNoise::new(&self.jet, &self.weights, self.pixel)
     }
 
-    /// Variance of the pixel noise from what the quadratics leave in the three frames; NaN when they leave nothing to judge by.
+    /// Variance of the pixel noise from what the quadratics leave in the three frames; NaN when they leave
+    /// nothing to judge by.
     pub fn pixel_variance<T: Real>(stencil: &JetStencil, frames: [&Frame<T>; 3], (x, y): (usize, usize)) -> f64 {
         frames.iter().map(|f| stencil.noise_variance(f, x, y).unwrap_or(f64::NAN)).sum::<f64>() / 3.0
     }
 
     /// Covariance of the solution of a model's equations.
     ///
-    /// The pixel variance is the given one; else the residual's square over its expectation for unit noise; else, for models with as many
-    /// unknowns as equations, that of the jets' fit.
+    /// The pixel variance is the given one; else the residual's square over its expectation for unit noise;
+    /// else, for models with as many unknowns as equations, that of the jets' fit.
     pub fn covariance<M: MotionModel<N, P>, const N: usize, const P: usize>(
         &self,
         a: &[[f64; P]; N],

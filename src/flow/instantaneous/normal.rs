@@ -1,8 +1,9 @@
 //! The affine model's normal equations in lanes, with the sparsity of (21) written out.
 //!
-//! With `g = (Ix, Iy)`, Hessian rows `h1, h2` and unknowns in three pairs `f = (u, v), X = (u_x, v_x), Y = (u_y, v_y)`, the rows of J are
-//! `[g 0 0], [h1 g 0], [h2 0 g], [0 2h1 0], [0 h2 h1], [0 0 2h2]`, so `J^T J` is made of fifteen products. It is solved by block elimination, pair by pair:
-//! three divisions, and short chains between them.
+//! With `g = (Ix, Iy)`, Hessian rows `h1, h2` and unknowns in three pairs `f = (u, v), X = (u_x, v_x), Y =
+//! (u_y, v_y)`, the rows of J are `[g 0 0], [h1 g 0], [h2 0 g], [0 2h1 0], [0 h2 h1], [0 0 2h2]`, so `J^T J`
+//! is made of fifteen products. It is solved by block elimination, pair by pair: three divisions, and short
+//! chains between them.
 
 use super::blocks::{Mat, Sym};
 use crate::math::Real;
@@ -13,7 +14,8 @@ use crate::simd::{Lanes, SimdReal};
 pub(super) struct LaneRates<V> {
     /// `Ix, Iy, Ixx, Ixy, Iyy`.
     pub jet: [V; 5],
-    /// **Minus** `i'`: with this sign the right sides need no change of sign (J enters squared or together with it).
+    /// **Minus** `i'`: with this sign the right sides need no change of sign (J enters squared or together
+    /// with it).
     pub minus_first: [V; 6],
     /// `i''`.
     pub second: [V; 6],
@@ -24,12 +26,14 @@ pub(super) struct LaneRates<V> {
 pub(super) struct LaneSolution<V> {
     /// `u, v, u_x, v_x, u_y, v_y`.
     pub motion: [V; 6],
-    /// Positive where every pivot is large enough for the precision and everything is finite; else the lane must be done again with more care.
+    /// Positive where every pivot is large enough for the precision and everything is finite; else the lane
+    /// must be done again with more care.
     pub trust: V,
 }
 
-/// Smallest accepted product of two pivots over that of their columns' squared lengths, all within a pair: `1 - R^2` of a column given those before
-/// it. In single precision the solution then keeps about three digits in the worst accepted pixel; in double, seven.
+/// Smallest accepted product of two pivots over that of their columns' squared lengths, all within a pair: `1
+/// - R^2` of a column given those before it. In single precision the solution then keeps about three digits
+/// in the worst accepted pixel; in double, seven.
 pub(super) fn pivot_tolerance<T: Real>() -> f64 {
     if size_of::<T>() == 4 { 3e-4 } else { 1e-9 }
 }

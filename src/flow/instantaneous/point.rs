@@ -31,7 +31,8 @@ pub(super) struct PointEstimate {
     pub condition: f64,
 }
 
-/// Standard deviation of the rounding noise in a jet that came from samples of type `T`: the type's relative precision times the brightness.
+/// Standard deviation of the rounding noise in a jet that came from samples of type `T`: the type's relative
+/// precision times the brightness.
 pub(in crate::flow) fn rounding_floor<T: Real>(rates: &JetRates<f64>) -> f64 {
     let size = rates.jet[0].abs() + rates.first[0].abs() + rates.second[0].abs();
     // Samples are held to half the spacing of their type; the jets are computed in double precision.

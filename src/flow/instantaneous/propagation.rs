@@ -1,11 +1,13 @@
 //! From the noise of the jets to the covariance of the motion, in lanes.
 //!
-//! `J(i) m = L(m) i` with a sparse 6x6 matrix L, so the error of the equations is `e = [i' - L i; i'' - L i']` and its derivative with respect to the jet of
-//! frame f is `G_f = [w1_f - w0_f L; w2_f - w1_f L]` with that frame's weights in i, i', i''. With the two halves `Y1, Y2` of `A^+` the gains are
-//! `A^+ G_f = w0_f X0 + w1_f X1 + w2_f X2`, where `X0 = -Y1 L, X1 = Y1 - Y2 L, X2 = Y2`.
+//! `J(i) m = L(m) i` with a sparse 6x6 matrix L, so the error of the equations is `e = [i' - L i; i'' - L
+//! i']` and its derivative with respect to the jet of frame f is `G_f = [w1_f - w0_f L; w2_f - w1_f L]` with
+//! that frame's weights in i, i', i''. With the two halves `Y1, Y2` of `A^+` the gains are `A^+ G_f = w0_f X0
+//! + w1_f X1 + w2_f X2`, where `X0 = -Y1 L, X1 = Y1 - Y2 L, X2 = Y2`.
 //!
-//! Frames and components enter only through `W = w w^T` and the jet's covariance C. Factors `W = K K^T` and `C = R S R^T` (R unit upper triangular, S diagonal) turn
-//! the covariance into a sum of squares, which rounding cannot make indefinite: three combinations of X0, X1, X2 times R times the root of S.
+//! Frames and components enter only through `W = w w^T` and the jet's covariance C. Factors `W = K K^T` and
+//! `C = R S R^T` (R unit upper triangular, S diagonal) turn the covariance into a sum of squares, which
+//! rounding cannot make indefinite: three combinations of X0, X1, X2 times R times the root of S.
 
 use super::lane_noise::LaneNoise;
 use super::normal::{LaneRates, Normal};
@@ -14,7 +16,8 @@ use crate::simd::{Lanes, SimdReal};
 /// Columns of the factored covariance: three combinations of six components.
 const COLUMNS: usize = 18;
 
-/// Factor of the covariance, a row a parameter: working memory, made once and not cleared for every vector of pixels.
+/// Factor of the covariance, a row a parameter: working memory, made once and not cleared for every vector of
+/// pixels.
 pub(super) type Factor<V> = [[V; COLUMNS]; 6];
 
 /// Working memory of [`propagate`].
@@ -35,7 +38,8 @@ pub(super) fn propagate<T: SimdReal, V: Lanes<Scalar = T>>(
     let m = normal.solution.motion;
     let [_, first @ ..] = rates.minus_first;
     for (z, out) in inverse.iter().zip(columns.iter_mut()) {
-        // With the signs of `minus_first` and of J's rows these are -Y1 and Y2; carried() leaves out L's minus sign.
+        // With the signs of `minus_first` and of J's rows these are -Y1 and Y2; carried() leaves out L's
+        // minus sign.
         let (y1, y2) = (weigh(z, rates.jet), weigh(z, first));
         let (l1, l2) = (carried(&y1, m), carried(&y2, m));
         // X0, X1, X2, all with the opposite sign.
@@ -92,7 +96,8 @@ fn carried<V: Lanes>(y: &[V; 6], [u, v, ux, vx, uy, vy]: [V; 6]) -> [V; 5] {
     ]
 }
 
-/// `B B^T`, upper triangle: three blocks of three rows by three, so that the sums of a block stay in registers.
+/// `B B^T`, upper triangle: three blocks of three rows by three, so that the sums of a block stay in
+/// registers.
 #[inline(always)]
 fn squares<V: Lanes>(b: &Factor<V>) -> [V; 21] {
     let mut out = [V::zero(); 21];

@@ -1,6 +1,8 @@
-//! The affine estimate with its covariance and residual, in lanes: the formulae of [`NoiseModel`](super::noise::NoiseModel), which stays their oracle.
+//! The affine estimate with its covariance and residual, in lanes: the formulae of
+//! [`NoiseModel`](super::noise::NoiseModel), which stays their oracle.
 //!
-//! What noise leaves in the residual is `sum_f |G_f C^(1/2)|^2 - tr(A^T A Cov)` in the words of [`propagation`](super::propagation); the first part is quadratic in m.
+//! What noise leaves in the residual is `sum_f |G_f C^(1/2)|^2 - tr(A^T A Cov)` in the words of
+//! [`propagation`](super::propagation); the first part is quadratic in m.
 
 use super::condition::condition;
 use super::lane_noise::LaneNoise;
@@ -40,16 +42,18 @@ impl LaneEstimate<f64> {
     }
 }
 
-/// Least share of the noise that must stay in the residual, for its expectation, a difference, to be worth dividing by.
+/// Least share of the noise that must stay in the residual, for its expectation, a difference, to be worth
+/// dividing by.
 fn least_share<T: Real>() -> f64 {
     if size_of::<T>() == 4 { 1e-2 } else { 1e-6 }
 }
 
-/// How many times the squared rounding noise of twelve equations (with its margin) the squared residual must have, where the
-/// pixel noise is judged by it: its relative error is then below one in a hundred.
+/// How many times the squared rounding noise of twelve equations (with its margin) the squared residual must
+/// have, where the pixel noise is judged by it: its relative error is then below one in a hundred.
 const RESIDUAL_MARGIN: f64 = 1e3;
 
-/// Solves the equations of each lane and propagates the pixel noise. `samples`: [`noise_square`] of the type that the frames came in.
+/// Solves the equations of each lane and propagates the pixel noise. `samples`: [`noise_square`] of the type
+/// that the frames came in.
 #[inline(always)]
 pub(super) fn estimate_affine<T: SimdReal, V: Lanes<Scalar = T>>(
     rates: &LaneRates<V>,
@@ -188,7 +192,8 @@ mod tests {
         all
     }
 
-    /// Differences from the careful path relative to standard deviations, over the condition squared (which normal equations cost).
+    /// Differences from the careful path relative to standard deviations, over the condition squared (which
+    /// normal equations cost).
     fn check<T: SimdReal>(tolerance: f64) {
         let mut trusted = 0;
         for (stencil, scheme, pixel) in models() {

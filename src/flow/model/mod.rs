@@ -1,7 +1,8 @@
 //! Motion models: what the flow around a pixel is assumed to be, and the equations that follow.
 //!
 //! A new model is one file beside this one, with a type that implements [`MotionModel`], and one line in the
-//! registry below. The registry makes the [`ModelKind`], its name for the command line and Python, and runs the shared conformance tests on the model.
+//! registry below. The registry makes the [`ModelKind`], its name for the command line and Python, and runs
+//! the shared conformance tests on the model.
 
 mod conformance;
 
@@ -70,17 +71,20 @@ impl Parameter {
     }
 }
 
-/// A motion model with P unknowns, determined at a pixel by N linear equations in the jet and its time derivatives.
+/// A motion model with P unknowns, determined at a pixel by N linear equations in the jet and its time
+/// derivatives.
 pub trait MotionModel<const N: usize, const P: usize> {
     /// Name on the command line and in Python.
     const NAME: &'static str;
     /// The unknowns, `u` and `v` first.
     const PARAMETERS: [Parameter; P];
 
-    /// The equations `A m = b`. Each is linear in `(i, i', i'')`, coefficients and right side alike, so that noise can be propagated.
+    /// The equations `A m = b`. Each is linear in `(i, i', i'')`, coefficients and right side alike, so that
+    /// noise can be propagated.
     fn equations(rates: &JetRates<f64>) -> ([[f64; P]; N], [f64; N]);
 
-    /// The flow that the unknowns describe, at offset `(dx, dy)` px from the pixel and `t` frames from the estimate.
+    /// The flow that the unknowns describe, at offset `(dx, dy)` px from the pixel and `t` frames from the
+    /// estimate.
     fn velocity(m: &[f64; P], dx: f64, dy: f64, t: f64) -> (f64, f64);
 }
 
@@ -168,8 +172,8 @@ impl ModelKind {
     /// The model called `name`.
     ///
     /// # Errors
-    /// [`Error::NotObservable`] for `affine_accelerating`: flow that varies in space and in time at once cannot be told from brightness (0071).
-    /// [`Error::Argument`] naming `model` for any other unknown word.
+    /// [`Error::NotObservable`] for `affine_accelerating`: flow that varies in space and in time at once
+    /// cannot be told from brightness (0071). [`Error::Argument`] naming `model` for any other unknown word.
     pub fn parse(name: &str) -> Result<Self> {
         if matches!(name, "affine_accelerating" | "accelerating_affine" | "affine+accelerating") {
             return Err(Error::NotObservable(format!(

@@ -33,7 +33,8 @@ impl Combination {
 
     /// Combines the frames in a rectangle that may reach over their edges, where the result is zero.
     ///
-    /// The rectangle has its corner at column `x`, row `y` and rows of `width` samples; `out` holds the three images one after the other.
+    /// The rectangle has its corner at column `x`, row `y` and rows of `width` samples; `out` holds the three
+    /// images one after the other.
     #[inline(always)]
     pub fn apply<T: SimdReal>(
         self,

@@ -1,21 +1,29 @@
 //! Covariance of the windowed estimate.
 //!
-//! To first order the error of `m = N^-1 sum_p w T_p^T A_p^T b_p` is `N^-1 sum_p w T_p^T A_p^T r_p`, `r_p` what noise leaves in the pixel's equations. Stencils and smoothing
-//! spread the noise of one sample over many pixels, so `s2 N^-1` would be far off. Instead the sum is turned round, to run over the noisy samples q:
-//! `sum_q w_q T_q^T h(q) e(q)` with `h = sum_j L_j^T d_j`, `d_j(p)` the weight of the jet's component j in `A_p^T r_p` and `L_j^T` the adjoint of the
-//! stencil. Then `Cov = s2 N^-1 S N^-1`, `S = sum_q w_q^2 T_q^T h h^T T_q`: one more pass of moments.
+//! To first order the error of `m = N^-1 sum_p w T_p^T A_p^T b_p` is `N^-1 sum_p w T_p^T A_p^T r_p`, `r_p`
+//! what noise leaves in the pixel's equations. Stencils and smoothing spread the noise of one sample over
+//! many pixels, so `s2 N^-1` would be far off. Instead the sum is turned round, to run over the noisy samples
+//! q: `sum_q w_q T_q^T h(q) e(q)` with `h = sum_j L_j^T d_j`, `d_j(p)` the weight of the jet's component j in
+//! `A_p^T r_p` and `L_j^T` the adjoint of the stencil. Then `Cov = s2 N^-1 S N^-1`, `S = sum_q w_q^2 T_q^T h
+//! h^T T_q`: one more pass of moments.
 //!
-//! Smoothing by a Gaussian of variance t2 comes in between. The product of the window, of variance w2, and of the kernel about the sample q is the Gaussian of variance
-//! `w2 + t2` at q times a kernel of variance `a t2` about `a q`, `a = w2 / (w2 + t2)`. So h is smoothed by `a t2` instead of t2, samples count at the place
-//! `a q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The stencil's few pixels are taken to be one place.
+//! Smoothing by a Gaussian of variance t2 comes in between. The product of the window, of variance w2, and of
+//! the kernel about the sample q is the Gaussian of variance `w2 + t2` at q times a kernel of variance `a t2`
+//! about `a q`, `a = w2 / (w2 + t2)`. So h is smoothed by `a t2` instead of t2, samples count at the place `a
+//! q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The
+//! stencil's few pixels are taken to be one place.
 //!
-//! Three things draw the estimate away from the truth in a known direction: noise in the coefficients towards zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own
-//! `E[dA^T dA]`; truncation ([`super::misfit`]); and flow that is not affine in the window ([`super::misfit_planes`]). None is subtracted; the outer product of the first two's sum
-//! is added and that of the third, so that the covariance is that of the whole error.
+//! Three things draw the estimate away from the truth in a known direction: noise in the coefficients towards
+//! zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own `E[dA^T dA]`; truncation
+//! ([`super::misfit`]); and flow that is not affine in the window ([`super::misfit_planes`]). None is
+//! subtracted; the outer product of the first two's sum is added and that of the third, so that the
+//! covariance is that of the whole error.
 //!
-//! Unless the noise is given, its variance is read from the highest frequencies of the frames ([`super::detail`]), where motion and misfit hardly show. The residual gives
-//! another, its sum of squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more than what chance allows
-//! beyond that, and where the residual is that much larger than noise and truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
+//! Unless the noise is given, its variance is read from the highest frequencies of the frames
+//! ([`super::detail`]), where motion and misfit hardly show. The residual gives another, its sum of squares
+//! over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more
+//! than what chance allows beyond that, and where the residual is that much larger than noise and truncation
+//! explain, at motion boundaries or changes of lighting, it widens the covariance.
 
 use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
 use super::detail::Detail;
@@ -35,8 +43,9 @@ use std::ops::Range;
 const TASK_ROWS: usize = 64;
 
 impl<T: SimdReal> NoiseSetting<T> {
-    /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with the margin around them
-    /// (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and frames; with `parts` 21 more, what is left of it without the noise.
+    /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with
+    /// the margin around them (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and
+    /// frames; with `parts` 21 more, what is left of it without the noise.
     pub fn covariance(
         &self,
         (source, detail): (&Source<'_, T>, Option<&Detail<T>>),
@@ -83,7 +92,8 @@ struct Scratch<T> {
     /// Planes of the misfit, and two of the detail.
     misfit: Planes<T>,
     misfit_sums: Moments<T>,
-    /// Inverse, motion, residual, weight, moments of the usable pixels at one row of the tile; then the result.
+    /// Inverse, motion, residual, weight, moments of the usable pixels at one row of the tile; then the
+    /// result.
     pixel: Vec<T>,
 }
 
@@ -116,7 +126,8 @@ pub(super) const PIXEL_NOISE: usize = PIXEL_SHARE + 2;
 pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
 /// Where the result begins among them.
 pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 12 + 3;
-/// Where the misfit's scores begin: six entries of the truncation's, six of the flow's, the truncation's energy, the energy of the detail and the weight of the pixels that have detail.
+/// Where the misfit's scores begin: six entries of the truncation's, six of the flow's, the truncation's
+/// energy, the energy of the detail and the weight of the pixels that have detail.
 pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
 /// The covariance of a band of rows.
 struct BandTask<'a, 'b, T> {
@@ -268,7 +279,8 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         }
     }
 
-    /// Covariance of row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that begins at `left`.
+    /// Covariance of row `j` of the band, whose moments are row `g` of the group, at the columns of the tile
+    /// that begins at `left`.
     fn finish_row(&mut self, j: usize, g: usize, left: usize) {
         self.gather(j, g, left);
         let Self { setting, scratch, .. } = self;

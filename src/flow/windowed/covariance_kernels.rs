@@ -8,7 +8,8 @@ use super::tile::{JetTile, Planes};
 use super::window::filter;
 use crate::simd::{Kernel, Lanes, SimdReal};
 
-/// Weights of the jet's components in `A^T r`, for one row of pixels; `ROWS` equations a pixel, of which `BLOCK` in each block.
+/// Weights of the jet's components in `A^T r`, for one row of pixels; `ROWS` equations a pixel, of which
+/// `BLOCK` in each block.
 pub(super) struct Weigh<'a, T, const ROWS: usize, const BLOCK: usize> {
     pub setting: &'a NoiseSetting<T>,
     pub jets: &'a JetTile<T>,

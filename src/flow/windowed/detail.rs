@@ -1,7 +1,9 @@
 //! Noise where motion hardly enters: in the highest frequencies of space and time.
 //!
-//! `e = sum_t c_t sum_o k(o) I_t(p + o)` with `k = [1, -2, 1] x [1, -2, 1]` and `c` the second difference of three frames (the difference of a pair): fourth derivatives of the
-//! image, differenced once or twice more in time. Texture of two pixels or more leaves next to nothing of itself there, while white noise keeps `36 sum_t c_t^2` times its variance.
+//! `e = sum_t c_t sum_o k(o) I_t(p + o)` with `k = [1, -2, 1] x [1, -2, 1]` and `c` the second difference of
+//! three frames (the difference of a pair): fourth derivatives of the image, differenced once or twice more
+//! in time. Texture of two pixels or more leaves next to nothing of itself there, while white noise keeps `36
+//! sum_t c_t^2` times its variance.
 
 use super::combine::Combination;
 use super::noise::shared;
@@ -56,7 +58,8 @@ impl<T: SimdReal> Detail<T> {
         Self { energy, known }
     }
 
-    /// Copies row `y` from column `x` on, either of which may lie outside the frame. `energy` comes with 1 where the pixel is usable and 0 elsewhere.
+    /// Copies row `y` from column `x` on, either of which may lie outside the frame. `energy` comes with 1
+    /// where the pixel is usable and 0 elsewhere.
     pub fn row(&self, x: isize, y: isize, energy: &mut [T], known: &mut [T]) {
         known.fill(T::default());
         let (w, h) = self.energy.size();
@@ -78,7 +81,8 @@ fn times(combination: Combination) -> [f64; 3] {
     if combination == Combination::Pair { weights[1] } else { weights[2] }
 }
 
-/// Expectation of `e^2` for noise of variance 1, which was smoothed by `smooth` px before the frames came here.
+/// Expectation of `e^2` for noise of variance 1, which was smoothed by `smooth` px before the frames came
+/// here.
 pub(super) fn gain(combination: Combination, smooth: Option<f64>) -> f64 {
     let correlation = shared(smooth);
     let mut axis = 0.0;

@@ -11,7 +11,8 @@ use crate::types::Status;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Rows of one parallel task, at most; fixed, and each pixel's result depends on its own window only, so threads cannot change it.
+/// Rows of one parallel task, at most; fixed, and each pixel's result depends on its own window only, so
+/// threads cannot change it.
 const TASK_ROWS: usize = 64;
 
 /// What the estimate needs beside the images.
@@ -84,7 +85,8 @@ impl<T: SimdReal> Strip<T> {
         strip
     }
 
-    /// Motion along the image row `y` from column `x` on, in px and frames: six rows of equal length in `out`; zero where there is no estimate.
+    /// Motion along the image row `y` from column `x` on, in px and frames: six rows of equal length in
+    /// `out`; zero where there is no estimate.
     ///
     /// The strip must hold every row of its span.
     pub fn motion_row(&self, x: isize, y: isize, scale: f64, out: &mut [T]) {
@@ -239,7 +241,8 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         }
     }
 
-    /// Solves row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that begins at `left`.
+    /// Solves row `j` of the band, whose moments are row `g` of the group, at the columns of the tile that
+    /// begins at `left`.
     fn solve_row(&mut self, j: usize, g: usize, left: usize) {
         let Scratch { moments: sums, solved, .. } = &mut *self.scratch;
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };

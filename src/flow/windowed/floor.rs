@@ -15,7 +15,8 @@ pub(super) fn of_frames<'a, T: Real + 'a>(frames: impl Iterator<Item = &'a Frame
     of_magnitude::<T>(frames.map(|frame| largest_magnitude(frame.data())).fold(0.0, f64::max))
 }
 
-/// The floor at `(x, y)`: that of the samples which the window of this radius touches. One pixel without data must not blind the rest of the frame.
+/// The floor at `(x, y)`: that of the samples which the window of this radius touches. One pixel without data
+/// must not blind the rest of the frame.
 pub(super) fn about<T: Real>(frames: &[&Frame<T>], (x, y): (usize, usize), radius: usize, reach: Reach) -> f64 {
     let span = |at: usize, before: usize, after: usize, n: usize| {
         at.saturating_sub(radius + before)..(at + radius + after + 1).min(n)

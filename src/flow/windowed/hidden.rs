@@ -1,8 +1,10 @@
 //! Directions of the motion that only noise seems to determine.
 //!
-//! Noise has gradients of its own. On average it adds E to the normal matrix N, so that along an eigenvector of `N^-1 E` with eigenvalue a the estimate is `1 - a` of the
-//! motion: where the image has no structure (an edge's own direction, a grating), a is near 1 and the estimate near zero whatever the motion is. What such an estimate
-//! leaves open is as large as the spread of the one that undoes the attenuation, `1 / (1 - a)` times as wide.
+//! Noise has gradients of its own. On average it adds E to the normal matrix N, so that along an eigenvector
+//! of `N^-1 E` with eigenvalue a the estimate is `1 - a` of the motion: where the image has no structure (an
+//! edge's own direction, a grating), a is near 1 and the estimate near zero whatever the motion is. What such
+//! an estimate leaves open is as large as the spread of the one that undoes the attenuation, `1 / (1 - a)`
+//! times as wide.
 
 use super::covariance::{PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
@@ -52,7 +54,8 @@ fn widen<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], c: usize)
     }
 }
 
-/// By how much undoing an attenuation of `1 - a` widens the estimate beyond what small shares do, which the covariance holds as a pull: `a^4 / (1 - a)`.
+/// By how much undoing an attenuation of `1 - a` widens the estimate beyond what small shares do, which the
+/// covariance holds as a pull: `a^4 / (1 - a)`.
 fn excess(share: f64) -> f64 {
     let a = share.max(0.0);
     a.min(1.0).powi(4) / (1.0 - a).max(WHOLE)

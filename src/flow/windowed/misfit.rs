@@ -1,10 +1,13 @@
 //! What truncation leaves in the equations even without noise.
 //!
-//! The equations hold for quadratic brightness and small steps in time. On texture the stencils see higher derivatives too, `L_j = sum_ab M_j(a, b) d_x^a d_y^b` with
-//! `M_j(a, b) = sum_o L_j(o) o_x^a o_y^b / (a! b!)`; a difference over frames is `d_t + c2 d_t^2 + c3 d_t^3`; and smoothing does not commute with strain.
-//! Brightness carried along gives `d_t = -(u d_x + v d_y)`, so the residual r that the true motion leaves in `i' + P(i) m` is known from the image itself, to
-//! leading order: second to fourth derivatives times [`Truncation::rows`], linear in m, and third powers of the flow from the difference in time. For rows 7-12 the same holds with i' for i.
-//! Windows sum it as `sum w T^T P^T r`; `N^-1` of that is minus the bias of the estimate.
+//! The equations hold for quadratic brightness and small steps in time. On texture the stencils see higher
+//! derivatives too, `L_j = sum_ab M_j(a, b) d_x^a d_y^b` with `M_j(a, b) = sum_o L_j(o) o_x^a o_y^b / (a!
+//! b!)`; a difference over frames is `d_t + c2 d_t^2 + c3 d_t^3`; and smoothing does not commute with strain.
+//! Brightness carried along gives `d_t = -(u d_x + v d_y)`, so the residual r that the true motion leaves in
+//! `i' + P(i) m` is known from the image itself, to leading order: second to fourth derivatives times
+//! [`Truncation::rows`], linear in m, and third powers of the flow from the difference in time. For rows 7-12
+//! the same holds with i' for i. Windows sum it as `sum w T^T P^T r`; `N^-1` of that is minus the bias of the
+//! estimate.
 
 use super::combine::Combination;
 use super::noise::basis;
@@ -14,7 +17,8 @@ use crate::simd::Lanes;
 /// The derivatives that residuals are made of, as powers of d_x and d_y: third, fourth, second.
 const POWERS: [(usize, usize); 12] =
     [(3, 0), (2, 1), (1, 2), (0, 3), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4), (2, 0), (1, 1), (0, 2)];
-/// Which component of the jet each of them is taken from, and the axis (0: x, 1: y) of the difference, first for third and second for fourth derivatives.
+/// Which component of the jet each of them is taken from, and the axis (0: x, 1: y) of the difference, first
+/// for third and second for fourth derivatives.
 pub(super) const DIFFERENCED: [(usize, usize); 12] =
     [(3, 0), (3, 1), (5, 0), (5, 1), (3, 0), (4, 0), (3, 1), (4, 1), (5, 1), (3, 0), (4, 0), (5, 0)];
 /// The derivative (2, 2), the mean of the two ways to take it: neither axis comes first.
@@ -97,8 +101,8 @@ fn moment(stencil: &JetStencil, j: usize, (a, b): (usize, usize)) -> f64 {
     sum / (factorial(a) * factorial(b))
 }
 
-/// What stencil k makes of `x_j d_i` of the image, for unknown a = the derivative along j of the flow's component i (or that component itself):
-/// the coefficient of the derivative of these powers.
+/// What stencil k makes of `x_j d_i` of the image, for unknown a = the derivative along j of the flow's
+/// component i (or that component itself): the coefficient of the derivative of these powers.
 fn carried(stencil: &JetStencil, k: usize, a: usize, (mut x, mut y): (usize, usize)) -> f64 {
     let power = if a.is_multiple_of(2) { &mut x } else { &mut y };
     if *power == 0 {
@@ -112,8 +116,9 @@ fn carried(stencil: &JetStencil, k: usize, a: usize, (mut x, mut y): (usize, usi
     }
 }
 
-/// Adds what smoothing of this variance does: the smoothed image moves like the image only where nothing is strained. For an affine flow
-/// `G * (u . grad I) = u . grad (G * I) + s^2 (u_x d_x^2 + (v_x + u_y) d_x d_y + v_y d_y^2) (G * I)`, and so on for its derivatives.
+/// Adds what smoothing of this variance does: the smoothed image moves like the image only where nothing is
+/// strained. For an affine flow `G * (u . grad I) = u . grad (G * I) + s^2 (u_x d_x^2 + (v_x + u_y) d_x d_y +
+/// v_y d_y^2) (G * I)`, and so on for its derivatives.
 fn smoothed(variance: f64, rows: &mut [[[f64; DERIVATIVES]; 6]; 6]) {
     for (k, row) in rows.iter_mut().enumerate() {
         let first = [9, 0, 1, 4, 5, 6][k];
@@ -179,7 +184,8 @@ mod tests {
             + 0.4 * y * y * y
     }
 
-    /// The largest difference between the residual that motion m leaves in rows 1-6 and what is expected of it, and the largest residual.
+    /// The largest difference between the residual that motion m leaves in rows 1-6 and what is expected of
+    /// it, and the largest residual.
     fn compare(m: [f64; 6], scheme: TimeScheme, neighbourhood: &Neighbourhood, smooth: Option<f64>) -> (f64, f64) {
         let stencil = JetStencil::new(neighbourhood, (1.0, 1.0)).unwrap();
         let combination = Combination::Triple(scheme);
@@ -240,7 +246,8 @@ mod tests {
                 let (off, size) = compare(m, TimeScheme::Central, neighbourhood, smooth);
                 assert!(off < 2e-3 * size, "{smooth:?} {off} {size}");
             }
-            // Backward differences err in their second order, whose own Jacobian terms are left out beyond row 1.
+            // Backward differences err in their second order, whose own Jacobian terms are left out beyond
+            // row 1.
             let (off, size) = compare([0.03, -0.02, 0.0, 0.0, 0.0, 0.0], TimeScheme::Backward, neighbourhood, None);
             assert!(off < 1e-2 * size, "backward {off} {size}");
         }

@@ -1,9 +1,12 @@
-//! The misfit of a tile: what truncation, and flow that is not affine, leave in the equations of each pixel, ready to be summed over windows.
+//! The misfit of a tile: what truncation, and flow that is not affine, leave in the equations of each pixel,
+//! ready to be summed over windows.
 //!
-//! The window's one affine motion `T_p m` is not the motion at its pixel p. By how much that draws the estimate aside can be seen from the estimates themselves: with the
-//! motion found at p in place of the one that is sought, `N^-1 sum w T^T P^T P m(p)` is what the window makes of the whole field, and its difference to m is to leading order the
-//! bias. The rows of second derivatives see the curvature of the flow directly, `d_x^2 (u i_x + v i_y)` contains `u_xx i_x + v_xx i_y`, and
-//! smoothing by s px adds `s^2 / 2` times its Laplacian.
+//! The window's one affine motion `T_p m` is not the motion at its pixel p. By how much that draws the
+//! estimate aside can be seen from the estimates themselves: with the motion found at p in place of the one
+//! that is sought, `N^-1 sum w T^T P^T P m(p)` is what the window makes of the whole field, and its
+//! difference to m is to leading order the bias. The rows of second derivatives see the curvature of the flow
+//! directly, `d_x^2 (u i_x + v i_y)` contains `u_xx i_x + v_xx i_y`, and smoothing by s px adds `s^2 / 2`
+//! times its Laplacian.
 
 use super::estimate::Strip;
 use super::misfit::{DERIVATIVES, DIFFERENCED, MIXED, Truncation, residual};
@@ -15,7 +18,8 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 pub(super) const PLANES: usize = 13;
 /// Moments of one score, `sum w T^T` of six such planes.
 pub(super) const SCORE: usize = 10;
-/// Highest power of an offset for plane p, and where its moments begin: three each of a score's first two planes, one each of the others.
+/// Highest power of an offset for plane p, and where its moments begin: three each of a score's first two
+/// planes, one each of the others.
 pub(super) const fn place(p: usize) -> (usize, usize) {
     match (p / 6, p % 6) {
         (score @ 0..2, k @ 0..2) => (1, score * SCORE + 3 * k),
@@ -24,7 +28,8 @@ pub(super) const fn place(p: usize) -> (usize, usize) {
     }
 }
 
-/// Rows of the ring for one row of pixels: the coefficients' jet, that of the first difference, the usable pixels, and the motion.
+/// Rows of the ring for one row of pixels: the coefficients' jet, that of the first difference, the usable
+/// pixels, and the motion.
 const SLOT: usize = 19;
 /// Where the usable pixels and the motion stand among them.
 const USABLE: usize = 12;
@@ -41,7 +46,8 @@ impl<T: SimdReal> Ring<T> {
         Self { rows: Vec::new() }
     }
 
-    /// Fills the first [`PLANES`] of `planes`, whose corner lies at pixel `corner`, for `rows` equations a pixel.
+    /// Fills the first [`PLANES`] of `planes`, whose corner lies at pixel `corner`, for `rows` equations a
+    /// pixel.
     pub fn fill(
         &mut self,
         (level, rows): (Level, usize),
@@ -141,7 +147,8 @@ impl<V: Lanes> Bent<V> {
         Self { motion, second, strain }
     }
 
-    /// `P m` and the share of the curvature in row k, of these columns, jet and third derivatives of the image.
+    /// `P m` and the share of the curvature in row k, of these columns, jet and third derivatives of the
+    /// image.
     #[inline(always)]
     fn rate(&self, p: &[[V; 6]; 6], jet: &[V; 6], third: &[V], k: usize) -> V {
         let mut rate = V::zero();

@@ -1,7 +1,8 @@
 //! How white pixel noise enters the equations.
 //!
-//! With `P(i) = -J(i)` a pixel's residual is `i' + P(i) m`, and below it `i'' + P(i') m`. Noise of the pixels enters through the right-hand side and, times m, through the
-//! coefficients. `P(i) m` is linear in the jet i and linear in m; both views are needed.
+//! With `P(i) = -J(i)` a pixel's residual is `i' + P(i) m`, and below it `i'' + P(i') m`. Noise of the pixels
+//! enters through the right-hand side and, times m, through the coefficients. `P(i) m` is linear in the jet i
+//! and linear in m; both views are needed.
 
 use super::combine::Combination;
 use super::misfit::{DERIVATIVES, Truncation};
@@ -51,7 +52,8 @@ pub(super) fn pulled_back<V: Lanes>(c: &[V; 6], m: &[V; 6]) -> [V; 6] {
     ]
 }
 
-/// Second moments of the noise in one pixel's equations, per unit variance of the pixels, in the scaled unknowns.
+/// Second moments of the noise in one pixel's equations, per unit variance of the pixels, in the scaled
+/// unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct PixelNoise {
     /// Variance of the right-hand sides, summed over the rows.
@@ -60,9 +62,11 @@ pub(super) struct PixelNoise {
     pub linear: [f64; 6],
     /// `E[dP^T dP]`, upper triangle.
     pub quadratic: [f64; ENTRIES],
-    /// `E[dP^T dP - dP^T dr]`, r being the residual that [`Truncation`] reads from the image, per unit of the motion: noise passes for texture there.
+    /// `E[dP^T dP - dP^T dr]`, r being the residual that [`Truncation`] reads from the image, per unit of the
+    /// motion: noise passes for texture there.
     pub pull: [[f64; 6]; 6],
-    /// `mixing[q]`: amounts of the three ways in which noise enters (through i, i', i'') in the q-th of as many independent noises.
+    /// `mixing[q]`: amounts of the three ways in which noise enters (through i, i', i'') in the q-th of as
+    /// many independent noises.
     pub mixing: Vec<[f64; 3]>,
 }
 
@@ -159,12 +163,14 @@ fn independent(ways: usize, gram: &dyn Fn(usize, usize) -> f64) -> Vec<[f64; 3]>
     (0..ways).map(|q| [lower[0][q], lower[1][q], lower[2][q]]).filter(|c| c.iter().any(|v| *v != 0.0)).collect()
 }
 
-/// Weights at distance 0, 1, ... of the Gaussian that smooths frames: cut at 4 sigma like [`crate::image::GaussianSmoother`].
+/// Weights at distance 0, 1, ... of the Gaussian that smooths frames: cut at 4 sigma like
+/// [`crate::image::GaussianSmoother`].
 pub(super) fn smoothing_weights(sigma: f64) -> Vec<f64> {
     weights(sigma, (4.0 * sigma + 0.5) as usize)
 }
 
-/// Correlation, along one axis, of white noise of variance 1 smoothed by `smooth` px: at lag 0 its variance's root.
+/// Correlation, along one axis, of white noise of variance 1 smoothed by `smooth` px: at lag 0 its variance's
+/// root.
 pub(super) fn shared(smooth: Option<f64>) -> impl Fn(i32) -> f64 {
     let half = smooth.map_or_else(|| vec![1.0], smoothing_weights);
     let r = half.len() as i32 - 1;

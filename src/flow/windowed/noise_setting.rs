@@ -7,7 +7,7 @@ use super::noise::{PixelNoise, smoothing_weights};
 use super::options::WindowedOptions;
 use super::rows::Plan;
 use super::window::Window;
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::jet::JetStencil;
 use crate::simd::{Level, SimdReal};
 
@@ -31,7 +31,8 @@ pub(super) struct NoiseSetting<T> {
     pub rows: usize,
     /// Variance of the pixel noise; `None`: from the frames.
     pub variance: Option<f64>,
-    /// Least variance that is believed of the frames: that of rounding to whole grey levels, where they hold nothing else.
+    /// Least variance that is believed of the frames: that of rounding to whole grey levels, where they hold
+    /// nothing else.
     pub least_variance: f64,
     /// What truncation leaves.
     pub truncation: Truncation,
@@ -44,10 +45,11 @@ pub(super) struct NoiseSetting<T> {
 }
 
 impl<T: SimdReal> NoiseSetting<T> {
-    /// For these options and their stencil, frames that hold whole numbers or not, and the window of the estimates.
+    /// For these options and their stencil, frames that hold whole numbers or not, and the window of the
+    /// estimates.
     pub fn new(
         (options, stencil): (&WindowedOptions, &JetStencil),
-        (common, rounded): (&Common, bool),
+        (common, rounded): (&EstimatorOptions, bool),
         window: Window<T>,
         frames: usize,
     ) -> Self {
@@ -85,7 +87,8 @@ impl<T: SimdReal> NoiseSetting<T> {
         pairs.map(|(&(x, y), w)| ((x as isize, y as isize), w.map(T::from_f64))).collect()
     }
 
-    /// Unknowns that have a column of their own in the equations; with row 1 alone the others act by transport only.
+    /// Unknowns that have a column of their own in the equations; with row 1 alone the others act by
+    /// transport only.
     pub fn unknowns(&self) -> usize {
         if self.rows == 1 { 2 } else { 6 }
     }

@@ -7,7 +7,8 @@ use crate::jet::{Neighbourhood, TimeScheme};
 /// Which of the twelve equations (31)/(34) of WO2010/098160 a window sums. All rows weigh the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum RowSet {
-    /// Row 1: brightness constancy alone. The cheapest; biased by the stencils' different smoothing on fine texture.
+    /// Row 1: brightness constancy alone. The cheapest; biased by the stencils' different smoothing on fine
+    /// texture.
     Brightness,
     /// Rows 1-3: brightness and gradient constancy.
     Gradient,
@@ -66,25 +67,29 @@ pub struct WindowedOptions {
     pub sigma: f64,
     /// Where the window ends, in standard deviations. Default 3.
     pub truncate: f64,
-    /// Which equations are summed. Default [`RowSet::All`]: with the smoothing below it has the least error on textures, particles and speckle alike
-    /// (`docs/performance.md`, "Which rows, how much smoothing").
+    /// Which equations are summed. Default [`RowSet::All`]: with the smoothing below it has the least error
+    /// on textures, particles and speckle alike (`docs/performance.md`, "Which rows, how much smoothing").
     pub rows: RowSet,
-    /// Frames of one estimate: 3 (default), or 2 for a pair, which [`RowSet::All`] does not allow. A pair's flow belongs to the moment between its frames.
+    /// Frames of one estimate: 3 (default), or 2 for a pair, which [`RowSet::All`] does not allow. A pair's
+    /// flow belongs to the moment between its frames.
     pub frames: usize,
-    /// How time derivatives are taken from three frames. Default central. A pair always takes the difference, and its mean as coefficients.
+    /// How time derivatives are taken from three frames. Default central. A pair always takes the difference,
+    /// and its mean as coefficients.
     pub scheme: TimeScheme,
     /// Pixels that each jet is fitted to. Default 3x3.
     pub neighbourhood: Neighbourhood,
-    /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance knows of it. Default 1.5: a 3x3 fit of a
-    /// texture as fine as the pixels is no derivative, and halves the flow of sharp particles.
-    /// Frames smoothed beforehand should be declared by [`WindowedOptions::already_smoothed`] instead.
+    /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance
+    /// knows of it. Default 1.5: a 3x3 fit of a texture as fine as the pixels is no derivative, and halves
+    /// the flow of sharp particles. Frames smoothed beforehand should be declared by
+    /// [`WindowedOptions::already_smoothed`] instead.
     pub presmooth: Option<f64>,
-    /// The frames come already smoothed by a Gaussian of this standard deviation, px: nothing is smoothed, but the covariance
-    /// takes their noise for correlated accordingly. Default `None`.
+    /// The frames come already smoothed by a Gaussian of this standard deviation, px: nothing is smoothed,
+    /// but the covariance takes their noise for correlated accordingly. Default `None`.
     pub already_smoothed: Option<f64>,
     /// What to report where the window does not determine every unknown. Default: NaN.
     pub rank_deficient: RankPolicy,
-    /// An unknown counts as undetermined when less than this share of its (squared) column is independent of the other columns. Default 1e-5.
+    /// An unknown counts as undetermined when less than this share of its (squared) column is independent of
+    /// the other columns. Default 1e-5.
     pub rank_tolerance: f64,
     /// Least share of the window's weight that usable pixels must hold. Default 0.1.
     pub min_weight: f64,

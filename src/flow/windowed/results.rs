@@ -4,7 +4,7 @@ use super::estimate::Strip;
 use super::run::Job;
 use crate::flow::site::FieldBand;
 use crate::simd::SimdReal;
-use crate::types::{Sites, Status};
+use crate::types::{SamplingGrid, Status};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -23,16 +23,16 @@ pub(super) struct Covariance<T> {
 
 impl<T: SimdReal> Results<T> {
     /// Copies the sites that lie in the strip to their bands.
-    pub(super) fn write(&self, job: &Job<'_, T>, sites: &Sites, bands: &mut [FieldBand<'_, T>]) {
+    pub(super) fn write(&self, job: &Job<'_, T>, sites: &SamplingGrid, bands: &mut [FieldBand<'_, T>]) {
         bands.par_iter_mut().for_each(|band| match sites {
-            Sites::Grid { region, stride } => {
+            SamplingGrid::Grid { region, stride } => {
                 let width = region.map_or(job.whole.0, |r| r.width).div_ceil(*stride);
                 for row in band.sites.start / width..band.sites.end / width {
                     let run = Run { at: sites.pixel(0, row), step: *stride, count: width };
                     self.write_run(job, &run, row * width - band.sites.start, band);
                 }
             }
-            Sites::Points(points) => {
+            SamplingGrid::Points(points) => {
                 for index in band.sites.clone() {
                     let run = Run { at: points[index], step: 1, count: 1 };
                     self.write_run(job, &run, index - band.sites.start, band);

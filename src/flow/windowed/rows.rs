@@ -1,13 +1,16 @@
 //! The products that a window sums: the normal matrix and right-hand side of each pixel's own equations.
 //!
-//! With `A` the pixel's rows of `[J(i); J(i')]` and `b` those of `[i'; i'']`, the planes are the different entries of `A^T A`, the entries of `A^T b` and `b^T b`.
-//! Unknowns are scaled to `(u, v, s u_x, s v_x, s u_y, s v_y)`, s the window's sigma, so that all columns are of one order.
+//! With `A` the pixel's rows of `[J(i); J(i')]` and `b` those of `[i'; i'']`, the planes are the different
+//! entries of `A^T A`, the entries of `A^T b` and `b^T b`. Unknowns are scaled to `(u, v, s u_x, s v_x, s
+//! u_y, s v_y)`, s the window's sigma, so that all columns are of one order.
 
 use crate::simd::Lanes;
 
-/// Columns of the equations, in the scaled unknowns: which plane holds which product, and which moments are needed of it.
+/// Columns of the equations, in the scaled unknowns: which plane holds which product, and which moments are
+/// needed of it.
 ///
-/// `u`, `v` are transported (multiplied by x and y), so their products need six moments, those with the Jacobian three, those within the Jacobian one.
+/// `u`, `v` are transported (multiplied by x and y), so their products need six moments, those with the
+/// Jacobian three, those within the Jacobian one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Distinct products of the flow's columns with the Jacobian's: 0, 6 or 8.
@@ -91,7 +94,8 @@ impl Plan {
         base
     }
 
-    /// Plane of the product of columns `i` of the flow (0, 1) and `j` of the Jacobian (2 .. 6); `None` where there is none.
+    /// Plane of the product of columns `i` of the flow (0, 1) and `j` of the Jacobian (2 .. 6); `None` where
+    /// there is none.
     #[inline(always)]
     pub const fn mixed(self, i: usize, j: usize) -> Option<usize> {
         const PLACE: [[usize; 4]; 2] = [[0, 1, 2, 3], [2, 3, 4, 5]];
@@ -133,7 +137,8 @@ pub(super) const fn moments(order: usize) -> usize {
     (order + 1) * (order + 2) / 2
 }
 
-/// The jets that the equations of one pixel are made of: of the coefficient frame, of the first and of the second time difference.
+/// The jets that the equations of one pixel are made of: of the coefficient frame, of the first and of the
+/// second time difference.
 #[derive(Clone, Copy)]
 pub(super) struct Jets<V> {
     pub coefficient: [V; 6],

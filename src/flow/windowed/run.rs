@@ -11,13 +11,13 @@ use super::support::Support;
 use super::tile::Source;
 use super::window::Window;
 use crate::error::Result;
-use crate::flow::options::Common;
+use crate::flow::options::EstimatorOptions;
 use crate::flow::site::bands;
 use crate::image::GaussianSmoother;
 use crate::jet::{JetRows, JetStencil};
 use crate::parallel::BAND_ROWS;
 use crate::simd::SimdReal;
-use crate::types::{FlowField, Frame, Rect, Sites};
+use crate::types::{FlowField, Frame, Rect, SamplingGrid};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -37,7 +37,7 @@ pub(in crate::flow) struct Windowed {
 
 impl Windowed {
     /// Checks the options.
-    pub fn new(options: &WindowedOptions, _common: &Common) -> Result<Self> {
+    pub fn new(options: &WindowedOptions, _common: &EstimatorOptions) -> Result<Self> {
         options.check()?;
         let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
         let smoother = options.presmooth.map(GaussianSmoother::new).transpose()?;
@@ -49,18 +49,24 @@ impl Windowed {
         self.options.frames
     }
 
-    /// Which of the frames the estimate belongs to. That of a pair lies between the two and is counted with the first.
+    /// Which of the frames the estimate belongs to. That of a pair lies between the two and is counted with
+    /// the first.
     pub fn frame(&self) -> usize {
         if self.options.frames == 2 { 0 } else { self.options.scheme.frame() }
     }
 
     /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
-    pub fn estimate_into<T: SimdReal>(&self, frames: &[&Frame<T>], common: &Common, field: &mut FlowField<T>) {
+    pub fn estimate_into<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        common: &EstimatorOptions,
+        field: &mut FlowField<T>,
+    ) {
         let sites = field.layout.sites.clone();
         let size = frames[0].size();
         let rounded = common.covariance && are_rounded(frames);
         common.threads.install(|| match &sites {
-            Sites::Grid { region, stride } => {
+            SamplingGrid::Grid { region, stride } => {
                 let whole = Rect { x: 0, y: 0, width: size.0, height: size.1 };
                 let job = Job::new(self, frames, (common, rounded), region.unwrap_or(whole));
                 let last = (field.width.saturating_sub(1)) * stride;
@@ -73,14 +79,14 @@ impl Windowed {
                     job.strip(rows, columns.clone()).write(&job, &sites, bands);
                 }
             }
-            Sites::Points(points) => self.points(frames, (common, rounded), points, field),
+            SamplingGrid::Points(points) => self.points(frames, (common, rounded), points, field),
         });
     }
 
     fn points<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
-        (common, rounded): (&Common, bool),
+        (common, rounded): (&EstimatorOptions, bool),
         points: &[(usize, usize)],
         field: &mut FlowField<T>,
     ) {
@@ -113,7 +119,7 @@ impl Windowed {
     }
 
     /// How far from a site samples have any influence, px.
-    fn margin(&self, common: &Common) -> usize {
+    fn margin(&self, common: &EstimatorOptions) -> usize {
         let reach = self.stencil.reach();
         let stencil = reach.left.max(reach.right).max(reach.up).max(reach.down);
         let smoothing = self.smoother.as_ref().map_or(0, GaussianSmoother::radius);
@@ -138,7 +144,12 @@ pub(super) struct Job<'a, T: Clone> {
 }
 
 impl<'a, T: SimdReal> Job<'a, T> {
-    fn new(owner: &'a Windowed, frames: &[&'a Frame<T>], (common, rounded): (&'a Common, bool), sites: Rect) -> Self {
+    fn new(
+        owner: &'a Windowed,
+        frames: &[&'a Frame<T>],
+        (common, rounded): (&'a EstimatorOptions, bool),
+        sites: Rect,
+    ) -> Self {
         let options = &owner.options;
         let whole = frames[0].size();
         let crop = crop(sites, whole, owner.margin(common));
@@ -206,7 +217,8 @@ impl<'a, T: SimdReal> Job<'a, T> {
     }
 }
 
-/// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them: rounding is then the least noise they can have.
+/// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them:
+/// rounding is then the least noise they can have.
 pub(in crate::flow) fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
     const STEPS: f64 = 8.0;
     let range = |frame: &&Frame<T>| {

@@ -11,7 +11,8 @@ use crate::simd::{Kernel, Lanes, SimdReal};
 const PULL_STEPS: usize = 3;
 /// Two estimates of the noise from one window may differ by so much by chance.
 const CHANCE: f64 = 1.5;
-/// What noise alone makes of the sum of squares of the six biases by curvature, each in units of its deviation: rarely more than this.
+/// What noise alone makes of the sum of squares of the six biases by curvature, each in units of its
+/// deviation: rarely more than this.
 const BEND_CHANCE: f64 = 6.0;
 /// That bias is known to leading order, and from estimates that share it: its square counts so many times.
 const BEND_WEIGHT: f64 = 2.0;
@@ -81,7 +82,8 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
     }
 }
 
-/// The variance of the noise, and of all that varies from pixel to pixel: `trace` is tr(N^-1 S), `at` reads rows of `Scratch::pixel`.
+/// The variance of the noise, and of all that varies from pixel to pixel: `trace` is tr(N^-1 S), `at` reads
+/// rows of `Scratch::pixel`.
 #[inline(always)]
 fn variances<T: SimdReal, V: Lanes<Scalar = T>>(
     setting: &NoiseSetting<T>,
@@ -137,7 +139,8 @@ fn one_pixel<V: Lanes>(noise: &PixelNoise, m: &[V; 6]) -> V {
     sum
 }
 
-/// Entry `(i, j)` of `sum_p w T^T Q T` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, for a symmetric Q.
+/// Entry `(i, j)` of `sum_p w T^T Q T` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, for a
+/// symmetric Q.
 #[inline(always)]
 pub(super) fn noise_entry<V: Lanes>(quadratic: &[f64; ENTRIES], ones: &[V; 6], (i, j): (usize, usize)) -> V {
     let q = |i: usize, j: usize| V::constant(quadratic[if i <= j { upper(i, j) } else { upper(j, i) }]);
@@ -162,7 +165,8 @@ fn transported_entry<V: Lanes>(q: &impl Fn(usize, usize) -> V, ones: &[V; 6], (i
     entry
 }
 
-/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, Q being [`PixelNoise::pull`]: minus the pull of unit noise on the score.
+/// `sum_p w T^T (l + Q T m)` from the moments 1, x, y, x^2, x y, y^2 of the usable pixels, Q being
+/// [`PixelNoise::pull`]: minus the pull of unit noise on the score.
 #[inline(always)]
 fn pull<V: Lanes>(noise: &PixelNoise, ones: &[V; 6], m: &[V; 6]) -> [V; 6] {
     let q = |i: usize, j: usize| V::constant(noise.pull[i][j]);

@@ -29,10 +29,12 @@ impl<T: SimdReal> MomentRow<'_, T> {
     }
 }
 
-/// Moment of the power x^a y^b that a product of columns of blocks `k` and `l` needs (0: flow, 1: d/dx, 2: d/dy).
+/// Moment of the power x^a y^b that a product of columns of blocks `k` and `l` needs (0: flow, 1: d/dx, 2:
+/// d/dy).
 const POWER: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
-/// The upper triangle of `sum w T^T A^T A T`: with `u = u0 + x u_x + y u_y` column `u_x` of `A T` is `x A_u + A_{u_x}`, and so on.
+/// The upper triangle of `sum w T^T A^T A T`: with `u = u0 + x u_x + y u_y` column `u_x` of `A T` is `x A_u +
+/// A_{u_x}`, and so on.
 #[inline(always)]
 pub(super) fn normal_matrix<V: Lanes<Scalar = T>, T: SimdReal>(
     plan: Plan,
@@ -88,14 +90,15 @@ pub(crate) struct Factor<V> {
     lower: [V; ENTRIES],
     inverse_pivot: [V; 6],
     scale: [V; 6],
-    /// The smallest of: the pivots of the scaled matrix (what of a column, squared, is independent of those before it), and the
-    /// columns' squares in relation to the largest.
+    /// The smallest of: the pivots of the scaled matrix (what of a column, squared, is independent of those
+    /// before it), and the columns' squares in relation to the largest.
     pub quality: V,
     /// The largest diagonal entry.
     pub largest: V,
 }
 
-/// Factors the normal matrix. Where it is singular the quality says so and the rest is meaningless (but harmless).
+/// Factors the normal matrix. Where it is singular the quality says so and the rest is meaningless (but
+/// harmless).
 #[inline(always)]
 pub(crate) fn factor<V: Lanes>(n: &[V; ENTRIES]) -> Factor<V> {
     let one = V::constant(1.0);
@@ -189,7 +192,8 @@ pub(super) struct Deficient {
     pub condition: f64,
 }
 
-/// Rank, least-norm solution and condition number of normal equations; `tolerance` is the least eigenvalue ratio that counts.
+/// Rank, least-norm solution and condition number of normal equations; `tolerance` is the least eigenvalue
+/// ratio that counts.
 pub(super) fn decompose<T: Real>(n: &[T; ENTRIES], right: &[T; 6], tolerance: f64, floor: f64) -> Deficient {
     let entry = |i: usize, j: usize| n[if i <= j { upper(i, j) } else { upper(j, i) }].to_f64();
     let matrix = Matrix6::from_fn(entry);

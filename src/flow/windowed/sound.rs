@@ -1,4 +1,5 @@
-//! What a covariance must be: finite, symmetric, positive definite. In single precision, products of an almost singular matrix are not.
+//! What a covariance must be: finite, symmetric, positive definite. In single precision, products of an
+//! almost singular matrix are not.
 
 use super::covariance::PIXEL_RESULT;
 use super::solve::{ENTRIES, upper};

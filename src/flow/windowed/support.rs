@@ -6,8 +6,8 @@ use crate::types::{Frame, Mask, Status};
 
 /// Usable pixels of a set of frames.
 ///
-/// A pixel is usable when its jet's neighbourhood lies in the frame and depends on no sample that is masked out or not finite; smoothing
-/// widens the dependence by its radius.
+/// A pixel is usable when its jet's neighbourhood lies in the frame and depends on no sample that is masked
+/// out or not finite; smoothing widens the dependence by its radius.
 #[derive(Debug)]
 pub(super) struct Support {
     size: (usize, usize),
@@ -81,7 +81,8 @@ impl Support {
         self.reach.inside(self.size)
     }
 
-    /// Writes 1 for usable and 0 for other pixels of row `y` from column `first` on; both may lie outside the frame.
+    /// Writes 1 for usable and 0 for other pixels of row `y` from column `first` on; both may lie outside the
+    /// frame.
     pub fn weights<T: Real>(&self, first: isize, y: isize, out: &mut [T]) {
         out.fill(T::default());
         let (columns, rows) = self.inside();

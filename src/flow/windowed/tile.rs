@@ -10,7 +10,8 @@ use crate::types::Frame;
 
 /// Columns of a tile.
 pub(super) const TILE_COLUMNS: usize = 128;
-/// Rows whose moments are held at a time: while they are summed, the products they share stay in the nearest cache.
+/// Rows whose moments are held at a time: while they are summed, the products they share stay in the nearest
+/// cache.
 pub(super) const GROUP_ROWS: usize = 8;
 
 /// The images and how to take their jets.
@@ -64,7 +65,8 @@ impl<T: SimdReal> JetTile<T> {
         }
     }
 
-    /// Prepares jets of `height` rows of `width` pixels (a multiple of [`CHUNK`]) from pixel `corner` on, which may lie outside the frame.
+    /// Prepares jets of `height` rows of `width` pixels (a multiple of [`CHUNK`]) from pixel `corner` on,
+    /// which may lie outside the frame.
     #[inline(always)]
     pub fn load(&mut self, source: &Source<'_, T>, corner: (isize, isize), width: usize, height: usize) {
         let Reach { left, right, up, down } = source.reach;
@@ -143,7 +145,8 @@ impl<T: SimdReal> Planes<T> {
         (p * self.height + r) * self.width + c
     }
 
-    /// Fills the product planes of `rows` equations (1, 3, 6 or 12) a pixel from the jets, and after them the plane of weights where `weights` says so.
+    /// Fills the product planes of `rows` equations (1, 3, 6 or 12) a pixel from the jets, and after them the
+    /// plane of weights where `weights` says so.
     pub fn fill(
         &mut self,
         (level, rows): (Level, usize),
@@ -170,7 +173,8 @@ impl<T: SimdReal> Planes<T> {
     }
 }
 
-// Each step is a kernel of its own, and what does not depend on the equations is not compiled again for each set of them.
+// Each step is a kernel of its own, and what does not depend on the equations is not compiled again for each
+// set of them.
 
 /// Jets of one row.
 struct JetRow<'a, T> {
@@ -218,7 +222,8 @@ impl<T: SimdReal, const ROWS: usize> Kernel<T> for Products<'_, T, ROWS> {
     }
 }
 
-/// Moments of a group of rows: moment `k` of row `j` is `data[(k * GROUP_ROWS + j) * TILE_COLUMNS ..][.. TILE_COLUMNS]`.
+/// Moments of a group of rows: moment `k` of row `j` is `data[(k * GROUP_ROWS + j) * TILE_COLUMNS ..][..
+/// TILE_COLUMNS]`.
 pub(super) struct Moments<T> {
     pub data: Vec<T>,
     column_sums: [Vec<T>; 3],
@@ -229,8 +234,8 @@ impl<T: SimdReal> Moments<T> {
         Self { data: Vec::new(), column_sums: [const { Vec::new() }; 3] }
     }
 
-    /// Sums plane `p` of `planes`, up to the power `order`, into the moments from `base` on, around rows `centres` (at most [`GROUP_ROWS`]) of the planes and
-    /// columns `radius ..`.
+    /// Sums plane `p` of `planes`, up to the power `order`, into the moments from `base` on, around rows
+    /// `centres` (at most [`GROUP_ROWS`]) of the planes and columns `radius ..`.
     pub fn sum(
         &mut self,
         level: Level,

@@ -1,11 +1,13 @@
 //! Gaussian-weighted moments of planes: separable sums with `g`, `x g` and `x^2 g`.
 //!
-//! The normal equations of a window need sums of products weighted by `w`, `w x`, `w y`, `w x^2`, `w x y` and `w y^2`, with
-//! `w = g(x) g(y)`: three one-dimensional filters down the columns, and along the rows those of each result that are still needed.
+//! The normal equations of a window need sums of products weighted by `w`, `w x`, `w y`, `w x^2`, `w x y` and
+//! `w y^2`, with `w = g(x) g(y)`: three one-dimensional filters down the columns, and along the rows those of
+//! each result that are still needed.
 
 use crate::simd::{Lanes, SimdReal};
 
-/// Filters of one axis: `taps[k] = [g, g k/s, g (k/s)^2]` for the distances k = 0 ..= radius, s the unit of length.
+/// Filters of one axis: `taps[k] = [g, g k/s, g (k/s)^2]` for the distances k = 0 ..= radius, s the unit of
+/// length.
 #[derive(Debug, Clone)]
 pub(super) struct Window<T> {
     pub taps: Vec<[T; 3]>,
@@ -17,11 +19,12 @@ impl<T: SimdReal> Window<T> {
         Self { taps: cast(&weights(sigma, radius), sigma) }
     }
 
-    /// Squares of the weights with which a window of `sigma` px sees the noise of samples that were smoothed by a Gaussian of `smooth` px, cut where they are
-    /// as small as the Gaussian at `radius`.
+    /// Squares of the weights with which a window of `sigma` px sees the noise of samples that were smoothed
+    /// by a Gaussian of `smooth` px, cut where they are as small as the Gaussian at `radius`.
     ///
-    /// `g_sigma(p) g_smooth(q - p)` is `g(q)`, wider by the smoothing, times a kernel about `p = a q`, `a = sigma^2 / (sigma^2 + smooth^2)`; the weights
-    /// are those at p, their squares summed over q. Lengths are in units of `sigma`.
+    /// `g_sigma(p) g_smooth(q - p)` is `g(q)`, wider by the smoothing, times a kernel about `p = a q`, `a =
+    /// sigma^2 / (sigma^2 + smooth^2)`; the weights are those at p, their squares summed over q. Lengths are
+    /// in units of `sigma`.
     pub fn squared(sigma: f64, radius: usize, smooth: f64) -> Self {
         let narrow = sigma * sigma / sigma.hypot(smooth);
         let share = (narrow / sigma).powi(2);
@@ -76,7 +79,8 @@ fn cast<T: SimdReal>(half: &[f64], unit: f64) -> Vec<[T; 3]> {
 /// Row lengths are multiples of this many samples, so that no loop below has a tail.
 pub(super) const CHUNK: usize = 32;
 
-/// Filters `len` samples (a multiple of [`CHUNK`]) of `source` from `centre` on with the first `N` filters of `taps`, neighbours being `stride` apart.
+/// Filters `len` samples (a multiple of [`CHUNK`]) of `source` from `centre` on with the first `N` filters of
+/// `taps`, neighbours being `stride` apart.
 #[inline(always)]
 pub(in crate::flow) fn filter<V: Lanes, const N: usize>(
     source: &[V::Scalar],

@@ -43,7 +43,8 @@ pub struct ChartArc {
     pub width: f64,
 }
 
-/// Draws nodes, as large as their sizes beside the mean, and the arcs between them; numbers of lanes on the left, of steps below, and of each node's own number above the first that has it.
+/// Draws nodes, as large as their sizes beside the mean, and the arcs between them; numbers of lanes on the
+/// left, of steps below, and of each node's own number above the first that has it.
 ///
 /// Arcs that name no node are left out.
 pub fn chart_picture(nodes: &[ChartNode], arcs: &[ChartArc]) -> Picture {

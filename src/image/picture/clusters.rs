@@ -3,7 +3,8 @@
 use super::digits::draw_number;
 use super::{Arrow, Picture, Quiver, Rgb};
 
-/// Hues of numbers that follow each other are this share of the wheel apart (the golden section): none of many is near another.
+/// Hues of numbers that follow each other are this share of the wheel apart (the golden section): none of
+/// many is near another.
 const APART: f64 = 0.618_033_988_749_895;
 
 /// The colour that a number always has, neither dark nor pale.
@@ -27,8 +28,9 @@ pub struct ClusterMark {
     pub motion: [f64; 2],
 }
 
-/// The picture of a view, darkened, with pixels `(x, y)` in the colour of the number that each has, enlarged `factor` times; then every mark's number and, as an arrow that ends at the
-/// middle, the motion that led there. Pixels beyond the picture are left out.
+/// The picture of a view, darkened, with pixels `(x, y)` in the colour of the number that each has, enlarged
+/// `factor` times; then every mark's number and, as an arrow that ends at the middle, the motion that led
+/// there. Pixels beyond the picture are left out.
 pub fn cluster_picture(
     view: &Picture,
     pixels: impl Iterator<Item = ([u32; 2], u64)>,

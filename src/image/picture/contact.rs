@@ -1,4 +1,5 @@
-//! What comes near, over a frame: points in the colours of their rates of approach, and the focus of expansion.
+//! What comes near, over a frame: points in the colours of their rates of approach, and the focus of
+//! expansion.
 
 use super::diverging::{SignedMap, symmetric_range};
 use super::{Picture, Rgb};
@@ -26,7 +27,8 @@ const STROKES: usize = 720;
 /// Largest half axis of an ellipse that is drawn, px.
 const LARGEST: f64 = 4000.0;
 
-/// Draws squares of half size `half` px, red where a point comes nearer and blue where it recedes, and the focus of expansion as a cross with its 95 % ellipse from `(place, covariance)`.
+/// Draws squares of half size `half` px, red where a point comes nearer and blue where it recedes, and the
+/// focus of expansion as a cross with its 95 % ellipse from `(place, covariance)`.
 pub fn draw_contacts(
     picture: &mut Picture,
     marks: &[ContactMark],
@@ -56,7 +58,8 @@ fn draw_focus(picture: &mut Picture, at: [f64; 2], covariance: &[[f64; 2]; 2]) {
         picture.blend(cx + d, cy, FOCUS, 1.0);
         picture.blend(cx, cy + d, FOCUS, 1.0);
     }
-    // The lower factor of the covariance turns a circle into the ellipse; 5.99 is chi-squared's 95 % for two numbers.
+    // The lower factor of the covariance turns a circle into the ellipse; 5.99 is chi-squared's 95 % for two
+    // numbers.
     let first = covariance[0][0].sqrt();
     let second = covariance[0][1] / first;
     let third = (covariance[1][1] - second * second).max(0.0).sqrt();

@@ -3,7 +3,8 @@
 use super::{Picture, Rgb};
 use crate::types::Frame;
 
-/// Draws every pixel that has a disparity over the darkened picture of its view: blue at the lower end of `range` (far), over green and yellow to red at the upper (near).
+/// Draws every pixel that has a disparity over the darkened picture of its view: blue at the lower end of
+/// `range` (far), over green and yellow to red at the upper (near).
 ///
 /// Pixels of the map beyond the picture are left out. What lies outside the range has the colour of its end.
 pub fn draw_disparity(picture: &mut Picture, disparity: &Frame<f32>, (far, near): (f64, f64)) {

@@ -7,7 +7,8 @@ use crate::math::Real;
 /// Colours at -1, -1/2, 0, 1/2, 1 of the range; straight lines between them.
 const STOPS: [Rgb; 5] = [[22, 56, 132], [102, 158, 214], [247, 247, 247], [228, 134, 96], [140, 20, 34]];
 
-/// The symmetric range of a plane: the `percentile` of its finite absolute values, so that a few outliers do not wash out the rest; 1 where all of it is zero or unknown.
+/// The symmetric range of a plane: the `percentile` of its finite absolute values, so that a few outliers do
+/// not wash out the rest; 1 where all of it is zero or unknown.
 pub fn symmetric_range<T: Real>(plane: &[T], at_percentile: f64) -> f64 {
     let range = percentile(plane.iter().map(|v| v.to_f64().abs()), at_percentile);
     if range > 0.0 { range } else { 1.0 }
@@ -17,7 +18,8 @@ pub fn symmetric_range<T: Real>(plane: &[T], at_percentile: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct SignedMap {
-    /// Value of the strongest red (and, negative, of the strongest blue); `None` (the default): [`symmetric_range`].
+    /// Value of the strongest red (and, negative, of the strongest blue); `None` (the default):
+    /// [`symmetric_range`].
     pub range: Option<f64>,
     /// Percentile of the automatic range; default 98.
     pub percentile: f64,

@@ -11,8 +11,9 @@ pub struct GreyRange {
 }
 
 impl GreyRange {
-    /// The range of a frame: for eight-bit samples all there is, for other types from their 0.5th to their 99.5th percentile, since sensors of 10 to 14 bit and float
-    /// pictures say nothing of their full scale. The range of the first frame of a sequence serves for all of it, so that brightness can be compared.
+    /// The range of a frame: for eight-bit samples all there is, for other types from their 0.5th to their
+    /// 99.5th percentile, since sensors of 10 to 14 bit and float pictures say nothing of their full scale.
+    /// The range of the first frame of a sequence serves for all of it, so that brightness can be compared.
     pub fn of(frame: &AnyFrame) -> Self {
         if matches!(frame, AnyFrame::U8(_)) {
             return Self { low: 0.0, gain: 1.0 };

@@ -1,6 +1,8 @@
-//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey, tracks, clusters and disparities over them, graphs over time.
+//! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey,
+//! tracks, clusters and disparities over them, graphs over time.
 //!
-//! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes it as PNG.
+//! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes
+//! it as PNG.
 
 mod chart;
 mod clusters;
@@ -72,7 +74,8 @@ impl Picture {
         [self.data[at], self.data[at + 1], self.data[at + 2]]
     }
 
-    /// Mixes `colour` into the pixel at column `x`, row `y`: `coverage` 0 leaves it, 1 replaces it. Outside the picture nothing happens.
+    /// Mixes `colour` into the pixel at column `x`, row `y`: `coverage` 0 leaves it, 1 replaces it. Outside
+    /// the picture nothing happens.
     pub fn blend(&mut self, x: isize, y: isize, colour: Rgb, coverage: f64) {
         if x < 0 || y < 0 || x as usize >= self.width || y as usize >= self.height {
             return;

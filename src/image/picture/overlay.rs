@@ -6,7 +6,8 @@ use super::line::draw_stroke;
 use super::{Picture, Rgb};
 use crate::types::{TrackState, TrackStatus};
 
-/// Squared radius of the ellipse that holds 95 % of a two-dimensional Gaussian: the 0.95 quantile of chi-squared with two degrees of freedom, -2 ln 0.05.
+/// Squared radius of the ellipse that holds 95 % of a two-dimensional Gaussian: the 0.95 quantile of
+/// chi-squared with two degrees of freedom, -2 ln 0.05.
 const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
 
 /// Strokes that an ellipse is drawn of.
@@ -21,8 +22,8 @@ const LONGEST: f64 = 1e5;
 /// Colour of the window about the line of sight.
 const WINDOW: Rgb = [235, 235, 235];
 
-/// Colour of a target by how well it is in hand, told apart by people with any kind of colour vision: green tracking, orange occluded, blue coasting, grey out, red
-/// lost.
+/// Colour of a target by how well it is in hand, told apart by people with any kind of colour vision: green
+/// tracking, orange occluded, blue coasting, grey out, red lost.
 ///
 /// Source: M. Okabe, K. Ito, "Color Universal Design", 2008.
 pub fn status_colour(status: TrackStatus) -> Rgb {
@@ -41,7 +42,8 @@ pub enum TrackColours {
     /// How well it is in hand, as [`status_colour`].
     #[default]
     Status,
-    /// Which one it is, as [`identity_colour`]. The box is dashed where the target was not measured, and left out once it is out of the picture or lost.
+    /// Which one it is, as [`identity_colour`]. The box is dashed where the target was not measured, and left
+    /// out once it is out of the picture or lost.
     Target,
 }
 
@@ -67,9 +69,10 @@ impl Default for TrackOverlay {
 pub type PathPoint = ([f64; 2], TrackStatus);
 
 impl TrackOverlay {
-    /// Draws target number `target` over `picture`: its box, turned by its rotation where that is observable; the path that it came, in the colours of its status; its
-    /// centre as a cross, with the ellipse that holds the true centre with 95 % certainty if the covariance is right; the window about the line of sight, dashed; the
-    /// number at the box. What is not finite is left out.
+    /// Draws target number `target` over `picture`: its box, turned by its rotation where that is observable;
+    /// the path that it came, in the colours of its status; its centre as a cross, with the ellipse that
+    /// holds the true centre with 95 % certainty if the covariance is right; the window about the line of
+    /// sight, dashed; the number at the box. What is not finite is left out.
     pub fn draw(&self, picture: &mut Picture, target: usize, state: &TrackState, path: &[PathPoint]) {
         let by_target = self.colours == TrackColours::Target;
         let colour_of = |status| if by_target { identity_colour(target as u64) } else { status_colour(status) };
@@ -97,7 +100,8 @@ impl TrackOverlay {
         }
     }
 
-    /// A place in the frame on the enlarged picture: pixel `x` covers `factor` pixels from `factor x` on, so its centre lies half a factor further, less half a pixel.
+    /// A place in the frame on the enlarged picture: pixel `x` covers `factor` pixels from `factor x` on, so
+    /// its centre lies half a factor further, less half a pixel.
     fn on_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let factor = self.enlargement.max(1) as f64;
         [x, y].map(|c| (c + 0.5) * factor - 0.5)
@@ -150,7 +154,8 @@ impl TrackOverlay {
     }
 }
 
-/// Corners of the box about its centre, turned where the rotation can be told; none for a box that is not known.
+/// Corners of the box about its centre, turned where the rotation can be told; none for a box that is not
+/// known.
 fn box_corners(state: &TrackState) -> Vec<[f64; 2]> {
     let (bounds, [x, y]) = (state.bounds, state.bounds.centre());
     let angle = if state.rotation_observable && state.rotation.is_finite() { state.rotation } else { 0.0 };
@@ -162,7 +167,8 @@ fn box_corners(state: &TrackState) -> Vec<[f64; 2]> {
     [[-a, -b], [a, -b], [a, b], [-a, b]].map(|[dx, dy]| [x + cos * dx - sin * dy, y + sin * dx + cos * dy]).to_vec()
 }
 
-/// The ellipse of 95 % about the position; its axes are those of the picture, since errors along x and y are taken as independent. None where the variance is not known.
+/// The ellipse of 95 % about the position; its axes are those of the picture, since errors along x and y are
+/// taken as independent. None where the variance is not known.
 fn ellipse(state: &TrackState) -> Vec<[f64; 2]> {
     let radius = |axis: usize| (CHI_SQUARED_95 * state.covariance[axis][0][0]).sqrt();
     let (rx, ry, [x, y]) = (radius(0), radius(1), state.position);

@@ -22,8 +22,8 @@ pub struct Arrow {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Quiver {
-    /// Length of an arrow in frames of motion (2: twice as long as one frame's motion); `None` (the default): chosen so that the 98th percentile of
-    /// the speeds is `longest` px long.
+    /// Length of an arrow in frames of motion (2: twice as long as one frame's motion); `None` (the default):
+    /// chosen so that the 98th percentile of the speeds is `longest` px long.
     pub scale: Option<f64>,
     /// Length of the 98th percentile's arrow under the automatic scale, px; default 14.
     pub longest: f64,
@@ -53,7 +53,8 @@ impl Quiver {
         })
     }
 
-    /// Draws `arrows` over `picture`. Unknown (NaN or infinite) flow is left out; flow shorter than half a pixel on screen becomes a dot.
+    /// Draws `arrows` over `picture`. Unknown (NaN or infinite) flow is left out; flow shorter than half a
+    /// pixel on screen becomes a dot.
     pub fn draw(&self, picture: &mut Picture, arrows: &[Arrow]) {
         let scale = self.resolve_scale(arrows);
         for pass in [(self.thickness + 1.6, [20, 20, 20]), (self.thickness, self.colour)] {
@@ -83,8 +84,9 @@ fn draw_arrow(picture: &mut Picture, arrow: Arrow, scale: f64, thickness: f64, c
     }
 }
 
-/// Arrows for every `spacing`-th column and row of the planes `u`, `v` (row-major, `width x height`), half a spacing in from the edge. The pixel of
-/// column `i`, row `j` is `(x0 + i step, y0 + j step)` with `origin = (x0, y0)`: for planes on a coarse grid or of a region.
+/// Arrows for every `spacing`-th column and row of the planes `u`, `v` (row-major, `width x height`), half a
+/// spacing in from the edge. The pixel of column `i`, row `j` is `(x0 + i step, y0 + j step)` with `origin =
+/// (x0, y0)`: for planes on a coarse grid or of a region.
 ///
 /// # Errors
 /// [`Error::Argument`] for a spacing of 0 or a plane of another size.

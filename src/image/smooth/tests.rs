@@ -40,7 +40,8 @@ fn kernel_has_the_usual_radius_and_sums_to_one() {
     }
 }
 
-/// `scipy.ndimage.gaussian_filter` (1.17) of a unit impulse at column 1, row 0 of a 3 x 4 frame, sigma 1: its first and last row.
+/// `scipy.ndimage.gaussian_filter` (1.17) of a unit impulse at column 1, row 0 of a 3 x 4 frame, sigma 1: its
+/// first and last row.
 #[test]
 fn impulse_matches_the_reference() {
     let mut frame = Frame::filled(4, 3, 0.0);

@@ -1,10 +1,12 @@
 //! From samples to spline coefficients.
 //!
-//! Along an axis the samples are `s_k = (c_(k-1) + 4 c_k + c_(k+1)) / 6`; the inverse is `1 / ((1 - z q)(1 - z / q))`, up to a gain of `-6 z`, with the shift `q`
-//! and `z = sqrt(3) - 2`. Powers of `z` vanish soon, so both passes begin near their band instead of at the frame's edge, and bands are independent:
-//! - down the columns by recursion, lanes side by side (M. Unser, A. Aldroubi, M. Eden, "B-spline signal processing: part II", 1993);
-//! - along the rows, where a recursion would have lanes wait for each other, by doubling:
-//!   `1 / (1 - z q) = (1 + z q)(1 + z^2 q^2)(1 + z^4 q^4)...`, each factor together with its mirror image a filter of three taps.
+//! Along an axis the samples are `s_k = (c_(k-1) + 4 c_k + c_(k+1)) / 6`; the inverse is `1 / ((1 - z q)(1 -
+//! z / q))`, up to a gain of `-6 z`, with the shift `q` and `z = sqrt(3) - 2`. Powers of `z` vanish soon, so
+//! both passes begin near their band instead of at the frame's edge, and bands are independent:
+//! - down the columns by recursion, lanes side by side (M. Unser, A. Aldroubi, M. Eden, "B-spline signal
+//!   processing: part II", 1993);
+//! - along the rows, where a recursion would have lanes wait for each other, by doubling: `1 / (1 - z q) = (1
+//!   + z q)(1 + z^2 q^2)(1 + z^4 q^4)...`, each factor together with its mirror image a filter of three taps.
 
 use super::{BEFORE, MARGIN};
 use crate::image::blocks::{BLOCK, cover, load, store};
@@ -90,7 +92,8 @@ impl<T: SimdReal> Band<'_, T> {
     }
 }
 
-/// Filters `N` vectors of columns from `x` on: forwards into `scratch`, back into `output`, which begins `reach` rows after `sources` and ends as many before.
+/// Filters `N` vectors of columns from `x` on: forwards into `scratch`, back into `output`, which begins
+/// `reach` rows after `sources` and ends as many before.
 #[inline(always)]
 fn down<V: Lanes, const N: usize>(
     sources: &[&[V::Scalar]],

@@ -95,7 +95,8 @@ fn check_against_the_definition<T: SimdReal>(tolerance: f64) {
 
 #[test]
 fn every_level_is_the_mirrored_spline_of_the_definition() {
-    // f32: positions of up to 150 px are themselves rounded to 1e-5 px, where noise has slopes of hundreds of grey levels a px.
+    // f32: positions of up to 150 px are themselves rounded to 1e-5 px, where noise has slopes of hundreds of
+    // grey levels a px.
     check_against_the_definition::<f32>(1e-3);
     check_against_the_definition::<f64>(1e-11);
 }

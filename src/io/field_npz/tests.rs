@@ -2,7 +2,7 @@ use super::*;
 use std::io::Cursor;
 
 /// A field with a distinct number everywhere and every optional plane.
-pub(in crate::io) fn numbered(sites: Sites) -> FlowField<f32> {
+pub(in crate::io) fn numbered(sites: SamplingGrid) -> FlowField<f32> {
     let layout = FieldLayout {
         frame_size: (7, 5),
         sites,
@@ -34,13 +34,13 @@ fn stored(field: &FlowField<f32>) -> NpzReader<Cursor<Vec<u8>>> {
 fn every_plane_and_the_layout_come_back() {
     let region = Some(Rect { x: 1, y: 0, width: 5, height: 5 });
     for sites in [
-        Sites::default(),
-        Sites::Grid { region, stride: 2 },
-        Sites::Points(vec![(6, 4), (0, 0), (3, 2)]),
-        Sites::Points(vec![]),
+        SamplingGrid::default(),
+        SamplingGrid::Grid { region, stride: 2 },
+        SamplingGrid::Points(vec![(6, 4), (0, 0), (3, 2)]),
+        SamplingGrid::Points(vec![]),
     ] {
-        if matches!(&sites, Sites::Points(p) if p.is_empty()) {
-            let field = FlowField::<f32>::empty(numbered(Sites::default()).layout, false).unwrap();
+        if matches!(&sites, SamplingGrid::Points(p) if p.is_empty()) {
+            let field = FlowField::<f32>::empty(numbered(SamplingGrid::default()).layout, false).unwrap();
             let mut layout = field.layout.clone();
             layout.sites = sites;
             let empty = FlowField::<f32>::empty(layout, false).unwrap();
@@ -58,7 +58,7 @@ fn every_plane_and_the_layout_come_back() {
 
 #[test]
 fn a_field_with_flipped_bytes_is_refused_or_the_same() {
-    let field = numbered(Sites::default());
+    let field = numbered(SamplingGrid::default());
     let good = write_npz_to(Cursor::new(Vec::new()), "x.npz", &field, "").unwrap().into_inner();
     let rng = crate::math::random::CounterRng::new(4);
     let mut refused = 0;
@@ -82,7 +82,7 @@ fn a_field_with_flipped_bytes_is_refused_or_the_same() {
 
 #[test]
 fn flow_and_jacobian_are_arranged_for_numpy() {
-    let mut npz = stored(&numbered(Sites::default()));
+    let mut npz = stored(&numbered(SamplingGrid::default()));
     let n = 35.0;
     assert_eq!(npz.array::<f32>("flow").unwrap().values[2..4], [1.0, n + 1.0]);
     let jacobian = npz.array::<f32>("jacobian").unwrap();
@@ -93,7 +93,7 @@ fn flow_and_jacobian_are_arranged_for_numpy() {
 
 #[test]
 fn parameters_that_the_model_lacks_are_zero_but_not_where_there_is_no_estimate() {
-    let mut layout = numbered(Sites::default()).layout;
+    let mut layout = numbered(SamplingGrid::default()).layout;
     (layout.model, layout.parameters) = ("translational".into(), vec!["u".into(), "v".into()]);
     let mut field = FlowField::<f32>::empty(layout, false).unwrap();
     (field.motion[1], field.motion[36]) = (2.0, 3.0);
@@ -103,7 +103,7 @@ fn parameters_that_the_model_lacks_are_zero_but_not_where_there_is_no_estimate()
 
 #[test]
 fn arrays_that_do_not_fit_are_refused() {
-    let field = numbered(Sites::default());
+    let field = numbered(SamplingGrid::default());
     let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
     npz.text("metadata", &Metadata::new(&field.layout, "").to_json(Path::new("x")).unwrap()).unwrap();
     npz.array("status", &[5, 7], &[0u8; 35]).unwrap();

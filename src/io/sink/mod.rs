@@ -13,12 +13,14 @@ use super::channels::FrameFormat;
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 
-/// Takes frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or [`AnyColourFrame`].
+/// Takes frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or
+/// [`AnyColourFrame`].
 pub trait FrameSink<F = AnyFrame>: Send {
     /// Adds a frame.
     ///
     /// # Errors
-    /// [`Error::Argument`] or [`Error::Type`] named `frame` for a frame unlike the first or of a type that the format cannot hold; [`Error::Io`] with the path.
+    /// [`Error::Argument`] or [`Error::Type`] named `frame` for a frame unlike the first or of a type that
+    /// the format cannot hold; [`Error::Io`] with the path.
     fn write(&mut self, frame: &F) -> Result<()>;
 
     /// Ends the sequence; files of several frames get their name only now.
@@ -31,7 +33,8 @@ pub trait FrameSink<F = AnyFrame>: Send {
 /// A sink of colour frames.
 pub type ColourSink = dyn FrameSink<AnyColourFrame>;
 
-/// A kind of sink: which specifications it takes and how it is opened, with the frame rate (frames per second).
+/// A kind of sink: which specifications it takes and how it is opened, with the frame rate (frames per
+/// second).
 struct Kind {
     accepts: fn(&str) -> bool,
     open: fn(&str, f64) -> Result<Box<dyn FrameSink>>,
@@ -41,10 +44,12 @@ struct Kind {
 /// Every kind of sink; the first that accepts a specification opens it.
 const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, png::KIND];
 
-/// Opens a sink of grey frames by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for numbered PNG files.
+/// Opens a sink of grey frames by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a
+/// folder for numbered PNG files.
 ///
 /// # Errors
-/// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or `output` for an extension that no sink has.
+/// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or
+/// `output` for an extension that no sink has.
 pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
     (kind_at_rate(spec, frame_rate)?.open)(spec, frame_rate)
 }

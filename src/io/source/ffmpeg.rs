@@ -15,13 +15,16 @@ pub(super) const KIND: Kind = Kind {
     open_colour: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
 };
 
-/// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier ones.
+/// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier
+/// ones.
 const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0"]];
 
-/// Conversion to what [`Y4mSource`] takes colour for, from any matrix and depth of the file. Limited range, since older programs say nothing of the range.
+/// Conversion to what [`Y4mSource`] takes colour for, from any matrix and depth of the file. Limited range,
+/// since older programs say nothing of the range.
 const COLOUR: [&str; 2] = ["-vf", "scale=out_color_matrix=bt601:out_range=tv,format=yuv444p"];
 
-/// Frames of a video file. Grey ones are the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]); colour ones have 8 bit, converted by the program.
+/// Frames of a video file. Grey ones are the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]); colour
+/// ones have 8 bit, converted by the program.
 ///
 /// The program runs beside this process and is stopped when the source is dropped.
 #[derive(Debug)]
@@ -49,11 +52,12 @@ impl FfmpegSource {
 }
 
 impl<P: ChannelPolicy> FfmpegSource<P> {
-    /// Opens a video with a program that understands the options of `ffmpeg`: grey frames with the policy [`Colour`], colour frames with
-    /// [`Grey`](crate::io::Grey).
+    /// Opens a video with a program that understands the options of `ffmpeg`: grey frames with the policy
+    /// [`Colour`], colour frames with [`Grey`](crate::io::Grey).
     ///
     /// # Errors
-    /// [`Error::Missing`] when there is no such program; [`Error::Format`] with its own words when it cannot decode the file.
+    /// [`Error::Missing`] when there is no such program; [`Error::Format`] with its own words when it cannot
+    /// decode the file.
     pub fn open_with(program: impl AsRef<Path>, path: impl AsRef<Path>, policy: P) -> Result<Self> {
         let (program, path) = (program.as_ref(), path.as_ref());
         File::open(path).map_err(|e| Error::io(path, e))?;

@@ -16,7 +16,8 @@ pub(super) const KIND: Kind = Kind {
 /// Longest list read, bytes.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// The paths in a list, one a line, in the order written; relative ones start at the list's folder. Empty lines and lines that begin with `#` are skipped.
+/// The paths in a list, one a line, in the order written; relative ones start at the list's folder. Empty
+/// lines and lines that begin with `#` are skipped.
 fn listed(list: &Path) -> Result<Vec<PathBuf>> {
     let file = File::open(list).map_err(|e| Error::io(list, e))?;
     let folder = list.parent().unwrap_or(Path::new(""));

@@ -23,7 +23,8 @@ use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
-/// How a source is opened: what to do with colour or grey, and the frames wanted, `first`, `first + step`, ... at most `limit` of them.
+/// How a source is opened: what to do with colour or grey, and the frames wanted, `first`, `first + step`,
+/// ... at most `limit` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct OpenOptions {
@@ -45,7 +46,8 @@ impl Default for OpenOptions {
     }
 }
 
-/// A sequence of frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or [`AnyColourFrame`].
+/// A sequence of frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or
+/// [`AnyColourFrame`].
 pub trait FrameSource<F = AnyFrame>: Send {
     /// The next frame; `None` after the last.
     ///
@@ -53,7 +55,8 @@ pub trait FrameSource<F = AnyFrame>: Send {
     /// [`Error::Io`] or [`Error::Format`] with the path of the file that cannot be read.
     fn next_frame(&mut self) -> Result<Option<F>>;
 
-    /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many there were.
+    /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many
+    /// there were.
     ///
     /// # Errors
     /// As [`FrameSource::next_frame`].
@@ -126,8 +129,8 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// | another file | compressed video, through an `ffmpeg` on the `PATH`; likewise |
 ///
 /// # Errors
-/// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems, [`Error::Argument`] for a `step` of 0,
-/// [`Error::Missing`] for video without `ffmpeg`.
+/// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems,
+/// [`Error::Argument`] for a `step` of 0, [`Error::Missing`] for video without `ffmpeg`.
 pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let source = (kind_for(spec, options)?.open)(spec, options.colour)?;
     Ok(Box::new(Selected::new(source, options)?))
@@ -135,9 +138,10 @@ pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
 
 /// Opens a source of colour frames by its specification: as [`open`], with red, green and blue of each pixel.
 ///
-/// Y4M is converted by ITU-R BT.601 (see [`Y4mSource`]); compressed video has 8 bit. A `*.npy` stack of colour is `(T, H, W, 3)` or `(T, H, W, 4)`, one
-/// frame `(H, W, 3)` or `(H, W, 4)`. Alpha is left out. Grey pictures are an [`Error::Format`] that says that colour is needed, unless
-/// `options.grey` is [`Grey::Repeat`].
+/// Y4M is converted by ITU-R BT.601 (see [`Y4mSource`]); compressed video has 8 bit. A `*.npy` stack of
+/// colour is `(T, H, W, 3)` or `(T, H, W, 4)`, one frame `(H, W, 3)` or `(H, W, 4)`. Alpha is left out. Grey
+/// pictures are an [`Error::Format`] that says that colour is needed, unless `options.grey` is
+/// [`Grey::Repeat`].
 ///
 /// # Errors
 /// As [`open`].

@@ -20,11 +20,12 @@ pub(super) const KIND: Kind = Kind {
 /// Bytes of frames held at once when the first axis varies fastest in the file.
 const BATCH_BYTES: usize = 64 << 20;
 
-/// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16, float32 or float64, either byte order.
-/// Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one colour frame.
+/// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16,
+/// float32 or float64, either byte order. Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one
+/// colour frame.
 ///
-/// In C order each frame is read when it is asked for. In Fortran order the samples of one frame are spread over the whole file, so each
-/// pass over the file gathers as many frames as fit 64 MiB (at least one).
+/// In C order each frame is read when it is asked for. In Fortran order the samples of one frame are spread
+/// over the whole file, so each pass over the file gathers as many frames as fit 64 MiB (at least one).
 #[derive(Debug)]
 pub struct NpySource<P: ChannelPolicy = Colour> {
     path: PathBuf,
@@ -44,8 +45,8 @@ impl<P: ChannelPolicy> NpySource<P> {
     /// Opens a stack: grey frames with the policy [`Colour`], colour frames with [`Grey`](crate::io::Grey).
     ///
     /// # Errors
-    /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is no such stack, is shorter than its header says, or
-    /// `policy` refuses it.
+    /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is no such stack, is shorter
+    /// than its header says, or `policy` refuses it.
     pub fn open(path: impl AsRef<Path>, policy: P) -> Result<Self> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;

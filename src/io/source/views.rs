@@ -11,9 +11,11 @@ pub enum ViewLayout {
     SideBySide,
     /// The left view in the upper half.
     TopBottom,
-    /// Side by side in a frame of the ordinary size: each view squeezed to half its width, to which it is widened again.
+    /// Side by side in a frame of the ordinary size: each view squeezed to half its width, to which it is
+    /// widened again.
     HalfSideBySide,
-    /// One above the other in a frame of the ordinary size: each view squeezed to half its height, to which it is stretched again.
+    /// One above the other in a frame of the ordinary size: each view squeezed to half its height, to which
+    /// it is stretched again.
     HalfTopBottom,
 }
 
@@ -31,8 +33,9 @@ impl ViewLayout {
 
 /// Pairs of views, left and right, one pair at a time.
 ///
-/// Movies that squeeze both views into a frame of the ordinary size ("half" formats) look like those that do not; [`ViewLayout`] has a layout of its own for them. Taken for the others, they give views of half
-/// the width, and disparities half as large, or of half the height.
+/// Movies that squeeze both views into a frame of the ordinary size ("half" formats) look like those that do
+/// not; [`ViewLayout`] has a layout of its own for them. Taken for the others, they give views of half the
+/// width, and disparities half as large, or of half the height.
 pub struct ViewPairs {
     views: Views,
     swapped: bool,
@@ -79,7 +82,8 @@ impl ViewPairs {
     /// The next left and right view; `None` after the last.
     ///
     /// # Errors
-    /// Those of the sources; [`Error::Argument`] named `input` where one of two ends before the other, `layout` for frames that cannot be cut in half.
+    /// Those of the sources; [`Error::Argument`] named `input` where one of two ends before the other,
+    /// `layout` for frames that cannot be cut in half.
     pub fn next_pair(&mut self) -> Result<Option<[AnyFrame; 2]>> {
         let pair = match &mut self.views {
             Views::Two([left, right]) => match (left.next_frame()?, right.next_frame()?) {
@@ -131,7 +135,8 @@ fn halves(frame: &AnyFrame, layout: ViewLayout) -> Result<[AnyFrame; 2]> {
     }
 }
 
-/// A frame twice as wide or twice as high, interpolated along that axis. Squeezed pixels are as wide as two: the middles of these are a quarter of it from its own.
+/// A frame twice as wide or twice as high, interpolated along that axis. Squeezed pixels are as wide as two:
+/// the middles of these are a quarter of it from its own.
 fn stretched<T: Sample>(frame: &Frame<T>, wider: bool) -> Frame<T> {
     let (width, height) = frame.size();
     let size = if wider { (2 * width, height) } else { (width, 2 * height) };

@@ -1,4 +1,5 @@
-//! YUV4MPEG2 (`.y4m`): uncompressed video with a text header, from a file or standard input. The luma plane is the grey image.
+//! YUV4MPEG2 (`.y4m`): uncompressed video with a text header, from a file or standard input. The luma plane
+//! is the grey image.
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
@@ -26,14 +27,17 @@ fn open_stream<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameS
 /// Longest header line accepted, bytes.
 const MAX_LINE: u64 = 4096;
 
-/// Frames of a YUV4MPEG2 stream: `mono`, `420` (all variants), `411`, `422`, `440` and `444` with or without alpha, 8 to 16 bit.
+/// Frames of a YUV4MPEG2 stream: `mono`, `420` (all variants), `411`, `422`, `440` and `444` with or without
+/// alpha, 8 to 16 bit.
 ///
-/// Eight-bit streams give uint8, deeper ones (`p10`, `p12`, ..., `mono16`) uint16. What is read depends on [`Y4mSource::with_policy`]:
+/// Eight-bit streams give uint8, deeper ones (`p10`, `p12`, ..., `mono16`) uint16. What is read depends on
+/// [`Y4mSource::with_policy`]:
 ///
-/// - Grey frames: colour is refused or its luma is taken, as coded (so `16..=235` for limited range). Deeper luma is shifted left so that the stream's
-///   full scale is that of 16 bits.
-/// - Colour frames: red, green and blue by the matrix of ITU-R BT.601, each pixel with the chroma sample that covers it; full range where the header says
-///   `XCOLORRANGE=FULL`, else limited range (16 to 235). `mono` is grey: where that may be repeated the luma is taken as coded.
+/// - Grey frames: colour is refused or its luma is taken, as coded (so `16..=235` for limited range). Deeper
+///   luma is shifted left so that the stream's full scale is that of 16 bits.
+/// - Colour frames: red, green and blue by the matrix of ITU-R BT.601, each pixel with the chroma sample that
+///   covers it; full range where the header says `XCOLORRANGE=FULL`, else limited range (16 to 235). `mono`
+///   is grey: where that may be repeated the luma is taken as coded.
 #[derive(Debug)]
 pub struct Y4mSource<R, P = Colour> {
     name: PathBuf,
@@ -83,7 +87,8 @@ impl<R: BufRead> Y4mSource<R> {
     /// Reads the header of a stream; `name` stands for it in messages.
     ///
     /// # Errors
-    /// [`Error::Io`] when it cannot be read, [`Error::Format`] when it is no YUV4MPEG2 stream or its frames are empty or over 65 536 px wide or high.
+    /// [`Error::Io`] when it cannot be read, [`Error::Format`] when it is no YUV4MPEG2 stream or its frames
+    /// are empty or over 65 536 px wide or high.
     pub fn new(name: impl AsRef<Path>, mut input: R) -> Result<Self> {
         let name = name.as_ref().to_path_buf();
         let line = read_line(&mut input, &name)?.unwrap_or_default();
@@ -110,7 +115,8 @@ impl<R: BufRead> Y4mSource<R> {
 }
 
 impl<R, P> Y4mSource<R, P> {
-    /// The same stream read by another policy: [`Colour`] for grey frames, [`Grey`](crate::io::Grey) for colour frames. [`Colour::Luminance`] until then.
+    /// The same stream read by another policy: [`Colour`] for grey frames, [`Grey`](crate::io::Grey) for
+    /// colour frames. [`Colour::Luminance`] until then.
     ///
     /// Grey in a coloured layout is grey for [`Colour`]: its chroma is in the middle of the scale.
     pub fn with_policy<Q: ChannelPolicy>(self, policy: Q) -> Y4mSource<R, Q> {
@@ -189,7 +195,8 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
         Error::format(&self.name, format!("frame {} {what}", self.frame))
     }
 
-    /// Reads `count` bytes, into memory that grows as they come: a header alone cannot make a large allocation.
+    /// Reads `count` bytes, into memory that grows as they come: a header alone cannot make a large
+    /// allocation.
     fn read_bytes(&mut self, count: usize) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         (&mut self.input).take(count as u64).read_to_end(&mut bytes).map_err(|e| Error::io(&self.name, e))?;

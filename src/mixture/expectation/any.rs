@@ -1,4 +1,5 @@
-//! The E step in lanes for any number of dimensions: differences of a block are kept in memory and read for two rows of a matrix at a time, so that reading is not what it waits for.
+//! The E step in lanes for any number of dimensions: differences of a block are kept in memory and read for
+//! two rows of a matrix at a time, so that reading is not what it waits for.
 
 use super::{Sums, shares};
 use crate::mixture::densities::Densities;
@@ -137,7 +138,8 @@ fn subtracted<V: Lanes<Scalar = f64>>(log: [V; ABREAST], z: [V; ABREAST]) -> [V;
     std::array::from_fn(|n| z[n].neg_mul_add(z[n], log[n]))
 }
 
-/// Responsibilities times weights times differences of a block, and the lanes' sums of the first and of the last.
+/// Responsibilities times weights times differences of a block, and the lanes' sums of the first and of the
+/// last.
 #[inline(always)]
 fn weigh<V: Lanes<Scalar = f64>>(
     shares: &[f64],
@@ -165,7 +167,8 @@ fn weigh<V: Lanes<Scalar = f64>>(
     }
 }
 
-/// Adds the lower triangle of a block's weighted products to the lanes' sums, by tiles of two rows and two columns.
+/// Adds the lower triangle of a block's weighted products to the lanes' sums, by tiles of two rows and two
+/// columns.
 #[inline(always)]
 fn add_products<V: Lanes<Scalar = f64>>(weighted: &[Plane], off: &[Plane], second: &mut [f64]) {
     for (upper, weighted) in weighted.chunks_exact(2).enumerate() {

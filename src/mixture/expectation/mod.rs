@@ -24,14 +24,16 @@ pub(super) struct Expected {
     pub negentropy: f64,
 }
 
-/// Sums of one band about the components' means: of each component `N, sum d, lower triangle of sum d d^T`, `d = x - m_k`.
+/// Sums of one band about the components' means: of each component `N, sum d, lower triangle of sum d d^T`,
+/// `d = x - m_k`.
 #[derive(Debug)]
 struct Sums {
     values: Vec<f64>,
     negentropy: f64,
 }
 
-/// Responsibilities under `densities`, summed. Call it inside [`Threads::install`](crate::parallel::Threads::install).
+/// Responsibilities under `densities`, summed. Call it inside
+/// [`Threads::install`](crate::parallel::Threads::install).
 ///
 /// Bands of fixed size are summed one after another: results do not depend on the number of threads.
 pub(super) fn expect(planes: &Planes, densities: &Densities) -> Expected {
@@ -86,7 +88,8 @@ fn moments(sums: &[f64], densities: &Densities) -> Moments {
     moments
 }
 
-/// Turns `ln rho` (K, BLOCK) into `rho` over the greatest one's, tells what makes weighted responsibilities of them (`scale`), and returns `sum_n f_n sum_k r_nk ln r_nk`.
+/// Turns `ln rho` (K, BLOCK) into `rho` over the greatest one's, tells what makes weighted responsibilities
+/// of them (`scale`), and returns `sum_n f_n sum_k r_nk ln r_nk`.
 #[inline(always)]
 fn shares<V: Lanes<Scalar = f64>>(
     logs: &mut [f64],
@@ -106,7 +109,8 @@ fn shares<V: Lanes<Scalar = f64>>(
     negentropy
 }
 
-/// Turns `ln rho` into `rho` over the greatest one's; adds them to `total`, and times their logarithms to `entropy`.
+/// Turns `ln rho` into `rho` over the greatest one's; adds them to `total`, and times their logarithms to
+/// `entropy`.
 #[inline(always)]
 fn exponentials<V: Lanes<Scalar = f64>>(
     logs: &mut [f64],

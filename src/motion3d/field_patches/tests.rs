@@ -19,7 +19,7 @@ fn camera() -> Intrinsics {
 fn field(stride: usize, length: f64, six: impl Fn(f64, f64) -> [f64; 6]) -> FlowField<f64> {
     let layout = FieldLayout {
         frame_size: (320, 240),
-        sites: Sites::Grid { region: None, stride },
+        sites: SamplingGrid::Grid { region: None, stride },
         model: "affine".into(),
         parameters: MOTION_NAMES.map(String::from).to_vec(),
         frame_period: None,
@@ -59,7 +59,8 @@ fn an_affine_flow_is_told_at_the_middles() {
             assert!((got - want).abs() < 1e-10, "{got} {want}");
         }
     }
-    // A slope has its own information and that of the flow around the middle; the flow is told apart from a bend, which the slopes tell, too. With the means of dx^2 and of dx^4.
+    // A slope has its own information and that of the flow around the middle; the flow is told apart from a
+    // bend, which the slopes tell, too. With the means of dx^2 and of dx^4.
     let (flow, slope) = (NOISE[0] * NOISE[0], NOISE[2] * NOISE[2]);
     let (second, fourth) = ((3600.0 - 1.0) / 12.0, (3.0 * 3600.0 * 3600.0 - 10.0 * 3600.0 + 7.0) / 240.0);
     let bend = 0.25 * (fourth + second * second) / flow + second / slope;
@@ -124,7 +125,8 @@ fn a_window_over_an_edge_is_told_less_surely() {
     assert!(off < 1.0 && (found.motion[1][0] - 2.0).abs() < 1e-9, "{off}");
 }
 
-/// White noise of deviation 1 smoothed by a Gaussian of `length` px, with the deviation 1 again: errors go together as `exp(-d^2 / (4 l^2))`.
+/// White noise of deviation 1 smoothed by a Gaussian of `length` px, with the deviation 1 again: errors go
+/// together as `exp(-d^2 / (4 l^2))`.
 fn smoothed(width: usize, height: usize, length: f64, rng: CounterRng) -> Vec<f64> {
     let reach = (3.0 * length).ceil() as i64;
     let weight: Vec<f64> = (-reach..=reach).map(|d| (-0.5 * (d as f64 / length).powi(2)).exp()).collect();
@@ -198,7 +200,8 @@ fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
         }
         errors.sort_by(f64::total_cmp);
         assert!(told >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {told}, {}", errors[12]);
-        // This noise has no tail, so that the area over which it is one is smaller than the one that is reckoned with.
+        // This noise has no tail, so that the area over which it is one is smaller than the one that is
+        // reckoned with.
         let mean = sum / 24.0 / 5.0 * area() / (4.0 * std::f64::consts::PI);
         assert!((0.4..2.2).contains(&mean), "{size}: {mean}");
     }

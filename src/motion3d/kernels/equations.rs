@@ -25,7 +25,8 @@ pub(in super::super) struct Equations {
 }
 
 impl Equations {
-    /// What depths behind the camera speak against a motion: the noise of depths that are hardly any leaves `sum (nu^ / sd)^2` of no more than their number.
+    /// What depths behind the camera speak against a motion: the noise of depths that are hardly any leaves
+    /// `sum (nu^ / sd)^2` of no more than their number.
     pub fn signs(&self) -> f64 {
         (self.behind - self.reversed).max(0.0)
     }
@@ -82,7 +83,8 @@ impl Kernel<f64> for EquationSums<'_> {
     }
 }
 
-/// The equations at a motion, `theta = (psi, w)` with `psi` along the rows of `tangent`; with `cut`, Tukey's weights that end there, in units of noise.
+/// The equations at a motion, `theta = (psi, w)` with `psi` along the rows of `tangent`; with `cut`, Tukey's
+/// weights that end there, in units of noise.
 pub(in super::super) fn equations(
     observations: &Observations,
     motion: &Motion,

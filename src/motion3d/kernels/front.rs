@@ -50,7 +50,8 @@ impl Kernel<f64> for FrontSums<'_> {
                 }
                 sums[15 + row] = weighted.mul_add(seen.across, sums[15 + row]);
             }
-            // A point that would lie behind has depth 0: all that is left of it is what the rotation does not explain.
+            // A point that would lie behind has depth 0: all that is left of it is what the rotation does not
+            // explain.
             let behind = (one - before) * seen.inverse;
             let rest_x = seen.along.mul_add(seen.t[0], seen.across * seen.t[1]) * behind;
             let rest_y = seen.across.neg_mul_add(seen.t[0], seen.along * seen.t[1]) * behind;

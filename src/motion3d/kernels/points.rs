@@ -38,7 +38,8 @@ impl Kernel<f64> for RotationSums<'_> {
     }
 }
 
-/// The best rotation for the translation `direction` and its `J`; `None` where the points do not determine it.
+/// The best rotation for the translation `direction` and its `J`; `None` where the points do not determine
+/// it.
 pub(in super::super) fn best_rotation(
     observations: &Observations,
     direction: &Vector3<f64>,
@@ -140,9 +141,11 @@ impl Kernel<f64> for ConsensusSum<'_> {
     }
 }
 
-/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: a point that does not obey counts once, for whatever reason.
+/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: a point that does not obey counts once,
+/// for whatever reason.
 ///
-/// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or overtakes it, obeys the same lines, as no stray does.
+/// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or
+/// overtakes it, obeys the same lines, as no stray does.
 pub(in super::super) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
     let [cost] = over_chunks(observations, |range| {
         let planes = observations.slices(&range);

@@ -19,7 +19,8 @@ struct WeightSums<'a> {
     spread: f64,
 }
 
-/// `1 / (s^2 + g kappa^2)` with `g = |G|^2 / 2`, and nothing at the epipole: what damped weights have for `1 / s^2`.
+/// `1 / (s^2 + g kappa^2)` with `g = |G|^2 / 2`, and nothing at the epipole: what damped weights have for `1
+/// / s^2`.
 #[inline(always)]
 fn damped<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, s2: V, floor: V, half_spread: V) -> V {
     let mut size = V::zero();
@@ -76,7 +77,8 @@ impl Kernel<f64> for WeightSums<'_> {
     }
 }
 
-/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights, which are damped within `kappa^2 = spread` of the epipole.
+/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights, which are
+/// damped within `kappa^2 = spread` of the epipole.
 pub(in super::super) fn information(
     observations: &Observations,
     motion: &Motion,
@@ -100,7 +102,8 @@ pub(in super::super) fn information(
     h
 }
 
-/// `sum W^t D` of weights with given depths and the rows' true depths, of which those of the points' own flow are an estimate.
+/// `sum W^t D` of weights with given depths and the rows' true depths, of which those of the points' own flow
+/// are an estimate.
 struct SlopeSums<'a> {
     weights: WeightSums<'a>,
     /// How much of each point's own depth is in that of its weight.
@@ -150,7 +153,9 @@ impl Kernel<f64> for SlopeSums<'_> {
     }
 }
 
-/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without bias: true depths are taken from the points' own flow, of which `share` is in `nu`. Weights are damped within `kappa^2 = spread` of the epipole.
+/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without
+/// bias: true depths are taken from the points' own flow, of which `share` is in `nu`. Weights are damped
+/// within `kappa^2 = spread` of the epipole.
 pub(in super::super) fn slope(
     observations: &Observations,
     motion: &Motion,

@@ -1,7 +1,9 @@
 //! Whether the covariance of few patches holds: the experiment again, with noise by chance.
 //!
-//! The theory is linear and takes the surfaces in the weights for known. With few patches neither is so, and the errors have longer tails than a covariance from one linear step tells. The scene that was found is measured again with new noise, and solved again: the errors in units of each
-//! repetition's own covariance are what the first one's are to be judged by (B. Efron 1979: the bootstrap).
+//! The theory is linear and takes the surfaces in the weights for known. With few patches neither is so, and
+//! the errors have longer tails than a covariance from one linear step tells. The scene that was found is
+//! measured again with new noise, and solved again: the errors in units of each repetition's own covariance
+//! are what the first one's are to be judged by (B. Efron 1979: the bootstrap).
 
 use super::super::covariance::{Matrix5, inverse, plugged_in};
 use super::super::motion::{Motion, tangents};
@@ -20,7 +22,8 @@ const MANY: usize = 30;
 const REPETITIONS: u64 = 200;
 const SHARE: f64 = 0.95;
 
-/// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 % ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights.
+/// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 %
+/// ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights.
 pub(super) fn wider(
     system: &System,
     motion: &Motion,

@@ -9,7 +9,8 @@ const ROUNDS: usize = 3;
 const EXPECTATIONS: usize = 60;
 const STEPS: usize = 60;
 
-/// The length of a step that is the last, or its square in units of the motion's deviation; and the farthest that the direction may come, degrees.
+/// The length of a step that is the last, or its square in units of the motion's deviation; and the farthest
+/// that the direction may come, degrees.
 const STEP: f64 = 1e-9;
 const NEGLIGIBLE: f64 = 1e-8;
 const FARTHEST: f64 = 30.0;
@@ -20,7 +21,8 @@ pub(super) struct Shrunk {
     pub surfaces: Vec<Vector3<f64>>,
 }
 
-/// Posterior means `mu + L (L + C)^-1 (lambda^ - mu)` under a normal distribution `N(mu, L)` fitted by expectation and maximisation.
+/// Posterior means `mu + L (L + C)^-1 (lambda^ - mu)` under a normal distribution `N(mu, L)` fitted by
+/// expectation and maximisation.
 fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vector3<f64>>> {
     let count = surfaces.len() as f64;
     // Begins with the precise ones: near the epipole a surface says nothing.
@@ -71,7 +73,8 @@ pub(super) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
 
 /// Scoring steps: the expected slope of the equation is that of its weights' own information.
 ///
-/// The equation's slope for the noise at hand is another, most where the epipole lies among patches: steps that grow went too far, and from there on they are half as long.
+/// The equation's slope for the noise at hand is another, most where the epipole lies among patches: steps
+/// that grow went too far, and from there on they are half as long.
 fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<Motion> {
     let (mut motion, mut share, mut before) = (*start, 1.0, f64::INFINITY);
     for _ in 0..STEPS {

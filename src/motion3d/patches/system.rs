@@ -60,7 +60,8 @@ pub(super) struct PatchEquations {
 }
 
 impl Patch {
-    /// From `(u, v, u_x, v_x, u_y, v_y)` at a place on the plane at distance 1; `None` unless all is finite and the covariance positive definite.
+    /// From `(u, v, u_x, v_x, u_y, v_y)` at a place on the plane at distance 1; `None` unless all is finite
+    /// and the covariance positive definite.
     ///
     /// With a `turn`, that rotation was taken out of them: its part is put back as the rows have it.
     pub fn new(point: [f64; 2], m: &Vector6<f64>, covariance: &Matrix6<f64>, turn: Option<&HalfTurn>) -> Option<Self> {
@@ -279,7 +280,8 @@ impl System {
         sum
     }
 
-    /// The other motion, where all patches lie in one plane `nu = n . eta` as far as their noise lets tell and that has them before the camera.
+    /// The other motion, where all patches lie in one plane `nu = n . eta` as far as their noise lets tell
+    /// and that has them before the camera.
     pub fn twin(&self, motion: &Motion) -> Option<Motion> {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let plane = |patch: &Patch| Matrix3::new(patch.point[0], patch.point[1], 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);

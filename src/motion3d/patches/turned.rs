@@ -12,7 +12,8 @@ use nalgebra::{Matrix2, Matrix6, Vector6};
 const TURNS: usize = 6;
 const ROUNDING: f64 = 1e-13;
 
-/// The map from one view to the other is `I + M` to first order: with the slopes `D_1`, `D_2` of what turns both views it is `D_2 (I + M) D_1^-1`.
+/// The map from one view to the other is `I + M` to first order: with the slopes `D_1`, `D_2` of what turns
+/// both views it is `D_2 (I + M) D_1^-1`.
 pub(super) fn turned_patch(given: &AffinePatches<'_>, k: usize, turn: &HalfTurn) -> Option<Patch> {
     let (mut m, at) = (Vector6::from(given.motion[k]), given.points[k]);
     let mut covariance = Matrix6::from_row_slice(&given.covariances[36 * k..36 * (k + 1)]);

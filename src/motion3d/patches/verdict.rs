@@ -11,7 +11,9 @@ use super::system::System;
 use crate::math::random::CounterRng;
 use nalgebra::Vector3;
 
-/// Squared deviations by which the opposite must be worse to be excluded, and what other minima, whose residuals are other components of the noise, may differ by through chance: this times the root of their number.
+/// Squared deviations by which the opposite must be worse to be excluded, and what other minima, whose
+/// residuals are other components of the noise, may differ by through chance: this times the root of their
+/// number.
 const SURE: f64 = 9.0;
 const CHANCE: f64 = 1.0;
 
@@ -60,7 +62,8 @@ pub(super) fn judge(out: &mut MotionEstimate, system: &System, evidence: &Eviden
     };
 }
 
-/// Other minima, and the opposites of all, that are about as likely with no patch behind the camera: each with the direction and the rotation that suit it best; the likeliest first.
+/// Other minima, and the opposites of all, that are about as likely with no patch behind the camera: each
+/// with the direction and the rotation that suit it best; the likeliest first.
 fn others(system: &System, motion: &Motion, minima: &[Motion], deviation: f64) -> Vec<Alternative> {
     let (_, least) = system.refine_in_front(motion);
     let distinct = (DISTINCT * deviation).max(APART).to_radians();
@@ -78,7 +81,8 @@ fn others(system: &System, motion: &Motion, minima: &[Motion], deviation: f64) -
     found
 }
 
-/// Whether directions explain the patches as well as the estimate that are farther than the covariance has it.
+/// Whether directions explain the patches as well as the estimate that are farther than the covariance has
+/// it.
 fn far(system: &System, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
     let n = system.patches.len();
     let few = system.subset(&sample(n, SEARCHED, rng));

@@ -1,4 +1,5 @@
-//! Things that move by themselves are whole: points among them that obey the scene's motion by chance pull it towards theirs.
+//! Things that move by themselves are whole: points among them that obey the scene's motion by chance pull it
+//! towards theirs.
 
 use super::super::covariance::{direction_block, inverse};
 use super::super::kernels::equations;
@@ -19,7 +20,8 @@ const MORE: f64 = 3.0;
 /// Times that points are left out and the rest is looked at again.
 const ROUNDS: usize = 5;
 
-/// The 0.999 quantile of chi-squared with two degrees of freedom, and what the variance of a direction counts besides what leaving points out adds to it.
+/// The 0.999 quantile of chi-squared with two degrees of freedom, and what the variance of a direction counts
+/// besides what leaving points out adds to it.
 const RARE: f64 = 13.8;
 const BESIDES: f64 = 0.1;
 
@@ -73,7 +75,8 @@ impl Around {
 pub(super) struct Inner {
     /// Those with hardly a rejected neighbour; all of them, where few would be left.
     pub inliers: Vec<u32>,
-    /// The motion of all inliers (where few would be left: of those few), if it is another one: then points on the border of a thing belong to that.
+    /// The motion of all inliers (where few would be left: of those few), if it is another one: then points
+    /// on the border of a thing belong to that.
     pub rival: Option<Rival>,
     /// Points with hardly a rejected neighbour; `None` where few would be left.
     pub quiet: Option<Vec<bool>>,
@@ -107,7 +110,8 @@ pub(super) fn more_than_usual(shares: &mut [f64]) -> f64 {
     usual + MORE * deviation
 }
 
-/// The motion and the inliers without those that have a larger share of rejected neighbours than is usual, and which points have no larger one.
+/// The motion and the inliers without those that have a larger share of rejected neighbours than is usual,
+/// and which points have no larger one.
 fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>, Vec<bool>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
     let mut quiet = vec![true; observations.n];
@@ -132,7 +136,9 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
     (motion, inliers, quiet)
 }
 
-/// Whether the motion of `fewer` points differs from that of all inliers by more than their lower number explains (J. Hausman 1978: the difference has the difference of the covariances); `None` where that is not known.
+/// Whether the motion of `fewer` points differs from that of all inliers by more than their lower number
+/// explains (J. Hausman 1978: the difference has the difference of the covariances); `None` where that is not
+/// known.
 fn differ(observations: &Observations, found: &Consensus, inner: &Motion, fewer: &[u32]) -> Option<bool> {
     let tangent = tangents(&found.motion.u());
     let spread = |points: &[u32]| {

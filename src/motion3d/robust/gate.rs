@@ -1,7 +1,10 @@
 //! Outliers along their epipolar line obey any motion, but not with the depth of their neighbours.
 //!
-//! A depth that differs from its neighbours' is no proof: few near things before a far background are as rare, and carry all of the translation. What tells strays is how many there are: spread evenly, as many obey a motion with such a depth as miss its epipolar line by a little more and have the same
-//! depth. Points whose depths are as odd are strays as far as that many explain them (the local false discovery rate; B. Efron 2001).
+//! A depth that differs from its neighbours' is no proof: few near things before a far background are as
+//! rare, and carry all of the translation. What tells strays is how many there are: spread evenly, as many
+//! obey a motion with such a depth as miss its epipolar line by a little more and have the same depth. Points
+//! whose depths are as odd are strays as far as that many explain them (the local false discovery rate; B.
+//! Efron 2001).
 
 use super::super::kernels::{Depths, depths};
 use super::super::motion::Motion;
@@ -23,14 +26,16 @@ const CELL: usize = 32;
 /// Cells of one task.
 const TOGETHER: usize = 64;
 
-/// The share of the differences whose quantile measures them, and that quantile of a standard normal's size: high enough for two layers of depth to stay.
+/// The share of the differences whose quantile measures them, and that quantile of a standard normal's size:
+/// high enough for two layers of depth to stay.
 const SHARE: f64 = 0.85;
 const SHARE_DEVIATION: f64 = 1.44;
 
 /// What is told of points at a motion.
 pub(super) struct Judged {
     pub strays: Strays,
-    /// Depths drawn to the median of the neighbours', as far as that can be trusted; 0 of points far from their lines.
+    /// Depths drawn to the median of the neighbours', as far as that can be trusted; 0 of points far from
+    /// their lines.
     pub smooth: Vec<f64>,
     /// Minus twice by how much, in nats, residuals and depths are likelier than those of strays alone.
     pub cost: f64,
@@ -46,7 +51,8 @@ pub(super) struct Gate<'a> {
 impl<'a> Gate<'a> {
     /// For these points.
     pub fn new(observations: &'a Observations) -> Self {
-        // Of many points a depth is compared with the inliers of its cell of the tree: nearly the same neighbours, found at once.
+        // Of many points a depth is compared with the inliers of its cell of the tree: nearly the same
+        // neighbours, found at once.
         let cells = (observations.n > MANY).then(|| {
             let tree = Tree::new(&observations.site);
             let cells = tree.cells(CELL);
@@ -107,7 +113,8 @@ impl<'a> Gate<'a> {
     }
 }
 
-/// Points before the camera that miss their epipolar line by no more than those from which strays are counted.
+/// Points before the camera that miss their epipolar line by no more than those from which strays are
+/// counted.
 fn near(observations: &Observations, seen: &Depths) -> Vec<u32> {
     let near = |&k: &u32| {
         let k = k as usize;
@@ -116,7 +123,8 @@ fn near(observations: &Observations, seen: &Depths) -> Vec<u32> {
     (0..observations.n as u32).filter(near).collect()
 }
 
-/// Differences in units of what the scene and the noise allow, and the variance that is the scene's; 0 at the epipole, where the depth is not known and cannot speak against the point.
+/// Differences in units of what the scene and the noise allow, and the variance that is the scene's; 0 at the
+/// epipole, where the depth is not known and cannot speak against the point.
 fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) -> (Vec<f64>, f64) {
     let known = |k: u32| seen.s2[k as usize] > 0.0;
     let obeying = || near.iter().zip(differences).filter(|(k, _)| obeys[**k as usize] && known(**k));
@@ -129,7 +137,8 @@ fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) 
     (near.iter().zip(differences).map(deviation).collect(), scene)
 }
 
-/// Differences of depths from the median of the inliers among their nearest points, and the share of the others there.
+/// Differences of depths from the median of the inliers among their nearest points, and the share of the
+/// others there.
 fn from_nearest(observations: &Observations, near: &[u32], obeys: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
     let sites: Vec<[f64; 3]> = near.iter().map(|&k| observations.site[k as usize]).collect();
     let tree = Tree::new(&sites);

@@ -1,4 +1,5 @@
-//! Whether a motion hangs on points that may be outliers: of few points, those that obey it by chance can be the ones that decide.
+//! Whether a motion hangs on points that may be outliers: of few points, those that obey it by chance can be
+//! the ones that decide.
 
 use super::super::covariance::{Matrix5, inverse};
 use super::super::kernels::depths;
@@ -19,9 +20,11 @@ const MOST: f64 = 2.0;
 
 type Vector5 = SMatrix<f64, 5, 1>;
 
-/// Whether the direction's deviation would more than double without the inliers that tell most of it, of as many as outliers may obey by chance.
+/// Whether the direction's deviation would more than double without the inliers that tell most of it, of as
+/// many as outliers may obey by chance.
 ///
-/// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of them fall within three deviations.
+/// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
+/// them fall within three deviations.
 pub(in super::super) fn hangs_on_few(observations: &Observations, found: &MotionEstimate) -> bool {
     let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
     let rejected = observations.n - inliers.len();
@@ -34,7 +37,8 @@ pub(in super::super) fn hangs_on_few(observations: &Observations, found: &Motion
     grows(&rows, observations, suspects)
 }
 
-/// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those evenly spread over twice the median residual of the rejected.
+/// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those
+/// evenly spread over twice the median residual of the rejected.
 fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) -> bool) -> f64 {
     let seen = depths(observations, motion);
     let mut sizes: Vec<f64> =

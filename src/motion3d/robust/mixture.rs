@@ -1,7 +1,11 @@
 //! The last steps towards the motion among points of which some are strays.
 //!
-//! With the probability `g(e)` of each point that it is an inlier ([`strays`](super::strays)), the estimating equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the mean of
-//! `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the same, as it is for every likelihood. Least squares on a fixed set of points take strays for inliers that tell of the motion.
+//! With the probability `g(e)` of each point that it is an inlier ([`strays`](super::strays)), the estimating
+//! equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its
+//! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
+//! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the
+//! same, as it is for every likelihood. Least squares on a fixed set of points take strays for inliers that
+//! tell of the motion.
 
 use super::super::covariance::{Matrix5, direction_spread, inverse};
 use super::super::kernels::depths;
@@ -23,7 +27,8 @@ const FARTHEST: f64 = 11.0;
 /// The longest step, rad: farther than that other points obey.
 const LONGEST: f64 = 0.2;
 
-/// Times that points are judged anew on the way to a root, and a change of the direction, rad, that is not worth another.
+/// Times that points are judged anew on the way to a root, and a change of the direction, rad, that is not
+/// worth another.
 const ROUNDS: usize = 6;
 const SETTLED: f64 = 1e-3;
 
@@ -143,7 +148,9 @@ impl Among<'_> {
     }
 }
 
-/// From the motion of the inner inliers, with the depths `smooth` of these in its weights (`None`: their own), to the root of the equation with probabilities, if it `moves`; the covariance grows as the information shrinks. `None` where nothing is known of strays.
+/// From the motion of the inner inliers, with the depths `smooth` of these in its weights (`None`: their
+/// own), to the root of the equation with probabilities, if it `moves`; the covariance grows as the
+/// information shrinks. `None` where nothing is known of strays.
 pub(in super::super) fn among_strays(
     all: &Observations,
     known: &Consensus,
@@ -162,9 +169,11 @@ pub(in super::super) fn among_strays(
     Some(Told { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
 }
 
-/// From a motion that was found by least squares to the root of the equation with probabilities, points judged anew on the way; with its cost. `None` where too few obey.
+/// From a motion that was found by least squares to the root of the equation with probabilities, points
+/// judged anew on the way; with its cost. `None` where too few obey.
 ///
-/// Strays with depths of their own, which are large, weigh most in least squares; drawn to their neighbours' they weigh as inliers do.
+/// Strays with depths of their own, which are large, weigh most in least squares; drawn to their neighbours'
+/// they weigh as inliers do.
 pub(super) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Option<(Motion, f64)> {
     let mut motion = start;
     for round in 0..=ROUNDS {
@@ -209,7 +218,8 @@ fn turned(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
     into * matrix * into.transpose()
 }
 
-/// The covariance after the information went from `before` to `after`, whatever else it accounts for in proportion; `axes` turn those of the direction.
+/// The covariance after the information went from `before` to `after`, whatever else it accounts for in
+/// proportion; `axes` turn those of the direction.
 fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix2<f64>) -> Option<Matrix5> {
     let (before, covariance) = (turned(before, axes), turned(covariance, axes));
     let grown = after.cholesky()?.l().transpose().try_inverse()? * before.cholesky()?.l().transpose();

@@ -15,7 +15,8 @@ const SPACING: f64 = 0.06;
 /// What the cut of Tukey's weights is divided by from one refinement to the next.
 const NARROWING: f64 = 1.6;
 
-/// The same points, with rounder noise first: where it is far from round the valleys are too narrow for the search.
+/// The same points, with rounder noise first: where it is far from round the valleys are too narrow for the
+/// search.
 pub(super) struct Narrowing<'a> {
     rounder: Vec<Observations>,
     own: &'a Observations,

@@ -16,13 +16,18 @@ const LITTLE: f64 = 0.25;
 /// Parts of the picture from which two motions are looked for.
 const PARTS: usize = 4;
 
-/// What two motions must explain more than one: twice the unknowns of one more, and which points have it. And of each point, where that of more points is the same: errors of flow that go together look like the motion of a few.
+/// What two motions must explain more than one: twice the unknowns of one more, and which points have it. And
+/// of each point, where that of more points is the same: errors of flow that go together look like the motion
+/// of a few.
 const ALL: f64 = 20.0;
 const EACH: f64 = 0.12;
 
-/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the same: where two motions explain them better, that of more points, or else of fewer, if it is another. `None` where that is not worth another motion, as where errors of flow go together and that is not told.
+/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the
+/// same: where two motions explain them better, that of more points, or else of fewer, if it is another.
+/// `None` where that is not worth another motion, as where errors of flow go together and that is not told.
 ///
-/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's motion alone, and what every search among all of them ends at; but it leaves residuals in both.
+/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's
+/// motion alone, and what every search among all of them ends at; but it leaves residuals in both.
 pub(super) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
     let mut parts = otherwise(observations, found, points)?;
     let own = observations.subset(points);
@@ -41,7 +46,8 @@ pub(super) fn instead(observations: &Observations, found: &Motion, points: &[u32
     (gain > ALL).then(|| Rival { motion: *motion, excess: excess.max(0.0), others: true })
 }
 
-/// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.
+/// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same
+/// sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.
 fn otherwise(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     if points.len() < ENOUGH {
         return None;

@@ -1,4 +1,6 @@
-//! Whether one part of the picture asks for another motion than the rest: where a thing that moves by itself and the scene obey a third motion together, their residuals are as small as noise, but those of each pull another way.
+//! Whether one part of the picture asks for another motion than the rest: where a thing that moves by itself
+//! and the scene obey a third motion together, their residuals are as small as noise, but those of each pull
+//! another way.
 
 use super::super::covariance::Matrix5;
 use super::super::kernels::depths;
@@ -18,12 +20,16 @@ const FEWEST: usize = 8;
 /// Deviations by which one of about thirty parts differs in one of a hundred pictures by chance.
 const FAR: f64 = 3.4;
 
-/// Information about a combination of the unknowns that a part has of its own, as a share of all; less is rounding.
+/// Information about a combination of the unknowns that a part has of its own, as a share of all; less is
+/// rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Parts of `points`, by their places among these, whose residuals pull the estimate on all of them farther than noise does, the farthest first.
+/// Parts of `points`, by their places among these, whose residuals pull the estimate on all of them farther
+/// than noise does, the farthest first.
 ///
-/// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of the points, halves of these, and so on.
+/// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with
+/// `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of
+/// the points, halves of these, and so on.
 pub(super) fn pulling(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
     departing(observations, motion, points).unwrap_or_default()
 }

@@ -12,10 +12,12 @@ use rayon::prelude::*;
 /// Points that do not obey among which a second motion is looked for.
 const REJECTED: usize = 128;
 
-/// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)` are as likely.
+/// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
+/// are as likely.
 const UNDECIDED: f64 = 1.0;
 
-/// The motion among strays that so many of obey that least squares follow them, from all candidates; with others that are about as likely, or that about as many points obey.
+/// The motion among strays that so many of obey that least squares follow them, from all candidates; with
+/// others that are about as likely, or that about as many points obey.
 pub(super) fn among_many_strays(
     observations: &Observations,
     on: &Observations,
@@ -48,7 +50,9 @@ pub(super) fn among_many_strays(
     Some((best, rivals))
 }
 
-/// What most points obey that do not obey `best`, refined on all, where they are so many that they may be the scene: the search among all may see one thing's motion only, from five sides, which part of the other's points obey by chance.
+/// What most points obey that do not obey `best`, refined on all, where they are so many that they may be the
+/// scene: the search among all may see one thing's motion only, from five sides, which part of the other's
+/// points obey by chance.
 pub(super) fn second(observations: &Observations, best: Motion, rng: CounterRng) -> Option<(Motion, f64)> {
     let obeys = obeying(observations, &best);
     let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| obeys.binary_search(k).is_err()).collect();
@@ -63,7 +67,8 @@ pub(super) fn second(observations: &Observations, best: Motion, rng: CounterRng)
     Some(cheaper_sign(observations, narrow(observations, found, INLIER)))
 }
 
-/// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey only because others do.
+/// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey
+/// only because others do.
 pub(super) fn rivals(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<Rival> {
     let (n, best) = (observations.n as f64, candidates[0]);
     let obeys_best = obeying(observations, &best.0);

@@ -63,7 +63,8 @@ fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
 
 /// Every direction with its best rotation and cost `sum min((e / bound)^2, 1)`.
 ///
-/// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of its own, at least `least`, else the share `spacing` of its flow.
+/// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of
+/// its own, at least `least`, else the share `spacing` of its flow.
 pub(super) fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
     let chosen = sample(observations.n, SEARCHED, rng.stream(0));
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();

@@ -1,7 +1,9 @@
 //! How likely a point that obeys is a stray that does so by chance, by how odd its depth is.
 //!
-//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and strays, which know nothing of the motion, `b` in every unit of residual. Those a little farther from their epipolar lines than inliers are tell `b`; what is left of those that obey tells `h`. A point is an inlier with the probability
-//! `h phi(e) / (h phi(e) + b)`.
+//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and strays,
+//! which know nothing of the motion, `b` in every unit of residual. Those a little farther from their
+//! epipolar lines than inliers are tell `b`; what is left of those that obey tells `h`. A point is an inlier
+//! with the probability `h phi(e) / (h phi(e) + b)`.
 
 use super::INLIER;
 use std::ops::Range;
@@ -29,7 +31,8 @@ const NONE: u8 = u8::MAX;
 /// Bins from here on are odd enough to be left out where strays are the most of them.
 const TAIL: usize = 4;
 
-/// How rarely, of all estimates, strays alone may make odd depths so many: each one that is kept wrongly decides nearly alone.
+/// How rarely, of all estimates, strays alone may make odd depths so many: each one that is kept wrongly
+/// decides nearly alone.
 const RARE: f64 = 1e-3;
 
 /// A point that is counted.
@@ -47,7 +50,8 @@ pub(super) struct Bin {
 /// What points of one bin are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Odds {
-    /// `b / h`: strays in a unit of residual for every inlier; infinite where strays explain all of the points.
+    /// `b / h`: strays in a unit of residual for every inlier; infinite where strays explain all of the
+    /// points.
     pub strays: f64,
     /// The information of an inlier's residual relative to that without strays, for each that obeys.
     pub told: f64,
@@ -71,7 +75,8 @@ pub(super) fn normal(e: f64) -> f64 {
 /// The share of a normal distribution within the limit of inliers.
 const WITHIN: f64 = 0.997_300_2;
 
-/// `int phi^2 e^2 / (phi + strays) de` over what obeys: the mean of `g e^2` of inliers, which by parts is the mean slope of `g e`, jumps at the limit included, too.
+/// `int phi^2 e^2 / (phi + strays) de` over what obeys: the mean of `g e^2` of inliers, which by parts is the
+/// mean slope of `g e`, jumps at the limit included, too.
 fn told(strays: f64) -> f64 {
     const STEPS: i32 = 60;
     let step = 2.0 * INLIER / f64::from(STEPS);
@@ -84,7 +89,8 @@ fn told(strays: f64) -> f64 {
     (0..=STEPS).map(value).sum::<f64>() * step / WITHIN
 }
 
-/// How often, of strays alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each obeys with the share that the strip of inliers has, `wider` times that of the band.
+/// How often, of strays alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each
+/// obeys with the share that the strip of inliers has, `wider` times that of the band.
 fn by_chance(obeying: usize, beside: usize, wider: f64) -> f64 {
     let (n, p) = (obeying + beside + 1, wider / (1.0 + wider));
     // Terms of the binomial distribution, from all of them down to none of the others.
@@ -109,7 +115,8 @@ fn bin(deviation: f64) -> usize {
 }
 
 impl Strays {
-    /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier has.
+    /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier
+    /// has.
     pub fn new(n: usize, far: usize, points: impl Iterator<Item = Bin>) -> Self {
         let mut bins = vec![NONE; n];
         let (mut obeying, mut beside) = ([0usize; BINS], [0usize; BINS]);
@@ -148,7 +155,8 @@ impl Strays {
         Self { bins, odds, dropped, share }
     }
 
-    /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and strays than among strays alone.
+    /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and strays than
+    /// among strays alone.
     pub fn gain(&self, k: usize, e: f64) -> f64 {
         self.of(k).map_or(0.0, |odds| 2.0 * (normal(e) / odds.strays.max(LEAST)).ln_1p())
     }
@@ -159,7 +167,8 @@ impl Strays {
         bin != NONE && !self.dropped[bin as usize]
     }
 
-    /// The odds of a point; `None` where it is farther from its line than any that was counted, or strays explain it.
+    /// The odds of a point; `None` where it is farther from its line than any that was counted, or strays
+    /// explain it.
     pub fn of(&self, k: usize) -> Option<Odds> {
         let bin = self.bins[k];
         (bin != NONE).then(|| self.odds[bin as usize]).filter(|odds| odds.strays.is_finite())
@@ -179,7 +188,8 @@ mod tests {
         assert_eq!(bin(-2.5), SIZES + 4);
     }
 
-    /// A quarter of the variance is not told where strays are a third of what obeys; without strays only what lies beyond the limit is missing.
+    /// A quarter of the variance is not told where strays are a third of what obeys; without strays only what
+    /// lies beyond the limit is missing.
     #[test]
     fn strays_take_information_away() {
         assert!((told(0.0) - 0.9733).abs() < 1e-3, "{}", told(0.0));
@@ -200,7 +210,8 @@ mod tests {
         }
     }
 
-    /// A hundred points with an odd depth stay without strays, and among as many others; ten among strays that explain them do not.
+    /// A hundred points with an odd depth stay without strays, and among as many others; ten among strays
+    /// that explain them do not.
     #[test]
     fn odd_depths_are_strays_where_these_are_as_many() {
         let run = |odd: u32, beside: u32| {

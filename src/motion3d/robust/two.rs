@@ -48,7 +48,8 @@ impl Division {
         halves.into_iter().map(|places| self.tree.order()[places].to_vec()).collect()
     }
 
-    /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or nearly so; `None` where one of both loses its points.
+    /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or
+    /// nearly so; `None` where one of both loses its points.
     pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<Two> {
         let mut second = vec![false; self.points.n];
         for &k in part {

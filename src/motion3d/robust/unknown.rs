@@ -1,6 +1,8 @@
 //! The noise that the inliers leave, where it is not told.
 //!
-//! It is a fixed point of its own estimate, and there may be several: with a thing that moves by itself, one at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the same sign as their neighbours', which those of noise do not.
+//! It is a fixed point of its own estimate, and there may be several: with a thing that moves by itself, one
+//! at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the
+//! same sign as their neighbours', which those of noise do not.
 
 use super::super::estimate::Scaled;
 use super::super::kernels::depths;
@@ -13,7 +15,8 @@ use crate::math::random::CounterRng;
 /// First guesses, in shares of the median flow: the next one where residuals go together.
 const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];
 
-/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal distribution cut there.
+/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal
+/// distribution cut there.
 const CUT: f64 = 2.5;
 const CUT_VARIANCE: f64 = 0.911;
 
@@ -66,7 +69,8 @@ fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
 /// By how many deviations the noise of points that obey must be larger than it is told.
 const LARGER: f64 = 4.0;
 
-/// What the noise of the points that obey is larger by, in variance, than is told, where chance does not explain it; 1 where errors are not independent.
+/// What the noise of the points that obey is larger by, in variance, than is told, where chance does not
+/// explain it; 1 where errors are not independent.
 pub(in super::super) fn larger(observations: &Observations, motion: &Motion) -> f64 {
     if !observations.independent {
         return 1.0;
@@ -76,7 +80,8 @@ pub(in super::super) fn larger(observations: &Observations, motion: &Motion) -> 
     if variance > 1.0 + chance { variance } else { 1.0 }
 }
 
-/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal distribution"; the five unknowns take their share away.
+/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal
+/// distribution"; the five unknowns take their share away.
 fn noise(residuals: &[f64]) -> f64 {
     let mut sigma = 1.0;
     for _ in 0..STEPS {

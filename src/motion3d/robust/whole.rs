@@ -1,4 +1,5 @@
-//! Whether few points have outliers at all: one motion of all of them in larger noise may be as good an explanation as one of the points that happen to agree.
+//! Whether few points have outliers at all: one motion of all of them in larger noise may be as good an
+//! explanation as one of the points that happen to agree.
 
 use super::super::kernels::depths;
 use super::super::likelihood::minima;
@@ -16,16 +17,21 @@ pub(super) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64>
 /// By how much the mean square may exceed what the median says of it.
 const TAILS: f64 = 1.5;
 
-/// Whether the lengths of two-dimensional residuals, NaN where there is none, are those of one normal distribution: few of points that are many times as large as most would make their mean square larger than their median has it, which is `2 ln 2` variances where the mean is two.
+/// Whether the lengths of two-dimensional residuals, NaN where there is none, are those of one normal
+/// distribution: few of points that are many times as large as most would make their mean square larger than
+/// their median has it, which is `2 ln 2` variances where the mean is two.
 pub(in super::super) fn one_noise(residuals: &[f64]) -> bool {
     let mut squares: Vec<f64> = residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).collect();
     let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
     mean <= TAILS * median(&mut squares) / std::f64::consts::LN_2
 }
 
-/// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present units of noise, for all points, less that with the noise of the inliers and the others anywhere.
+/// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present
+/// units of noise, for all points, less that with the noise of the inliers and the others anywhere.
 ///
-/// Lengths of descriptions (J. Rissanen 1978): `-ln` of the densities, that of an outlier uniform over the residuals' range, and `ln C(n, k)` for which points they are. A selection among few points makes residuals small that the unknowns do not account for.
+/// Lengths of descriptions (J. Rissanen 1978): `-ln` of the densities, that of an outlier uniform over the
+/// residuals' range, and `ln C(n, k)` for which points they are. A selection among few points makes residuals
+/// small that the unknowns do not account for.
 pub(super) fn shortening(observations: &Observations, found: &Consensus, sigma: f64) -> f64 {
     let (n, k) = (observations.n, found.inliers.len());
     if k >= n {

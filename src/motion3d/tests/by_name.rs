@@ -22,7 +22,8 @@ fn maximum_likelihood_tells_of_other_minima_too() {
     assert!(undecided >= 8 && sure <= 2, "{sure} of {undecided}");
 }
 
-/// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the epipole may lie among noisy points it is told how far it is from the better solution.
+/// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the
+/// epipole may lie among noisy points it is told how far it is from the better solution.
 #[test]
 fn maximum_likelihood_tells_how_far_it_may_be() {
     let ground = |_: f64, y: f64, _: f64| ground(y);

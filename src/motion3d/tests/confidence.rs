@@ -3,7 +3,8 @@
 use super::super::*;
 use super::scenes::{Scene, W, mahalanobis, oblique, smooth};
 
-/// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with the truth outside of the ellipsoid that holds 0.999.
+/// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with
+/// the truth outside of the ellipsoid that holds 0.999.
 fn silently_wrong(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
     let (mut confident, mut wrong) = (0u32, 0u32);
     for seed in 0..trials {
@@ -45,7 +46,8 @@ fn a_narrow_field_is_not_trusted() {
     assert!(confident > 240 && wrong * 100 <= confident, "{wrong} of {confident}");
 }
 
-/// A rotation that adds the same to all depths turns them round: in a narrow field a sideways motion has its opposite beside it.
+/// A rotation that adds the same to all depths turns them round: in a narrow field a sideways motion has its
+/// opposite beside it.
 #[test]
 fn the_opposite_motion_is_told_where_depths_do_not_exclude_it() {
     let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
@@ -75,7 +77,8 @@ fn many_points_are_no_reason_for_doubt() {
     assert!(trusted >= 11, "{trusted} of 12");
 }
 
-/// With noisy depths the deviation of a thousand points grows faster than by the root of their number: what they leave in doubt is asked of more.
+/// With noisy depths the deviation of a thousand points grows faster than by the root of their number: what
+/// they leave in doubt is asked of more.
 #[test]
 fn what_a_thousand_of_the_points_leave_in_doubt_is_asked_of_more() {
     let forward = Motion::new([0.05, -0.03, 1.0], W);

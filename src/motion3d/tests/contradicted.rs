@@ -66,7 +66,8 @@ fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
     }
 }
 
-/// The more surely a wrong rotation is told, the larger residuals it leaves: they are no reason to hear the flow less.
+/// The more surely a wrong rotation is told, the larger residuals it leaves: they are no reason to hear the
+/// flow less.
 #[test]
 fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
     for noise in [Noise::Sigma(0.01), Noise::Unknown] {

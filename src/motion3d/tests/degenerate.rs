@@ -111,7 +111,8 @@ fn a_plane_has_two_motions() {
 /// Places by number.
 type Layout<'a> = Box<dyn Fn(u64) -> [f64; 2] + 'a>;
 
-/// Points at one place, at two, on a line through the epipole: fewer than five unknowns are told of, whatever noise seems to add.
+/// Points at one place, at two, on a line through the epipole: fewer than five unknowns are told of, whatever
+/// noise seems to add.
 #[test]
 fn points_that_do_not_tell_of_all_unknowns() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
@@ -150,7 +151,8 @@ fn points_that_do_not_tell_of_all_unknowns() {
     }
 }
 
-/// Flow that is the same everywhere is a sideways motion before a wall, whose other motion has half of it behind the camera; no rotation makes it over so wide a field. None at all is none.
+/// Flow that is the same everywhere is a sideways motion before a wall, whose other motion has half of it
+/// behind the camera; no rotation makes it over so wide a field. None at all is none.
 #[test]
 fn the_same_flow_everywhere() {
     let points = Scene::oblique(200, 0.0, 3).points;
@@ -236,7 +238,8 @@ fn two_planes_are_no_trap() {
     assert!(found.motion.angle_to(&motion) < 1e-4, "{:?}", found.motion);
 }
 
-/// `a . X = X^t Q X` with `Q` symmetric has, with the flow of a motion, a second motion for eight linear equations: here nu = (eta^t Q eta) / (a . eta).
+/// `a . X = X^t Q X` with `Q` symmetric has, with the flow of a motion, a second motion for eight linear
+/// equations: here nu = (eta^t Q eta) / (a . eta).
 #[test]
 fn a_quadric_through_the_camera_is_no_trap() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);

@@ -13,7 +13,8 @@ fn turning(axis: usize, turn: f64) -> Motion {
     Motion::new([0.6, 0.2, 0.75], AXES[axis].map(|value| turn * value))
 }
 
-/// Two exact views: points of the first on the plane at distance 1, their displacement, and their inverse depths half way in time.
+/// Two exact views: points of the first on the plane at distance 1, their displacement, and their inverse
+/// depths half way in time.
 struct Views {
     points: Vec<[f64; 2]>,
     flow: Vec<[f64; 2]>,
@@ -26,7 +27,8 @@ fn views(motion: &Motion, n: usize, seed: u64, nu: impl Fn([f64; 2], f64) -> f64
     views_at(motion, n, seed, |k| [0, 1].map(|i| 1.2 * rng.uniform(3 * k + i) - 0.6), nu)
 }
 
-/// `at`: the place of a point in the first view; `nu`: the inverse depth there of a place, and of a random number.
+/// `at`: the place of a point in the first view; `nu`: the inverse depth there of a place, and of a random
+/// number.
 fn views_at(
     motion: &Motion,
     n: usize,
@@ -103,7 +105,8 @@ fn two_exact_views_give_the_exact_motion_and_depths() {
     }
 }
 
-/// Where the third order does not matter, nothing is turned: the result is that of instantaneous flow half way, but for which points are neighbours.
+/// Where the third order does not matter, nothing is turned: the result is that of instantaneous flow half
+/// way, but for which points are neighbours.
 #[test]
 fn slow_displacements_are_placed_half_way_and_left_alone() {
     let truth = turning(0, 0.02);
@@ -137,7 +140,8 @@ fn covariances_of_fast_turns_hold() {
     }
 }
 
-/// Points on one line of the picture determine the motion; a turn of a radian past near points fits them nearly as well, with most of the noise hidden in depths that change by as much as they are.
+/// Points on one line of the picture determine the motion; a turn of a radian past near points fits them
+/// nearly as well, with most of the noise hidden in depths that change by as much as they are.
 #[test]
 fn points_on_a_line_are_given_no_invented_turn() {
     let turns = CounterRng::new(77);
@@ -161,7 +165,8 @@ fn points_on_a_line_are_given_no_invented_turn() {
     }
 }
 
-/// Points on a curve, whose places half way hold the flow's noise across it: depths predicted from these would share it with the residuals, and pull the estimate.
+/// Points on a curve, whose places half way hold the flow's noise across it: depths predicted from these
+/// would share it with the residuals, and pull the estimate.
 #[test]
 fn smoothed_weights_are_as_good_on_a_curve() {
     let truth = Motion::new([0.35, 0.25, 1.0], [0.0; 3]);
@@ -256,7 +261,8 @@ fn exact_patches_give_the_exact_motion() {
     }
 }
 
-/// Whatever the flow is, as displacements in pixels of points on the plane at distance 1 are: rotations that lead all points behind the camera are no reason to stop.
+/// Whatever the flow is, as displacements in pixels of points on the plane at distance 1 are: rotations that
+/// lead all points behind the camera are no reason to stop.
 #[test]
 fn flow_that_no_rotation_can_be_taken_out_of_is_no_reason_to_stop() {
     for seed in 0..60 {

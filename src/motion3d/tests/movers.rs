@@ -8,7 +8,8 @@ fn options() -> MotionOptions {
     MotionOptions { robust: true, placement: Placement::Start, ..MotionOptions::default() }
 }
 
-/// Something large that overtakes moves along the camera's epipolar lines: together with the rest of the scene it can look like a sideways motion.
+/// Something large that overtakes moves along the camera's epipolar lines: together with the rest of the
+/// scene it can look like a sideways motion.
 #[test]
 fn a_robust_search_tells_what_else_many_points_obey() {
     let ahead = Motion::new([0.0, 0.0, -1.0], [0.0; 3]);
@@ -38,7 +39,8 @@ fn a_robust_search_tells_what_else_many_points_obey() {
     }
 }
 
-/// Points of a mover that obey the scene's motion by chance lie together and pull the same way: with a slow mover that is not seen in their residuals.
+/// Points of a mover that obey the scene's motion by chance lie together and pull the same way: with a slow
+/// mover that is not seen in their residuals.
 #[test]
 fn a_slow_mover_is_found_or_told() {
     let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
@@ -64,7 +66,8 @@ fn a_slow_mover_is_found_or_told() {
     assert!(silent <= 2 && trusted >= 11, "{silent} {trusted}");
 }
 
-/// A fifth of the points moves by itself: some of them obey the camera's motion by chance, and pull it their way. They lie among rejected ones.
+/// A fifth of the points moves by itself: some of them obey the camera's motion by chance, and pull it their
+/// way. They lie among rejected ones.
 #[test]
 fn points_among_rejected_ones_do_not_pull_the_motion() {
     let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
@@ -91,7 +94,9 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
     assert!(held.of >= 150 && held.honest() && wrong < 0.025, "{held:?}, {wrong}");
 }
 
-/// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene it may obey a third motion, at which every search ends. The residuals there are hardly larger than noise, but those of a part pull another way, and two motions explain the points better.
+/// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene
+/// it may obey a third motion, at which every search ends. The residuals there are hardly larger than noise,
+/// but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {
     let sigma = 1e-3;

@@ -37,7 +37,8 @@ fn ellipsoids_hold_the_truth_in_narrow_fields() {
     }
 }
 
-/// The same where the epipole may lie among noisy points, and of a wide field, of which nothing is added to speak of.
+/// The same where the epipole may lie among noisy points, and of a wide field, of which nothing is added to
+/// speak of.
 #[test]
 fn ellipsoids_hold_the_truth_around_the_epipole() {
     let [off, forward] = [[0.35, 0.25, 1.0], [0.05, -0.03, 1.0]].map(|u| Motion::new(u, [0.02, -0.03, 0.01]));
@@ -50,7 +51,8 @@ fn ellipsoids_hold_the_truth_around_the_epipole() {
     assert!(held.of >= 140 && (0.9..=0.985).contains(&held.share()), "{held:?}");
 }
 
-/// A motion forwards or backwards into a picture of 6 to 23 degrees, of which a search of the half sphere sees a few directions only.
+/// A motion forwards or backwards into a picture of 6 to 23 degrees, of which a search of the half sphere
+/// sees a few directions only.
 fn into_a_narrow_picture(seed: u64) -> Scene {
     let rng = CounterRng::new(9000 + seed);
     let h = 0.05 + 0.15 * rng.uniform(0);
@@ -75,7 +77,8 @@ fn minima_within_narrow_pictures_are_found() {
     assert!(sure >= 200, "{sure}");
 }
 
-/// Noise that is fifty times as large along one axis as along the other, as that of edges: valleys are as much narrower.
+/// Noise that is fifty times as large along one axis as along the other, as that of edges: valleys are as
+/// much narrower.
 #[test]
 fn minima_under_noise_that_is_far_from_round_are_found() {
     let mut held = Held::default();

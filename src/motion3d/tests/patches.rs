@@ -4,7 +4,8 @@ use super::super::*;
 use super::scenes::mahalanobis;
 use crate::math::random::CounterRng;
 
-/// `n` patches in `[-h, h]^2` on the plane at distance 1, seen with a focal length of 500 px: windows of `2 r + 1` px, noise of `sigma` px, 3 px of flow in the mean.
+/// `n` patches in `[-h, h]^2` on the plane at distance 1, seen with a focal length of 500 px: windows of `2 r
+/// + 1` px, noise of `sigma` px, 3 px of flow in the mean.
 struct Made {
     points: Vec<[f64; 2]>,
     motion: Vec<[f64; 6]>,
@@ -45,7 +46,8 @@ impl Made {
     }
 }
 
-/// How many estimates are confident, how many of those have the truth far outside of their ellipsoid, and how many go the opposite way.
+/// How many estimates are confident, how many of those have the truth far outside of their ellipsoid, and how
+/// many go the opposite way.
 fn silently_wrong(truth: &Motion, n: u64, h: f64, r: f64, sigma: f64, method: Method) -> (u32, u32, u32) {
     let (mut confident, mut wrong, mut opposite) = (0, 0, 0);
     for seed in 0..60 {

@@ -59,7 +59,8 @@ fn the_bound_is_that_of_pixels_too() {
     }
 }
 
-/// Section 5 of the paper: translation in the image plane, no rotation, one unknown; (29), (31), the bound and where the lines cross.
+/// Section 5 of the paper: translation in the image plane, no rotation, one unknown; (29), (31), the bound
+/// and where the lines cross.
 #[test]
 fn one_unknown_has_its_closed_forms() {
     let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
@@ -68,7 +69,8 @@ fn one_unknown_has_its_closed_forms() {
     near(bound.ones, 8.9109e-4, "(31)");
     near(bound.bound, 8.2128e-4, "bound");
     near(bound.crossover, 0.30369, "crossover");
-    // The same from the general forms, whose psi lies in the image plane once the other unknowns are taken out.
+    // The same from the general forms, whose psi lies in the image plane once the other unknowns are taken
+    // out.
     let at = vec![[0.0; 2]; 101];
     let flow = Flow::Plane { points: &at, flow: &at, camera: None };
     let observations = super::super::intake::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();

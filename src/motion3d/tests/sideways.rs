@@ -21,7 +21,8 @@ fn between(a: f64, b: f64) -> f64 {
     (a - b).sin().atan2((a - b).cos())
 }
 
-/// Mean squared errors over many trials: of maximum likelihood, of weights of 1, of shrunk weights; and the mean variances told.
+/// Mean squared errors over many trials: of maximum likelihood, of weights of 1, of shrunk weights; and the
+/// mean variances told.
 fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [f64; 3]) {
     let (nu, angle) = (depths(n), 2.2);
     let (mut errors, mut variances) = ([0.0; 3], [0.0; 3]);
@@ -61,7 +62,8 @@ fn few_points_in_large_noise_exceed_the_first_order() {
     assert!(errors[2] < 1.02 * errors[0].min(errors[1]), "{errors:?}");
 }
 
-/// Weights of 1 beat maximum likelihood above the crossover only; shrunk weights lie below both and above the bound.
+/// Weights of 1 beat maximum likelihood above the crossover only; shrunk weights lie below both and above the
+/// bound.
 #[test]
 fn the_lines_cross_where_they_are_said_to() {
     for depths in [depths(101), vec![0.4, 0.4, 1.6, 0.4, 1.6], vec![-0.2, 0.5, 2.0]] {
@@ -96,7 +98,8 @@ fn every_direction_comes_with_its_sign_and_depths() {
     }
 }
 
-/// The axis of maximum likelihood is where the flow across is least, that of all weights where their equation is zero.
+/// The axis of maximum likelihood is where the flow across is least, that of all weights where their equation
+/// is zero.
 #[test]
 fn estimates_solve_their_equations() {
     let flow = flow(&depths(60), 0.7, 0.4, 3);

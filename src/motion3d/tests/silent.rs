@@ -27,7 +27,8 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
     }
 }
 
-/// Of hardly visible depths half are behind the camera by noise alone, and a wrong motion may have fewer of them.
+/// Of hardly visible depths half are behind the camera by noise alone, and a wrong motion may have fewer of
+/// them.
 #[test]
 fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
     let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);

@@ -3,7 +3,10 @@
 use super::super::*;
 use super::scenes::{Scene, W, oblique, smooth};
 
-/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no others. (The direction's confidence interval may have no end in such noise: `ill_conditioned`; or another minimum comes as close.)
+/// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes
+/// maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no
+/// others. (The direction's confidence interval may have no end in such noise: `ill_conditioned`; or another
+/// minimum comes as close.)
 #[test]
 fn depths_that_are_mostly_noise_are_low_snr() {
     let forward = Motion::new([0.05, -0.03, 1.0], W);

@@ -4,7 +4,8 @@ use super::super::*;
 use super::scenes::{Scene, mahalanobis};
 use crate::math::random::CounterRng;
 
-/// A motion by chance, of points with depths from 0.5 to 1.5 of which a share has any flow up to four times the others'; noise in shares of that.
+/// A motion by chance, of points with depths from 0.5 to 1.5 of which a share has any flow up to four times
+/// the others'; noise in shares of that.
 fn among_outliers(outliers: f64, noise: f64, seed: u64) -> Scene {
     let rng = CounterRng::new(7000 + seed);
     let normal = |k: u64| [0, 1, 2].map(|j| rng.normal(3 * k + j));
@@ -43,7 +44,8 @@ fn strays_that_obey_are_in_the_covariance() {
     }
 }
 
-/// Few near things before a far background carry all of the translation: a depth that is odd is no stray where no strays are.
+/// Few near things before a far background carry all of the translation: a depth that is odd is no stray
+/// where no strays are.
 #[test]
 fn few_near_points_before_a_far_background_stay() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]);

@@ -1,6 +1,7 @@
 //! What residuals tell of errors: how large they are and how far they go together.
 //!
-//! A field's correlation length is that of its windows. What a scene does to flow (edges in depth, a texture that smoothing reaches across) goes together farther, and differs from field to field.
+//! A field's correlation length is that of its windows. What a scene does to flow (edges in depth, a texture
+//! that smoothing reaches across) goes together farther, and differs from field to field.
 
 use super::super::covariance::Matrix5;
 use super::super::kernels::depths;
@@ -10,10 +11,12 @@ use super::{REACH, Vector5, Weighted, correlation, slopes};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Residuals nearer than this many correlation lengths are compared: three times the usual distance of points.
+/// Residuals nearer than this many correlation lengths are compared: three times the usual distance of
+/// points.
 const NEAR: f64 = 6.0;
 
-/// Fewer points than this do not tell how far errors go together: by chance their residuals correlate as much.
+/// Fewer points than this do not tell how far errors go together: by chance their residuals correlate as
+/// much.
 const FEWEST: usize = 30;
 
 /// By how much the correlation length may be longer than told, and the steps in which that is looked for.
@@ -38,7 +41,9 @@ pub(super) struct Errors {
 impl Errors {
     /// `inverse`: that of the equations' information; `own`: the deviation of a point's own error.
     ///
-    /// Fitting a motion takes what looks like one out of the residuals: of errors with the correlations `R` they have the covariance `(I - H) R (I - H)^t`, `H = W A^-1 W^t`. The shortest stretch is taken for which that makes residuals of neighbours as alike as they are.
+    /// Fitting a motion takes what looks like one out of the residuals: of errors with the correlations `R`
+    /// they have the covariance `(I - H) R (I - H)^t`, `H = W A^-1 W^t`. The shortest stretch is taken for
+    /// which that makes residuals of neighbours as alike as they are.
     pub fn told_by_residuals(points: &Neighbourhood, inverse: &Matrix5, own: f64) -> Self {
         let squares: f64 = points.all.iter().map(|point| point.residual.powi(2)).sum();
         let near = points.near();
@@ -79,7 +84,8 @@ struct Near {
     alike: f64,
 }
 
-/// What residuals are expected to be: their squares, in units of the errors', and products of near ones in units of that.
+/// What residuals are expected to be: their squares, in units of the errors', and products of near ones in
+/// units of that.
 struct Expected {
     squares: f64,
     alike: f64,
@@ -140,7 +146,8 @@ impl Neighbourhood {
         near.map(move |(l, point)| (l, (point.place - here).norm()))
     }
 
-    /// Rows of the other points times their correlations with point `k`, and the correlations of the near ones added up.
+    /// Rows of the other points times their correlations with point `k`, and the correlations of the near
+    /// ones added up.
     fn correlated(&self, k: usize, stretch: f64) -> (Vector5, f64) {
         let (mut rows, mut near) = (Vector5::zeros(), 0.0);
         for (l, distance) in self.around(k, REACH * stretch) {
@@ -168,7 +175,8 @@ impl Neighbourhood {
         Near { rows: of_points.into_iter().map(|(rows, _)| rows).collect(), alike }
     }
 
-    /// With `U = R W`, `B = W^t U` and the rows `N` of neighbours added up, the products of near residuals are `sum R - 2 tr A^-1 U^t N + tr A^-1 B A^-1 W^t N`, and the squares the same with `N = W`.
+    /// With `U = R W`, `B = W^t U` and the rows `N` of neighbours added up, the products of near residuals
+    /// are `sum R - 2 tr A^-1 U^t N + tr A^-1 B A^-1 W^t N`, and the squares the same with `N = W`.
     fn expected(&self, near: &Near, inverse: &Matrix5, stretch: f64) -> Expected {
         let of_point = |k: usize| {
             let (rows, correlations) = self.correlated(k, stretch);
@@ -189,7 +197,8 @@ impl Neighbourhood {
         Expected { squares, alike: alike / squares }
     }
 
-    /// What is added up over all points, or over those that stand for them, and how many each of these stands for; in one order, whoever computes it.
+    /// What is added up over all points, or over those that stand for them, and how many each of these stands
+    /// for; in one order, whoever computes it.
     fn parts<S: Send>(&self, of_point: impl Fn(usize) -> S + Sync + Send) -> (Vec<S>, f64) {
         let step = self.all.len().div_ceil(ENOUGH).max(1);
         let chosen: Vec<usize> = (step / 2..self.all.len()).step_by(step).collect();

@@ -102,13 +102,13 @@ impl ParticleRun {
 
     /// Works through `source` and ends every sink, however the run ends.
     ///
-    /// `progress` is called with the number of frames read, at least once a frame and while waiting for one; its
-    /// error stops the run, and what is complete then stays.
+    /// `progress` is called with the number of frames read, at least once a frame and while waiting for one;
+    /// its error stops the run, and what is complete then stays.
     ///
     /// # Errors
     /// Those of the source, of `begin`, the tracker, the sinks and `progress`. [`Error::Argument`] named
-    /// `frames` for fewer than two frames or one of another size; named `box`, with the target's number, for a
-    /// box that cannot be followed.
+    /// `frames` for fewer than two frames or one of another size; named `box`, with the target's number, for
+    /// a box that cannot be followed.
     pub fn run(
         &mut self,
         source: Box<ColourSource>,

@@ -3,7 +3,7 @@ use super::super::stage::Output;
 use super::*;
 use crate::io::MemorySource;
 use crate::parallel::Silent;
-use crate::types::{AnyFrame, FieldLayout, FlowField, Frame, Sites};
+use crate::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -18,7 +18,7 @@ impl Stage<f32> for Means {
         self.0 += 1;
         let layout = FieldLayout {
             frame_size: frame.size(),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "translational".into(),
             parameters: vec!["u".into(), "v".into()],
             frame_period: None,

@@ -61,7 +61,8 @@ pub struct EgomotionPlan {
     pub field: FieldOptions,
     /// How the motion is estimated.
     pub motion: MotionOptions,
-    /// What the thing in the field options' region may turn by itself, rad/frame: its rotation is then known beforehand as that of the rest of the scene. `None`: nothing is known of it.
+    /// What the thing in the field options' region may turn by itself, rad/frame: its rotation is then known
+    /// beforehand as that of the rest of the scene. `None`: nothing is known of it.
     pub turning: Option<f64>,
     /// Where rows go.
     pub target: TableTarget,
@@ -73,8 +74,10 @@ pub struct EgomotionPlan {
     pub maps: Option<PathBuf>,
 }
 
-/// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame) and time
-/// to contact (frames) of all points together, and the Cramér-Rao bound; other motions that explain the flow as well into a table of their own.
+/// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation
+/// rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame)
+/// and time to contact (frames) of all points together, and the Cramér-Rao bound; other motions that explain
+/// the flow as well into a table of their own.
 #[derive(Debug)]
 pub struct Egomotion {
     plan: EgomotionPlan,

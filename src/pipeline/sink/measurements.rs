@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::flow::derived::{Quantity, fit_region, value_and_std};
 use crate::io::cell;
 use crate::math::Real;
-use crate::types::{FlowField, Sites};
+use crate::types::{FlowField, SamplingGrid};
 use std::path::PathBuf;
 
 /// Columns of the table.
@@ -14,8 +14,9 @@ const HEADER: [&str; 9] = ["frame", "time_s", "x", "y", "quantity", "value", "st
 
 /// Writes `frame, time_s, x, y, quantity, value, std, unit, valid_share`.
 ///
-/// A grid of sites is one region: [`fit_region`] gives its motion, and `x`, `y` is its centre. A list of points has a row for each point. A quantity
-/// that cannot be had is NaN. Without a frame rate the time is empty and units are per frame.
+/// A grid of sites is one region: [`fit_region`] gives its motion, and `x`, `y` is its centre. A list of
+/// points has a row for each point. A quantity that cannot be had is NaN. Without a frame rate the time is
+/// empty and units are per frame.
 #[derive(Debug)]
 pub struct Measurements {
     table: Table,
@@ -81,7 +82,7 @@ impl<T: Real> Sink<T> for Measurements {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let field = step.field;
         self.check(field)?;
-        if let Sites::Points(points) = &field.layout.sites {
+        if let SamplingGrid::Points(points) = &field.layout.sites {
             for (site, &(x, y)) in points.iter().enumerate() {
                 let m = field.affine(site).to_array().map(Real::to_f64);
                 let share = f64::from(u8::from(field.status[site].is_valid()));

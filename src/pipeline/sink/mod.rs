@@ -47,7 +47,8 @@ pub trait Sink<T>: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and removes the rest.
+    /// Called once at the end, however the run ended: brings what is complete under its final name and
+    /// removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.

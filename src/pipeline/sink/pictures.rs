@@ -7,18 +7,20 @@ use crate::image::picture::{FlowColours, Picture, Quiver, SignedMap, arrows_on_g
 use crate::io::write_picture;
 use crate::math::Real;
 use crate::pipeline::output::{OutputPlan, PictureKind, Place, too_many};
-use crate::types::{AnyFrame, FlowField, Frame, Sites};
+use crate::types::{AnyFrame, FlowField, Frame, SamplingGrid};
 use std::path::PathBuf;
 
 /// Pixels between arrows.
 const ARROW_SPACING: usize = 16;
 
-/// Ranges of the pictures of a run; `None`: from the first field with an estimate, then kept, so that the frames of a run can be compared.
+/// Ranges of the pictures of a run; `None`: from the first field with an estimate, then kept, so that the
+/// frames of a run can be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PictureRanges {
     /// Speed of the full colour, in the field's unit; also sets the arrows' scale.
     pub speed: Option<f64>,
-    /// Divergence or curl of the strongest red and blue, 1/s where the frame rate is known, else 1/frame; one range for both, so that they can be compared.
+    /// Divergence or curl of the strongest red and blue, 1/s where the frame rate is known, else 1/frame; one
+    /// range for both, so that they can be compared.
     pub rate: Option<f64>,
 }
 
@@ -84,7 +86,8 @@ impl Pictures {
         Ok(picture)
     }
 
-    /// A diverging map of a quantity. The first known field sets the range of the run: that of the wider one of divergence and curl.
+    /// A diverging map of a quantity. The first known field sets the range of the run: that of the wider one
+    /// of divergence and curl.
     fn signed<T: Real>(&mut self, field: &FlowField<T>, quantity: Quantity) -> Result<Picture> {
         let values = plane(field, quantity)?;
         if self.ranges.rate.is_none() && is_known(&values) {
@@ -115,8 +118,8 @@ fn is_known<T: Real>(plane: &[T]) -> bool {
 
 fn stride<T>(field: &FlowField<T>) -> usize {
     match field.layout.sites {
-        Sites::Grid { stride, .. } => stride,
-        Sites::Points(_) => 1,
+        SamplingGrid::Grid { stride, .. } => stride,
+        SamplingGrid::Points(_) => 1,
     }
 }
 

@@ -1,7 +1,8 @@
 //! Rows of CSV tables that grow while a run lasts.
 //!
-//! A file gets its name only when the run is complete. The rows of a run that was stopped are kept beside it, as `name.partial.csv`: nothing is
-//! lost, and nothing half is taken for whole. Standard output gets the rows of each frame at once.
+//! A file gets its name only when the run is complete. The rows of a run that was stopped are kept beside it,
+//! as `name.partial.csv`: nothing is lost, and nothing half is taken for whole. Standard output gets the rows
+//! of each frame at once.
 
 use super::{Ending, Sink, Step};
 use crate::error::Result;
@@ -34,7 +35,8 @@ impl TableTarget {
     }
 }
 
-/// A table that ends as a run ends. On standard output its header comes with the first row: a run that fails before that leaves nothing there.
+/// A table that ends as a run ends. On standard output its header comes with the first row: a run that fails
+/// before that leaves nothing there.
 #[derive(Debug)]
 pub struct Table {
     target: TableTarget,
@@ -111,7 +113,8 @@ impl Table {
     }
 }
 
-/// Ends a table by `finish(None)` under its own name, by `finish(Some(name))` under the partial one, or, without rows, by dropping it. The file that is in place then.
+/// Ends a table by `finish(None)` under its own name, by `finish(Some(name))` under the partial one, or,
+/// without rows, by dropping it. The file that is in place then.
 pub(in crate::pipeline) fn end_table(
     target: &TableTarget,
     ending: Ending,

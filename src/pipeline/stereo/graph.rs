@@ -58,8 +58,9 @@ impl StereoSink for GraphFile {
     }
 }
 
-/// Draws the graph as a PNG when the run ends: steps to the right, a lane for each component, nodes in the colours of their tracks and as large as their number of pixels, arcs
-/// that tracks follow as wide as their scores. That of a run that was stopped goes to `name.partial.png`.
+/// Draws the graph as a PNG when the run ends: steps to the right, a lane for each component, nodes in the
+/// colours of their tracks and as large as their number of pixels, arcs that tracks follow as wide as their
+/// scores. That of a run that was stopped goes to `name.partial.png`.
 #[derive(Debug)]
 pub struct GraphChart {
     path: PathBuf,

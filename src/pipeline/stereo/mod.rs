@@ -1,4 +1,5 @@
-//! From pairs of views to tracks of everything that moves: views, preparation, grey levels, the stereo tracker, sinks; one pair at a time.
+//! From pairs of views to tracks of everything that moves: views, preparation, grey levels, the stereo
+//! tracker, sinks; one pair at a time.
 
 mod graph;
 mod overlay;
@@ -32,7 +33,8 @@ const LEAST_PAIRS: usize = 2;
 pub struct StereoStep<'a> {
     /// Index of the pair in the input.
     pub frame_index: usize,
-    /// Its time, s from the first frame of the input; `None` where neither the frame rate nor its time is known.
+    /// Its time, s from the first frame of the input; `None` where neither the frame rate nor its time is
+    /// known.
     pub time: Option<f64>,
     /// The left view as it came.
     pub left: &'a AnyFrame,
@@ -48,7 +50,8 @@ pub trait StereoSink: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &StereoStep<'_>) -> Result<()>;
 
-    /// Called once at the end, however the run ended, with the clusters of all steps: brings what is complete under its final name and removes the rest.
+    /// Called once at the end, however the run ended, with the clusters of all steps: brings what is complete
+    /// under its final name and removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -111,10 +114,12 @@ impl StereoRun {
 
     /// Works through `pairs` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of pairs taken, at least once a pair and while waiting for one; its error stops the run, and what is complete then stays.
+    /// `progress` is told the number of pairs taken, at least once a pair and while waiting for one; its
+    /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
-    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named `frames` for fewer than two pairs.
+    /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named
+    /// `frames` for fewer than two pairs.
     pub fn run(&mut self, mut pairs: GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(&mut pairs, begin, progress);

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 pub enum StereoPicture {
     /// Edge pixels in the colours of their tracks, tracks' numbers, motions since the last step.
     Clusters,
-    /// Edge pixels in colours of their disparity, from blue at the first (far) to red at the second (near), px.
+    /// Edge pixels in colours of their disparity, from blue at the first (far) to red at the second (near),
+    /// px.
     Disparities(f64, f64),
 }
 
@@ -75,17 +76,20 @@ pub struct StereoOverlays {
 }
 
 impl StereoOverlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of `frame_rate` frames per second that appears when it is finished.
-    /// Pictures are `enlargement` times as large as the views.
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// `frame_rate` frames per second that appears when it is finished. Pictures are `enlargement` times as
+    /// large as the views.
     ///
     /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
+    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: &Path, kind: StereoPicture, enlargement: usize, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path, kind.stem(), kind.argument(), frame_rate)?;
         Ok(Self { album, kind, enlargement, range: None })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film
+    /// that exists. Nothing is made.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay` or `disparity_overlay`.

@@ -17,7 +17,8 @@ pub struct GreyPair {
     pub grey: [Frame<f32>; 2],
 }
 
-/// Reads pairs ahead, on a thread of their own, and prepares them. The first views decide what the white of floats is, unless they are too dark to.
+/// Reads pairs ahead, on a thread of their own, and prepares them. The first views decide what the white of
+/// floats is, unless they are too dark to.
 pub struct GreyPairs {
     pairs: Prefetch<[AnyFrame; 2]>,
     total: usize,
@@ -41,7 +42,8 @@ impl GreyPairs {
         self.total
     }
 
-    /// The next pair, after `done` of them; `None` after the last. `progress` is asked at least once, and while there is none yet.
+    /// The next pair, after `done` of them; `None` after the last. `progress` is asked at least once, and
+    /// while there is none yet.
     ///
     /// # Errors
     /// Those of the views and of `progress`.

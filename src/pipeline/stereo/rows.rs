@@ -68,8 +68,9 @@ const COLUMNS: [&str; 32] = [
     "velocity_z",
 ];
 
-/// Writes a row for every cluster and step. Numbers read back exactly; what is not known is `nan`. A file gets its name when the run is complete; the rows of a run that
-/// was stopped are kept beside it, as `name.partial.csv`.
+/// Writes a row for every cluster and step. Numbers read back exactly; what is not known is `nan`. A file
+/// gets its name when the run is complete; the rows of a run that was stopped are kept beside it, as
+/// `name.partial.csv`.
 ///
 /// | columns | unit |
 /// |---|---|

@@ -14,7 +14,8 @@ pub struct PairTimes {
 }
 
 impl PairTimes {
-    /// From the times of all pairs of the input, s; `numbering` says which of them are used. An ordinary step is the median of theirs.
+    /// From the times of all pairs of the input, s; `numbering` says which of them are used. An ordinary step
+    /// is the median of theirs.
     ///
     /// # Errors
     /// [`Error::Argument`] named `times` for fewer than two that are used, and for those that do not ascend.

@@ -1,4 +1,5 @@
-//! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in bounded memory.
+//! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in
+//! bounded memory.
 
 mod overlay;
 mod rows;
@@ -43,7 +44,8 @@ pub trait TrackSink: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and removes the rest.
+    /// Called once at the end, however the run ended: brings what is complete under its final name and
+    /// removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -53,7 +55,8 @@ pub trait TrackSink: Send {
     fn files(&self) -> (usize, Option<PathBuf>);
 }
 
-/// What a run begins with. Sinks come with the trackers, so that no file is begun for targets that cannot be followed.
+/// What a run begins with. Sinks come with the trackers, so that no file is begun for targets that cannot be
+/// followed.
 pub struct Begun {
     /// One tracker a target.
     pub trackers: Vec<Box<dyn Tracker>>,
@@ -92,7 +95,8 @@ pub struct TrackSummary {
     pub seconds: f64,
 }
 
-/// A run: frames in, tracks out. Targets are followed independently of each other, in parallel; the result does not depend on the number of threads.
+/// A run: frames in, tracks out. Targets are followed independently of each other, in parallel; the result
+/// does not depend on the number of threads.
 #[derive(Default)]
 pub struct TrackRun {
     preprocess: Preprocess,
@@ -124,13 +128,15 @@ impl TrackRun {
         self.summary.clone()
     }
 
-    /// Works through `source` and ends every sink, however the run ends. `begin` makes trackers and sinks; the trackers' state at the first frame is
-    /// the first row.
+    /// Works through `source` and ends every sink, however the run ends. `begin` makes trackers and sinks;
+    /// the trackers' state at the first frame is the first row.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its error stops the run, and what is complete then stays.
+    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
-    /// Those of the source, of `begin`, the trackers, the sinks and `progress`; [`Error::Argument`] named `frames` for fewer than two frames or one of another size.
+    /// Those of the source, of `begin`, the trackers, the sinks and `progress`; [`Error::Argument`] named
+    /// `frames` for fewer than two frames or one of another size.
     pub fn run(&mut self, source: Box<dyn FrameSource>, begin: Begin<'_>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(source, begin, progress);

@@ -14,7 +14,8 @@ pub const PATH_LENGTH: usize = 1000;
 /// First word of the files' names.
 const STEM: &str = "track";
 
-/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one film.
+/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one
+/// film.
 #[derive(Debug)]
 pub struct Overlays {
     album: Album,
@@ -24,16 +25,19 @@ pub struct Overlays {
 }
 
 impl Overlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of `frame_rate` frames per second that appears when it is finished.
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
+    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film
+    /// that exists. Nothing is made.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay`.

@@ -80,8 +80,8 @@ pub(in crate::pipeline) struct Row<'a> {
     pub further: Vec<String>,
 }
 
-/// Rows that end as a run ends. A file gets its name when the run is complete; the rows of a run that was stopped are kept beside it, as
-/// `name.partial.csv`. Standard output gets the rows of each frame at once.
+/// Rows that end as a run ends. A file gets its name when the run is complete; the rows of a run that was
+/// stopped are kept beside it, as `name.partial.csv`. Standard output gets the rows of each frame at once.
 #[derive(Debug)]
 pub(in crate::pipeline) struct RowWriter {
     target: TableTarget,
@@ -118,8 +118,9 @@ impl RowWriter {
     }
 }
 
-/// Writes a row for every target and frame. A file gets its name when the run is complete; the rows of a run that was stopped are kept beside it, as
-/// `name.partial.csv`. Standard output gets the rows of each frame at once.
+/// Writes a row for every target and frame. A file gets its name when the run is complete; the rows of a run
+/// that was stopped are kept beside it, as `name.partial.csv`. Standard output gets the rows of each frame at
+/// once.
 #[derive(Debug)]
 pub struct TrackRows {
     rows: RowWriter,

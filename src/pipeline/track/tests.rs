@@ -7,7 +7,8 @@ use crate::pipeline::{TableTarget, TextFormat, peek};
 use crate::types::TargetBox;
 use std::path::Path;
 
-/// Goes one pixel to the right a frame, takes the frame's brightness for its gain, and fails at a frame of one brightness.
+/// Goes one pixel to the right a frame, takes the frame's brightness for its gain, and fails at a frame of
+/// one brightness.
 struct Walker(TrackState);
 
 impl Walker {

@@ -6,7 +6,7 @@ use crate::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
 use crate::flow::instantaneous::InstantaneousOptions;
 use crate::flow::model::ModelKind;
 use crate::flow::windowed::{RowSet, WindowedOptions};
-use crate::flow::{Common, Estimator, Method, RankPolicy};
+use crate::flow::{Estimator, EstimatorOptions, Method, RankPolicy};
 use crate::image::Preprocess;
 use crate::jet::{Neighbourhood, TimeScheme};
 use crate::python::arrays::{self, ColourRule};
@@ -98,9 +98,9 @@ impl Arguments {
         !matches!(Method::parse(&self.method), Ok(Method::Instantaneous(_)))
     }
 
-    fn common(&self, py: Python<'_>, has_covariance: bool) -> PyResult<Common> {
-        let default = Common::default();
-        Ok(Common {
+    fn common(&self, py: Python<'_>, has_covariance: bool) -> PyResult<EstimatorOptions> {
+        let default = EstimatorOptions::default();
+        Ok(EstimatorOptions {
             sites: options::sites(py, &self.points, self.region, self.stride)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
@@ -201,7 +201,8 @@ impl Arguments {
         named.map_err(|_| unknown_scheme(self, "central or pair"))
     }
 
-    /// Baselines and the windowed method have one model each; "affine" is also what everybody gets who does not choose.
+    /// Baselines and the windowed method have one model each; "affine" is also what everybody gets who does
+    /// not choose.
     fn expect_model(&self, only: &str) -> Result<()> {
         ModelKind::parse(&self.model)?;
         if self.model == only || self.model == ModelKind::default().name() {

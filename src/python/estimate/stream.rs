@@ -17,8 +17,9 @@ use std::collections::VecDeque;
 
 /// Flow from a stream: frames are pushed one by one, memory stays bounded.
 ///
-/// The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-/// (two with time_scheme="pair"). With temporal="recursive" each field holds what all frames so far tell. Pickles in mid-stream.
+/// The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as
+/// soon as three frames have (two with time_scheme="pair"). With temporal="recursive" each field holds what
+/// all frames so far tell. Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowEstimator {
     arguments: Arguments,
@@ -30,7 +31,8 @@ estimator_options!(constructor [FlowEstimator from Arguments]);
 
 #[pymethods]
 impl FlowEstimator {
-    /// Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have come, before that None.
+    /// Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
+    /// come, before that None.
     ///
     /// A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<Option<FlowField>> {

@@ -14,16 +14,21 @@ const ROUNDING: f64 = 1e-9;
 
 #[pymethods]
 impl FlowField {
-    /// Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its fields, (T + 1, N, 2), beginning with `points`.
+    /// Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
+    /// fields, (T + 1, N, 2), beginning with `points`.
     ///
-    /// `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites the flow is bilinear in what the four sites about a point
-    /// say of it by flow and Jacobian: affine motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+    /// `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
+    /// the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
+    /// motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
     ///
-    /// With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes
-    /// (I + M) C (I + M)^T with the Jacobian M, plus the covariance of the flow there where the field has one: errors of the flow are taken as independent of
-    /// the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain points.
+    /// With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance
+    /// (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes (I + M) C (I + M)^T with the Jacobian M, plus the
+    /// covariance of the flow there where the field has one: errors of the flow are taken as independent of
+    /// the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
+    /// points.
     ///
-    /// A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other shapes, and for matrices that are no covariance.
+    /// A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
+    /// shapes, and for matrices that are no covariance.
     #[pyo3(signature = (points, covariance=None))]
     fn advect<'py>(
         &self,

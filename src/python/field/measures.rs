@@ -14,19 +14,22 @@ impl FlowField {
         self.value(py, "divergence")
     }
 
-    /// Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns clockwise on the screen.
+    /// Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
+    /// clockwise on the screen.
     #[getter]
     fn curl<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "curl")
     }
 
-    /// Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    /// Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
+    /// period.
     #[getter]
     fn shear_magnitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "shear_magnitude")
     }
 
-    /// Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in (-pi/2, pi/2], from x towards y.
+    /// Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in
+    /// (-pi/2, pi/2], from x towards y.
     #[getter]
     fn shear_axis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "shear_axis")
@@ -56,7 +59,8 @@ impl FlowField {
         self.value(py, "angular_velocity")
     }
 
-    /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or frame_period.
+    /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
+    /// frame_period.
     #[getter]
     fn rpm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "rpm")
@@ -68,7 +72,8 @@ impl FlowField {
         self.value(py, "centre_distance")
     }
 
-    /// Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W), frames, or s with a frame period; negative while it recedes.
+    /// Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W),
+    /// frames, or s with a frame period; negative while it recedes.
     #[getter]
     fn time_to_contact<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, "time_to_contact")
@@ -80,18 +85,22 @@ impl FlowField {
         self.value(py, "speed")
     }
 
-    /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
+    /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of
+    /// the pixel pitch.
     ///
-    /// It need not be in the picture. NaN where there is none. `value` and `std` take its parts, rotation_centre_x and rotation_centre_y.
+    /// It need not be in the picture. NaN where there is none. `value` and `std` take its parts,
+    /// rotation_centre_x and rotation_centre_y.
     #[getter]
     fn rotation_centre<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let both = (self.value(py, "rotation_centre_x")?, self.value(py, "rotation_centre_y")?);
         py.import("numpy")?.call_method1("stack", (both, -1))
     }
 
-    /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)` tells.
+    /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
+    /// tells.
     ///
-    /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm without a frame period.
+    /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm
+    /// without a frame period.
     fn value<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         each!(self.store, packed => {
             let mut data = Vec::new();
@@ -103,7 +112,8 @@ impl FlowField {
         })
     }
 
-    /// Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its unit: sqrt(g^T Cov g) with its gradient g.
+    /// Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its
+    /// unit: sqrt(g^T Cov g) with its gradient g.
     ///
     /// ValueError for another name and for a field without covariance.
     fn std<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -117,10 +127,13 @@ impl FlowField {
         })
     }
 
-    /// One number for a region: (value, standard deviation, number of sites) of the parameter or derived quantity `name`, in its unit.
+    /// One number for a region: (value, standard deviation, number of sites) of the parameter or derived
+    /// quantity `name`, in its unit.
     ///
-    /// `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-    /// The standard deviation allows for the correlation of neighbouring estimates, and for an error that they have in common: what they claim and do not scatter. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+    /// `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the
+    /// covariance, "median" does without. The standard deviation allows for the correlation of neighbouring
+    /// estimates, and for an error that they have in common: what they claim and do not scatter. A single
+    /// field only. ValueError for unknown names and for "inverse_variance" without covariance.
     #[pyo3(signature = (name, region=None, aggregate=None))]
     fn region_mean(
         &self,
@@ -139,7 +152,8 @@ impl FlowField {
         })
     }
 
-    /// Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name.
+    /// Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another
+    /// name.
     fn unit(&self, name: &str) -> PyResult<&'static str> {
         Ok(derived::unit(self.layout(), name)?)
     }

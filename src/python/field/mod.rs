@@ -1,4 +1,5 @@
-//! `FlowField`: flow, Jacobian, covariance and status of one frame or of a stack, as arrays that share the core's memory.
+//! `FlowField`: flow, Jacobian, covariance and status of one frame or of a stack, as arrays that share the
+//! core's memory.
 
 mod advect;
 mod derived;
@@ -10,7 +11,7 @@ mod state;
 use super::arrays;
 use crate::error::Error;
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField as CoreField, MOTION_NAMES, Sites};
+use crate::types::{FieldLayout, FlowField as CoreField, MOTION_NAMES, SamplingGrid};
 use numpy::Element;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -57,8 +58,9 @@ impl Stored for f64 {
 
 /// Flow with its Jacobian, covariance and status: the result of every estimator.
 ///
-/// Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field of a stack. Flow in px/frame, derivatives in
-/// 1/frame (or in units of `pixel_pitch`). NaN where `status` says why. Most arrays are read-only views that share memory.
+/// Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field
+/// of a stack. Flow in px/frame, derivatives in 1/frame (or in units of `pixel_pitch`). NaN where `status`
+/// says why. Most arrays are read-only views that share memory.
 #[pyclass(name = "FlowField", module = "jacoflow", frozen)]
 pub struct FlowField {
     store: Store,
@@ -103,7 +105,7 @@ impl FlowField {
     fn shape(&self) -> Vec<usize> {
         let (width, height) = self.size();
         let mut shape = if self.stack { vec![self.count] } else { vec![] };
-        if matches!(self.layout().sites, Sites::Points(_)) {
+        if matches!(self.layout().sites, SamplingGrid::Points(_)) {
             shape.push(width);
         } else {
             shape.extend([height, width]);
@@ -118,7 +120,7 @@ impl FlowField {
         let sites = width * height;
         let mut shape = this.shape();
         let mut strides = if this.stack { vec![slice.planes * sites] } else { vec![] };
-        if matches!(this.layout().sites, Sites::Points(_)) {
+        if matches!(this.layout().sites, SamplingGrid::Points(_)) {
             strides.push(1);
         } else {
             strides.extend([width, 1]);
@@ -131,7 +133,8 @@ impl FlowField {
         arrays::view(slf.as_any(), slice.data.get(first..).unwrap_or_default(), &shape, &strides)
     }
 
-    /// The planes of the affine parameters `first + sum(tail)`: a view where the model has them, a new array where it assumes them.
+    /// The planes of the affine parameters `first + sum(tail)`: a view where the model has them, a new array
+    /// where it assumes them.
     fn motion_slice<'py>(slf: &Bound<'py, Self>, first: usize, tail: &[(usize, usize)]) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.get();
         let is_affine = this.layout().parameters.iter().map(String::as_str).eq(MOTION_NAMES);

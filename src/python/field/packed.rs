@@ -5,7 +5,8 @@ use crate::math::Real;
 use crate::python::spare;
 use crate::types::{FieldLayout, FlowField as CoreField, Status};
 
-/// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1, and so on.
+/// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1,
+/// and so on.
 #[derive(Debug, Clone)]
 pub struct Packed<T: Real> {
     /// Layout of the first field; the frame index counts up from it.
@@ -67,7 +68,7 @@ impl<T: Real> Packed<T> {
         Ok(())
     }
 
-    /// Sites of one field.
+    /// SamplingGrid of one field.
     pub fn sites(&self) -> usize {
         self.width * self.height
     }

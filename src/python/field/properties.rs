@@ -2,7 +2,7 @@
 
 use super::{FlowField, Slice, Store, each, state};
 use crate::python::{arrays, io};
-use crate::types::{Sites, Status};
+use crate::types::{SamplingGrid, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice, PyTuple};
@@ -10,7 +10,8 @@ use std::path::PathBuf;
 
 #[pymethods]
 impl FlowField {
-    /// Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of `pixel_pitch` per frame.
+    /// Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of
+    /// `pixel_pitch` per frame.
     ///
     /// NaN where `status` says why. A read-only view.
     #[getter]
@@ -62,7 +63,8 @@ impl FlowField {
         Self::motion_slice(slf, 5, &[])
     }
 
-    /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None if it was not asked for.
+    /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
+    /// if it was not asked for.
     ///
     /// Rows and columns of parameters that the model lacks are zero. A new array at every access.
     #[getter]
@@ -95,7 +97,8 @@ impl FlowField {
         Ok(arrays::owned::<bool>(slf.py(), &this.shape(), valid)?.into_any())
     }
 
-    /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has none.
+    /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
+    /// none.
     #[getter]
     fn residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
         each!(slf.get().store, packed => packed.residual.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
@@ -107,15 +110,18 @@ impl FlowField {
         each!(slf.get().store, packed => packed.rank.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
     }
 
-    /// Condition number of the equations (largest over smallest singular value), array (..., H, W); None if the method has none.
+    /// Condition number of the equations (largest over smallest singular value), array (..., H, W); None if
+    /// the method has none.
     #[getter]
     fn condition<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
         each!(slf.get().store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
     }
 
-    /// Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+    /// Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the
+    /// pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
     ///
-    /// Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times as wide, and bias of sixth order.
+    /// Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times
+    /// as wide, and bias of sixth order.
     #[getter]
     fn window<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
         each!(slf.get().store, packed => packed.window.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
@@ -127,8 +133,11 @@ impl FlowField {
         let (width, height) = self.size();
         let pixels = (0..height).flat_map(|row| (0..width).map(move |col| (col, row)));
         let data = pixels.map(|(col, row)| self.layout().sites.pixel(col, row)).flat_map(|(x, y)| [x as i64, y as i64]);
-        let shape =
-            if matches!(self.layout().sites, Sites::Points(_)) { vec![width, 2] } else { vec![height, width, 2] };
+        let shape = if matches!(self.layout().sites, SamplingGrid::Points(_)) {
+            vec![width, 2]
+        } else {
+            vec![height, width, 2]
+        };
         Ok(arrays::owned(py, &shape, data.collect())?.into_any())
     }
 
@@ -156,7 +165,8 @@ impl FlowField {
         self.layout().pixel_pitch
     }
 
-    /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0 where they are independent or it is not known.
+    /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
+    /// where they are independent or it is not known.
     #[getter]
     fn correlation_length(&self) -> f64 {
         self.layout().correlation_length
@@ -181,16 +191,18 @@ impl FlowField {
         PyTuple::new(py, self.shape())
     }
 
-    /// Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo, .png (KITTI) or .pfm (flow in px/frame only).
+    /// Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo,
+    /// .png (KITTI) or .pfm (flow in px/frame only).
     ///
-    /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options` is free text kept in .npz.
-    /// OSError when the file cannot be written, ValueError for another extension.
+    /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options`
+    /// is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
     #[pyo3(signature = (path, *, options=""))]
     fn save(&self, py: Python<'_>, path: PathBuf, options: &str) -> PyResult<()> {
         io::save_field(py, self, &path, options)
     }
 
-    /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError for a damaged file.
+    /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
+    /// for a damaged file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         io::load_field(py, &path)
@@ -211,7 +223,8 @@ impl FlowField {
         true
     }
 
-    /// Field `index` of a stack, or the stack of a slice of step 1, sharing its memory. IndexError outside, TypeError for a single field.
+    /// Field `index` of a stack, or the stack of a slice of step 1, sharing its memory. IndexError outside,
+    /// TypeError for a single field.
     fn __getitem__(&self, index: &Bound<'_, PyAny>) -> PyResult<Self> {
         let count = self.__len__()?;
         if let Ok(slice) = index.cast::<PySlice>() {

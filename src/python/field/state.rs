@@ -3,7 +3,7 @@
 use super::{FlowField, Packed, Store, Stored, each};
 use crate::error::Error;
 use crate::python::arrays;
-use crate::types::{FieldLayout, Rect, Sites, Status};
+use crate::types::{FieldLayout, Rect, SamplingGrid, Status};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -46,11 +46,11 @@ fn layout_state<'py>(py: Python<'py>, layout: &FieldLayout) -> PyResult<Bound<'p
     state.set_item("frame_period", layout.frame_period)?;
     state.set_item("pixel_pitch", layout.pixel_pitch)?;
     match &layout.sites {
-        Sites::Grid { region, stride } => {
+        SamplingGrid::Grid { region, stride } => {
             state.set_item("region", region.map(|r| (r.x, r.y, r.width, r.height)))?;
             state.set_item("stride", stride)?;
         }
-        Sites::Points(points) => state.set_item("points", points)?,
+        SamplingGrid::Points(points) => state.set_item("points", points)?,
     }
     Ok(state)
 }
@@ -64,8 +64,8 @@ pub fn restore_field(state: &Bound<'_, PyDict>) -> PyResult<FlowField> {
 
 fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> PyResult<FlowField> {
     let sites = match state.get_item("points")? {
-        Some(points) => Sites::Points(points.extract()?),
-        None => Sites::Grid {
+        Some(points) => SamplingGrid::Points(points.extract()?),
+        None => SamplingGrid::Grid {
             region: required(state, "region")?
                 .extract::<Option<(usize, usize, usize, usize)>>()?
                 .map(|(x, y, width, height)| Rect { x, y, width, height }),

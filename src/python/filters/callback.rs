@@ -14,7 +14,8 @@ pub struct Callbacks {
 }
 
 impl Callbacks {
-    /// Hands `inputs` (shape and values) to `function` as arrays and copies its result, which must have shape `shape_out`, to `out`.
+    /// Hands `inputs` (shape and values) to `function` as arrays and copies its result, which must have shape
+    /// `shape_out`, to `out`.
     ///
     /// Called by the core while the interpreter is detached; attaches for the time of the call.
     pub fn call(

@@ -10,15 +10,17 @@ use std::sync::Mutex;
 
 /// Extended Kalman filter x' = f(x) + w, z = h(x) + v, linearised at the mean.
 ///
-/// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
-/// Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n) and (..., m); `FJacobian` and `HJacobian` map the means
-/// (n,) or (B, n) to (n, n) or (B, n, n) and (m, n) or (B, m, n). Without a Jacobian central differences are taken.
+/// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
+/// leading axis (B, ...). Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n)
+/// and (..., m); `FJacobian` and `HJacobian` map the means (n,) or (B, n) to (n, n) or (B, n, n) and (m, n)
+/// or (B, m, n). Without a Jacobian central differences are taken.
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct ExtendedKalmanFilter {
     core: Mutex<Core>,
 }
 
-/// Calls `function` on rows of states that have `rows` rows for each filter (1: the means themselves, without that axis).
+/// Calls `function` on rows of states that have `rows` rows for each filter (1: the means themselves, without
+/// that axis).
 fn on_rows(
     callbacks: &Callbacks,
     name: &'static str,
@@ -43,7 +45,8 @@ impl ExtendedKalmanFilter {
         Ok(PyClassInitializer::from(base).add_subclass(Self { core: Mutex::new(core) }))
     }
 
-    /// x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B, ...), in the state's units.
+    /// x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B,
+    /// ...), in the state's units.
     ///
     /// Exceptions of the functions leave x and P as they were.
     #[pyo3(signature = (fx, FJacobian=None))]
@@ -68,10 +71,11 @@ impl ExtendedKalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+    /// one.
     ///
-    /// `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step. Exceptions of the functions leave x
-    /// and P as they were.
+    /// `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
+    /// Exceptions of the functions leave x and P as they were.
     #[pyo3(signature = (z, HJacobian, Hx, R=None))]
     fn update(
         slf: &Bound<'_, Self>,

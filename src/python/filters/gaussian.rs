@@ -9,10 +9,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Mean, covariance and noise of a batch of filters, as float64 arrays.
 ///
-/// Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B` they are
-/// (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or changed in place; a number given
-/// for P, Q or R means that multiple of the identity. ValueError for an x that is not finite and for a P, Q or R that is not finite, symmetric
-/// and positive semi-definite, when it is set or, changed in place, at the next step. Units are the state's and the measurement's own.
+/// Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B`
+/// they are (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or
+/// changed in place; a number given for P, Q or R means that multiple of the identity. ValueError for an x
+/// that is not finite and for a P, Q or R that is not finite, symmetric and positive semi-definite, when it
+/// is set or, changed in place, at the next step. Units are the state's and the measurement's own.
 #[pyclass(module = "jacoflow.filters", subclass, frozen)]
 pub struct GaussianFilter {
     pub dim_x: usize,
@@ -106,7 +107,8 @@ impl GaussianFilter {
         Error::argument(NAMES[index], format!("shape {:?}", self.shape(index)), format!("shape {got:?}")).into()
     }
 
-    /// `value` for array `index`: a copy, spread over the batch; a number for a covariance is a multiple of the identity.
+    /// `value` for array `index`: a copy, spread over the batch; a number for a covariance is a multiple of
+    /// the identity.
     pub fn covariance(&self, index: usize, value: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         let py = value.py();
         let numpy = py.import("numpy")?;
@@ -212,7 +214,8 @@ impl GaussianFilter {
         self.set(3, self.covariance(3, value)?);
         Ok(())
     }
-    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the measurement was missing.
+    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
+    /// measurement was missing.
     #[getter]
     fn y(&self, py: Python<'_>) -> Py<PyAny> {
         self.get(py, 4)

@@ -11,7 +11,8 @@ use std::sync::Mutex;
 
 /// Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
 ///
-/// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
+/// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
+/// leading axis (B, ...).
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct KalmanFilter {
     core: Mutex<Core>,
@@ -96,9 +97,11 @@ impl KalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+    /// one.
     ///
-    /// `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not positive definite.
+    /// `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not
+    /// positive definite.
     #[pyo3(signature = (z, R=None, H=None))]
     fn update(
         slf: &Bound<'_, Self>,

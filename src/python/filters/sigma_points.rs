@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 
 /// Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.
 ///
-/// `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared spread of the points is
-/// alpha^2 (n + kappa).
+/// `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared
+/// spread of the points is alpha^2 (n + kappa).
 #[pyclass(module = "jacoflow.filters", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct MerweScaledSigmaPoints {

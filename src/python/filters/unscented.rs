@@ -12,10 +12,11 @@ use std::sync::Mutex;
 
 /// Unscented Kalman filter x' = f(x) + w, z = h(x) + v (Julier and Uhlmann 1997, van der Merwe 2004).
 ///
-/// `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1, n), or (B, 2 n + 1, n) with
-/// `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is, in whatever unit `fx` wants. `points` is a
-/// MerweScaledSigmaPoints. With `augmented=True` the noise is part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each.
-/// With `redraw=True` new points are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out of
+/// `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1,
+/// n), or (B, 2 n + 1, n) with `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is,
+/// in whatever unit `fx` wants. `points` is a MerweScaledSigmaPoints. With `augmented=True` the noise is part
+/// of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points are
+/// drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out of
 /// the innovation covariance.
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct UnscentedKalmanFilter {
@@ -99,9 +100,11 @@ impl UnscentedKalmanFilter {
         Ok(lock(&self.core)?.redraw)
     }
 
-    /// Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit); keywords are handed to `fx`.
+    /// Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit);
+    /// keywords are handed to `fx`.
     ///
-    /// Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no positive-definite repair.
+    /// Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no
+    /// positive-definite repair.
     #[pyo3(signature = (dt=None, fx=None, **fx_args))]
     fn predict(
         slf: &Bound<'_, Self>,
@@ -137,9 +140,11 @@ impl UnscentedKalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+    /// one.
     ///
-    /// `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx` leave x and P as they were.
+    /// `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx`
+    /// leave x and P as they were.
     #[pyo3(signature = (z, R=None, hx=None, **hx_args))]
     fn update(
         slf: &Bound<'_, Self>,

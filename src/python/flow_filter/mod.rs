@@ -11,7 +11,7 @@ use crate::image::Preprocess;
 use crate::io::npz::NpzReader;
 use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter as Core, FlowFilterOptions, SavedFilter};
-use crate::types::{AnyFrame, Frame, Sample, Sites};
+use crate::types::{AnyFrame, Frame, Sample, SamplingGrid};
 use arguments::{Arguments, filter_options};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -38,13 +38,15 @@ macro_rules! each_engine {
 
 /// Flow and Jacobian filtered in time: one small Kalman filter at each site, WO2010/098160 (44)-(55).
 ///
-/// Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
-/// v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
-/// frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
+/// Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I,
+/// Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent"
+/// has the patent's constants, "measured" those for raw 8-bit frames (9 x 9 pixels); the other options
+/// replace single constants. Pickles in mid-stream.
 ///
-/// `form` "fast" (13 sigma points) has the numbers of "non_augmented" (25) with `square_root="motion_first"`, not those of its default
-/// "brightness_first", which is filterpy's order. With the profile "measured" they follow the patent's ramp equally well (rms error of u within
-/// 0.3 %); with "patent" use "augmented" or "non_augmented": the rms error of u is 0.063 px/frame there and 0.30 px/frame with "fast".
+/// `form` "fast" (13 sigma points) has the numbers of "non_augmented" (25) with `square_root="motion_first"`,
+/// not those of its default "brightness_first", which is filterpy's order. With the profile "measured" they
+/// follow the patent's ramp equally well (rms error of u within 0.3 %); with "patent" use "augmented" or
+/// "non_augmented": the rms error of u is 0.063 px/frame there and 0.30 px/frame with "fast".
 #[pyclass(module = "jacoflow")]
 pub struct FlowFilter {
     arguments: Arguments,
@@ -61,8 +63,9 @@ filter_options!(constructor [FlowFilter from Arguments]);
 impl FlowFilter {
     /// Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
     ///
-    /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status NON_FINITE. ValueError for a frame of another
-    /// size, TypeError for another dtype; the filter is then unchanged.
+    /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status
+    /// NON_FINITE. ValueError for a frame of another size, TypeError for another dtype; the filter is then
+    /// unchanged.
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<FlowField> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, self.colour)?;
@@ -82,7 +85,8 @@ impl FlowFilter {
         self.engine = Engine::Waiting;
     }
 
-    /// Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN where there is no filter (border, mask).
+    /// Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN
+    /// where there is no filter (border, mask).
     ///
     /// None before the first frame.
     #[getter]
@@ -93,7 +97,8 @@ impl FlowFilter {
         }, Ok(None))
     }
 
-    /// Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where there is no filter. None before the first frame.
+    /// Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where
+    /// there is no filter. None before the first frame.
     #[getter]
     fn state_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         each_engine!(&self.engine, core => {
@@ -123,15 +128,18 @@ impl FlowFilter {
 
     /// Writes the states (one file, .npz) so that `load` goes on bit for bit, in the units of `state`.
     ///
-    /// Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be written.
+    /// Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be
+    /// written.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let early = || Error::argument("path", "a filter that has seen a frame", "one that has not");
         each_engine!(&self.engine, core => Ok(py.detach(|| core.save(&path))?), Err(early().into()))
     }
 
-    /// Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be those of the saved one.
+    /// Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be
+    /// those of the saved one.
     ///
-    /// FormatError for a damaged file, ValueError for a file of other options or another precision, OSError when it cannot be read.
+    /// FormatError for a damaged file, ValueError for a file of other options or another precision, OSError
+    /// when it cannot be read.
     fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let engine = py.detach(|| {
             if is_double(NpzReader::open(&path)?)? {
@@ -187,7 +195,8 @@ impl FlowFilter {
         }
     }
 
-    /// After loading a state the first frame tells the sample type; it must have the scale that the state was made with.
+    /// After loading a state the first frame tells the sample type; it must have the scale that the state was
+    /// made with.
     fn accept_dtype(&mut self, frame: &AnyFrame) -> PyResult<()> {
         let expected = self.full_scale(frame);
         let (scale, dtype) = match &mut self.engine {
@@ -205,7 +214,8 @@ impl FlowFilter {
         Ok(())
     }
 
-    /// Takes up a saved state, if it was made with these options. Full scale depends on the frames and is looked at with them.
+    /// Takes up a saved state, if it was made with these options. Full scale depends on the frames and is
+    /// looked at with them.
     fn resume(&self, engine: Engine) -> crate::Result<Engine> {
         let same = |saved: &FlowFilterOptions| {
             let mut mine = self.options.clone();
@@ -258,7 +268,7 @@ fn named(error: Error) -> Error {
 
 fn shape<T: SimdReal>(core: &Core<T>, tail: &[usize]) -> PyResult<Vec<usize>> {
     let (width, height) = core.options().sites.shape(core.frame_size())?;
-    let sites = if matches!(core.options().sites, Sites::Points(_)) { vec![width] } else { vec![height, width] };
+    let sites = if matches!(core.options().sites, SamplingGrid::Points(_)) { vec![width] } else { vec![height, width] };
     Ok(sites.into_iter().chain(tail.iter().copied()).collect())
 }
 

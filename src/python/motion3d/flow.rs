@@ -43,7 +43,8 @@ pub fn motion3d_essential<'py>(py: Python<'py>, translation: &Any<'py>, rotation
     Ok(matrix(py, &motion.essential_matrix())?.into_any())
 }
 
-/// The rotation of a thing in a scene as far as the scene's tells it, and its covariance; `None` where the scene's is not known.
+/// The rotation of a thing in a scene as far as the scene's tells it, and its covariance; `None` where the
+/// scene's is not known.
 #[pyfunction]
 #[pyo3(name = "_motion3d_beside")]
 pub fn motion3d_beside<'py>(

@@ -1,10 +1,11 @@
 //! Four rows of four neighbours for every lane, summed down their columns.
 //!
-//! Hardware gathers take as long as one load a value. A patch row is contiguous: here it is one load, and the four lanes' sums are transposed at the end.
+//! Hardware gathers take as long as one load a value. A patch row is contiguous: here it is one load, and the
+//! four lanes' sums are transposed at the end.
 //!
 //! # Safety
-//! As in the parent module: these functions are reached only through lane types, which exist only on processors that have their instructions.
-//! Every patch is checked to lie inside the plane before it is read.
+//! As in the parent module: these functions are reached only through lane types, which exist only on
+//! processors that have their instructions. Every patch is checked to lie inside the plane before it is read.
 
 #[allow(clippy::wildcard_imports)]
 use core::arch::x86_64::*;

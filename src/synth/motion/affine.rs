@@ -4,7 +4,8 @@ use super::{Motion, PointMap};
 use crate::types::AffineFlow;
 use nalgebra::Matrix3;
 
-/// `u(p) = (u, v) + M (p - c)`, the same at every time: translation, rotation, expansion and shear in any mixture.
+/// `u(p) = (u, v) + M (p - c)`, the same at every time: translation, rotation, expansion and shear in any
+/// mixture.
 ///
 /// Particle paths are `p(t) = exp(t G) p(0)` with the 3 x 3 generator `G = [[M, (u, v) - M c], [0, 0]]`.
 #[derive(Debug, Clone, Copy, PartialEq)]

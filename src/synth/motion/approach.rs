@@ -3,10 +3,12 @@
 use super::{Motion, PointMap};
 use crate::types::AffineFlow;
 
-/// A fronto-parallel surface at distance `Z(t) = Z0 (1 - t / tau)`: `u = (x - x0) / (tau - t)`, `v = (y - y0) / (tau - t)`.
+/// A fronto-parallel surface at distance `Z(t) = Z0 (1 - t / tau)`: `u = (x - x0) / (tau - t)`, `v = (y - y0)
+/// / (tau - t)`.
 ///
-/// `tau` is the time to contact at time 0, so the truth at time t is `tau - t = 2 / divergence`. A negative `tau` is a surface drawing away.
-/// From the moment of contact on there is no picture: velocity and paths are NaN.
+/// `tau` is the time to contact at time 0, so the truth at time t is `tau - t = 2 / divergence`. A negative
+/// `tau` is a surface drawing away. From the moment of contact on there is no picture: velocity and paths are
+/// NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Approach {
     /// Frames until contact, counted from time 0.

@@ -19,19 +19,21 @@ struct Wave {
     amplitude: f64,
 }
 
-/// Frozen isotropic turbulence: the stream function `psi` is a sum of 24 random waves, `u = psi_y`, `v = -psi_x`
-/// (after R. H. Kraichnan, "Diffusion by a random velocity field", 1970).
+/// Frozen isotropic turbulence: the stream function `psi` is a sum of 24 random waves, `u = psi_y`, `v =
+/// -psi_x` (after R. H. Kraichnan, "Diffusion by a random velocity field", 1970).
 ///
-/// Wavelengths run logarithmically from `longest` to an eighth of it, and the speed of each wave falls with its wave number k as `k^(-1/3)`,
-/// which is an energy spectrum of `k^(-5/3)`. Velocity and Jacobian are exact; paths have no closed form and are integrated (Runge-Kutta, fourth
-/// order, 4 steps a frame: 4e-7 px a frame at a speed of 1 px/frame and 128 px waves).
+/// Wavelengths run logarithmically from `longest` to an eighth of it, and the speed of each wave falls with
+/// its wave number k as `k^(-1/3)`, which is an energy spectrum of `k^(-5/3)`. Velocity and Jacobian are
+/// exact; paths have no closed form and are integrated (Runge-Kutta, fourth order, 4 steps a frame: 4e-7 px a
+/// frame at a speed of 1 px/frame and 128 px waves).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turbulence {
     waves: Vec<Wave>,
 }
 
 impl Turbulence {
-    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose longest wave is `longest` px.
+    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose
+    /// longest wave is `longest` px.
     pub fn new(speed: f64, longest: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         let mut waves: Vec<Wave> = (0..WAVES)

@@ -4,10 +4,12 @@ use super::{Motion, PointMap};
 use crate::types::AffineFlow;
 use std::f64::consts::TAU;
 
-/// The Lamb-Oseen vortex with a core that keeps its size: `v_theta(r) = circulation / (2 pi r) (1 - exp(-r^2 / core^2))`.
+/// The Lamb-Oseen vortex with a core that keeps its size: `v_theta(r) = circulation / (2 pi r) (1 - exp(-r^2
+/// / core^2))`.
 ///
-/// Turning is from x to y (clockwise on the screen) for a positive circulation. The centre may drift; seen from it every path is a circle
-/// run through at a known angular velocity, so positions at any time are exact. (H. Lamb, Hydrodynamics, 1932; C. W. Oseen, 1912.)
+/// Turning is from x to y (clockwise on the screen) for a positive circulation. The centre may drift; seen
+/// from it every path is a circle run through at a known angular velocity, so positions at any time are
+/// exact. (H. Lamb, Hydrodynamics, 1932; C. W. Oseen, 1912.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LambOseen {
     /// Circulation far from the core, px^2/frame.
@@ -42,7 +44,8 @@ impl LambOseen {
         (strength * mean, strength / area * slope)
     }
 
-    /// Vorticity `v_x - u_y` at the point `(x, y)` and time `t`, 1/frame: `circulation / (pi core^2) exp(-r^2 / core^2)`.
+    /// Vorticity `v_x - u_y` at the point `(x, y)` and time `t`, 1/frame: `circulation / (pi core^2) exp(-r^2
+    /// / core^2)`.
     pub fn vorticity(&self, x: f64, y: f64, t: f64) -> f64 {
         let (cx, cy) = self.centre_at(t);
         let area = self.core * self.core;

@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 
 /// Number of waves.
 const WAVES: usize = 8;
-/// Radians of the waves that the matter may pass in one step of the path integration, at root-mean-square speed.
+/// Radians of the waves that the matter may pass in one step of the path integration, at root-mean-square
+/// speed.
 const RADIANS_PER_STEP: f64 = 0.03;
 /// Fewest steps of the path integration in one frame.
 const FEWEST_STEPS: f64 = 4.0;
@@ -22,11 +23,12 @@ struct Wave {
     along_y: f64,
 }
 
-/// A steady smooth velocity field of one scale with divergence and curl: eight waves of equal strength and random phase, their wavelengths within a factor
-/// `2^(1/4)` of the one asked for, their directions and polarisations spread evenly.
+/// A steady smooth velocity field of one scale with divergence and curl: eight waves of equal strength and
+/// random phase, their wavelengths within a factor `2^(1/4)` of the one asked for, their directions and
+/// polarisations spread evenly.
 ///
-/// Velocity and Jacobian are exact; paths have no closed form and are integrated (Runge-Kutta, fourth order; steps short enough for 1e-6 px a frame up to
-/// 8 px/frame and 64 px waves).
+/// Velocity and Jacobian are exact; paths have no closed form and are integrated (Runge-Kutta, fourth order;
+/// steps short enough for 1e-6 px a frame up to 8 px/frame and 64 px waves).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Waves {
     waves: [Wave; WAVES],
@@ -34,7 +36,8 @@ pub struct Waves {
 }
 
 impl Waves {
-    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose waves are about `wavelength` px long.
+    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose
+    /// waves are about `wavelength` px long.
     pub fn new(speed: f64, wavelength: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         let share = |place: usize, draw: u64| TAU * (place as f64 + rng.uniform(draw)) / WAVES as f64;
@@ -42,7 +45,8 @@ impl Waves {
         let waves = std::array::from_fn(|i| {
             let draw = 4 * i as u64;
             let wave_number = TAU / wavelength * 2f64.powf(0.5 * rng.uniform(draw) - 0.25);
-            // Half a turn of directions, a whole turn between a wave and what it moves: along the wave is divergence, across it is curl.
+            // Half a turn of directions, a whole turn between a wave and what it moves: along the wave is
+            // divergence, across it is curl.
             let direction = 0.5 * share(i, draw + 1);
             let polarisation = direction + share(i * 3 % WAVES, draw + 2);
             Wave {

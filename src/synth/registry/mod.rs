@@ -1,7 +1,7 @@
 //! Scenes by name, for the binary and for Python.
 //!
-//! A scene is a motion and what it carries, or something of its own. A new motion, carrier or scene is one file here with one constant in it, plus one line in
-//! the list it belongs to: [`SCENES`] or [`CARRIERS`].
+//! A scene is a motion and what it carries, or something of its own. A new motion, carrier or scene is one
+//! file here with one constant in it, plus one line in the list it belongs to: [`SCENES`] or [`CARRIERS`].
 
 mod affine;
 mod disc;
@@ -114,7 +114,8 @@ impl Default for SceneOptions {
 /// The scene called `name`.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `scene`, `carrier`, `size`, `origin` or the parameter that is unknown or unusable.
+/// [`Error::Argument`] naming `scene`, `carrier`, `size`, `origin` or the parameter that is unknown or
+/// unusable.
 pub fn build(name: &str, options: &SceneOptions) -> Result<Box<dyn Scene>> {
     let kind = find(SCENES, "scene", name, |kind| kind.name)?;
     let carrier = match (&options.carrier, kind.takes_carrier()) {
@@ -205,7 +206,8 @@ impl<'a> Settings<'a> {
         if value > 0.0 { Ok(value) } else { Err(Error::argument(name, "a positive number", value)) }
     }
 
-    /// The point `(x, y)` of these names; the middle of the frame, `origin + (size - 1) / 2`, where it is not given.
+    /// The point `(x, y)` of these names; the middle of the frame, `origin + (size - 1) / 2`, where it is not
+    /// given.
     fn point(&self, x: &str, y: &str) -> (f64, f64) {
         let or_middle = |value: f64, origin: f64, size: usize| {
             if value.is_nan() { origin + (size as f64 - 1.0) / 2.0 } else { value }

@@ -6,15 +6,18 @@ use crate::math::random::CounterRng;
 
 /// Lattice points along each side after which the noise repeats, px. A power of two.
 const PERIOD: usize = 1024;
-/// Reach of the Gaussian, in its standard deviations: what is left out is below 1e-10 of the standard deviation.
+/// Reach of the Gaussian, in its standard deviations: what is left out is below 1e-10 of the standard
+/// deviation.
 const REACH: f64 = 7.0;
 /// Widest Gaussian, px: twice its reach must stay well below the period.
 const MAX_SIGMA: f64 = 32.0;
 
-/// Band-limited noise `I(x) = mean + a sum_k n_k exp(-|x - k|^2 / (2 sigma^2))` over lattice points `k` with white normal `n_k`.
+/// Band-limited noise `I(x) = mean + a sum_k n_k exp(-|x - k|^2 / (2 sigma^2))` over lattice points `k` with
+/// white normal `n_k`.
 ///
-/// With `a = std / (sigma sqrt(pi))` its standard deviation is `std` and its autocorrelation `exp(-r^2 / (4 sigma^2))`: exactly the
-/// statistics of white noise filtered by a Gaussian of standard deviation `sigma`, without any interpolation. It repeats every 1024 px.
+/// With `a = std / (sigma sqrt(pi))` its standard deviation is `std` and its autocorrelation `exp(-r^2 / (4
+/// sigma^2))`: exactly the statistics of white noise filtered by a Gaussian of standard deviation `sigma`,
+/// without any interpolation. It repeats every 1024 px.
 #[derive(Debug, Clone)]
 pub struct Noise {
     lattice: Vec<f64>,
@@ -24,10 +27,12 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Noise of standard deviation `std` grey levels about `mean`, filtered by a Gaussian of standard deviation `sigma` px.
+    /// Noise of standard deviation `std` grey levels about `mean`, filtered by a Gaussian of standard
+    /// deviation `sigma` px.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a `sigma` outside 0.5 to 32 px (a narrower one would show the lattice) or a `std` or `mean` that is not finite.
+    /// [`Error::Argument`] for a `sigma` outside 0.5 to 32 px (a narrower one would show the lattice) or a
+    /// `std` or `mean` that is not finite.
     pub fn new(sigma: f64, std: f64, mean: f64, seed: u64) -> Result<Self> {
         if !(0.5..=MAX_SIGMA).contains(&sigma) {
             return Err(Error::argument("sigma", format!("0.5 to {MAX_SIGMA} px"), sigma));
@@ -44,7 +49,8 @@ impl Noise {
         Ok(Self { lattice, sigma, mean, amplitude })
     }
 
-    /// `exp(-(first + i - x)^2 / (2 sigma^2))` for i = 0, 1, ... by the recurrence of its ratios: two exponentials instead of one a term.
+    /// `exp(-(first + i - x)^2 / (2 sigma^2))` for i = 0, 1, ... by the recurrence of its ratios: two
+    /// exponentials instead of one a term.
     fn weights(&self, first: f64, x: f64, into: &mut [f64]) {
         let inverse = 1.0 / (self.sigma * self.sigma);
         let distance = first - x;

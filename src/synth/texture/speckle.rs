@@ -6,8 +6,9 @@ use crate::math::random::CounterRng;
 
 /// Round dark blobs strewn at random (Poisson) on a bright ground; overlaps merge smoothly.
 ///
-/// `I = dark + (bright - dark) prod_k (1 - w_k)`, where `w_k` falls from 1 to 0 over the blob's edge (twice continuously differentiable).
-/// Radii are spread evenly over 0.7 to 1.3 of `radius`. The pattern does not repeat within 2^31 cells.
+/// `I = dark + (bright - dark) prod_k (1 - w_k)`, where `w_k` falls from 1 to 0 over the blob's edge (twice
+/// continuously differentiable). Radii are spread evenly over 0.7 to 1.3 of `radius`. The pattern does not
+/// repeat within 2^31 cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Speckle {
     radius: f64,
@@ -19,11 +20,12 @@ pub struct Speckle {
 }
 
 impl Speckle {
-    /// Blobs of mean `radius` px covering about the share `coverage` of the plane, with an edge `edge` px wide.
+    /// Blobs of mean `radius` px covering about the share `coverage` of the plane, with an edge `edge` px
+    /// wide.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a radius or an edge that is not positive, an edge wider than the radius, a coverage outside 0.05 to 0.95, or
-    /// brightness that is not finite.
+    /// [`Error::Argument`] for a radius or an edge that is not positive, an edge wider than the radius, a
+    /// coverage outside 0.05 to 0.95, or brightness that is not finite.
     pub fn new(radius: f64, coverage: f64, edge: f64, levels: (f64, f64), seed: u64) -> Result<Self> {
         if !(radius.is_finite() && radius > 0.0) {
             return Err(Error::argument("radius", "a positive number of px", radius));
@@ -37,7 +39,8 @@ impl Speckle {
         if !(levels.0.is_finite() && levels.1.is_finite()) {
             return Err(Error::argument("levels", "finite grey levels", format!("{levels:?}")));
         }
-        // Blobs strewn at random leave exp(-area / cell^2) of the plane free. Mean of the squared radius factor: 1.03.
+        // Blobs strewn at random leave exp(-area / cell^2) of the plane free. Mean of the squared radius
+        // factor: 1.03.
         let cell = radius * (1.03 * std::f64::consts::PI / -(1.0 - coverage).ln()).sqrt();
         let rng = CounterRng::new(seed);
         Ok(Self { radius, edge, cell, dark: levels.0, bright: levels.1, rng })

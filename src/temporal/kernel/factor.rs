@@ -7,8 +7,8 @@ use crate::simd::{Lanes, SimdReal};
 /// The columns of a factor, zero above its diagonal: `columns[k][state index]`.
 pub(super) type Columns<V> = [[V; N]; N];
 
-/// Factors `cov`, taking the state's components in `order`, into columns whose upper part is zero already. The result is one in each lane whose pivots
-/// were all positive.
+/// Factors `cov`, taking the state's components in `order`, into columns whose upper part is zero already.
+/// The result is one in each lane whose pivots were all positive.
 ///
 /// Columns left to right; each is held in registers while the earlier ones are subtracted.
 #[inline(always)]
@@ -42,7 +42,8 @@ fn column<V: Lanes, const J: usize>(cov: &[V; PACKED], order: &[usize; N], colum
     }
 }
 
-/// Gives pixel `lane` of a block a covariance that has a factor: by loading its diagonal, or, when nothing of it is left, by starting anew.
+/// Gives pixel `lane` of a block a covariance that has a factor: by loading its diagonal, or, when nothing of
+/// it is left, by starting anew.
 #[cold]
 #[inline(never)]
 pub(super) fn repair<T: SimdReal>(block: &mut [T], lane: usize, constants: &Constants<T>) {

@@ -1,4 +1,5 @@
-//! Second moments of propagated points: sums of outer products, tile by tile so that the sums stay in registers.
+//! Second moments of propagated points: sums of outer products, tile by tile so that the sums stay in
+//! registers.
 
 use super::{N, PACKED, packed};
 use crate::simd::Lanes;
@@ -34,7 +35,8 @@ pub(super) fn outer<V: Lanes>(vectors: &[[V; 6]], scale: V, cov: &mut [V; PACKED
 /// The lower triangle of a 3 x 3 tile.
 pub(super) const TRIANGLE: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
-/// `scale sum_k d_k l_k^T` into the block of motion with brightness, `l_k` being the motion part of the factor's column `k`.
+/// `scale sum_k d_k l_k^T` into the block of motion with brightness, `l_k` being the motion part of the
+/// factor's column `k`.
 #[inline(always)]
 pub(super) fn cross<V: Lanes>(differences: &[[V; 6]], columns: &[[V; N]], scale: V, cov: &mut [V; PACKED]) {
     for m in 0..3 {

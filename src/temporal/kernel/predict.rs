@@ -24,7 +24,8 @@ pub(in crate::temporal) const EXTENDED: u8 = FilterForm::Extended as u8;
 /// Most vectors that a form's covariance is summed from: 24 images and 11 of noise.
 const VECTORS: usize = 35;
 
-/// Room for one vector of pixels; made once, since clearing it for every one would cost as much as a tenth of the work.
+/// Room for one vector of pixels; made once, since clearing it for every one would cost as much as a tenth of
+/// the work.
 struct Scratch<V> {
     /// The factor. Entries above its diagonal are zero from the beginning and never written.
     columns: Columns<V>,
@@ -120,12 +121,14 @@ fn predict<V: Lanes, S: Step, const FORM: u8>(
     lane.mean[0] = lane.mean[0] + brightness;
 }
 
-/// The unscented transform over the first `PAIRS` columns of the factor, `POINTS = 2 PAIRS`, together with the vectors that a form adds up to `TOTAL`:
-/// they enter the covariance with weight one. Returns the shift of the mean from the centre's image.
+/// The unscented transform over the first `PAIRS` columns of the factor, `POINTS = 2 PAIRS`, together with
+/// the vectors that a form adds up to `TOTAL`: they enter the covariance with weight one. Returns the shift
+/// of the mean from the centre's image.
 ///
-/// With `a, b` the images of a pair less the centre's and `c = n + lambda`: shift `d = sum (a + b) / 2c`, covariance
-/// `sum (a a^T + b b^T) / 2c + (beta - alpha^2) d d^T`, covariance with the motion `sum (a - b) l^T / 2 sqrt(c)`. The usual weights, with the centre's
-/// large cancelling terms gone; the motion's own block does not change but for its noise.
+/// With `a, b` the images of a pair less the centre's and `c = n + lambda`: shift `d = sum (a + b) / 2c`,
+/// covariance `sum (a a^T + b b^T) / 2c + (beta - alpha^2) d d^T`, covariance with the motion `sum (a - b)
+/// l^T / 2 sqrt(c)`. The usual weights, with the centre's large cancelling terms gone; the motion's own block
+/// does not change but for its noise.
 #[inline(always)]
 fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POINTS: usize, const TOTAL: usize>(
     lane: &mut Lane<V>,
@@ -184,7 +187,8 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
     shift
 }
 
-/// The factor of the brightness's covariance given the motion, moved by the mean motion: exact, because that step is linear.
+/// The factor of the brightness's covariance given the motion, moved by the mean motion: exact, because that
+/// step is linear.
 #[inline(always)]
 fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, out: &mut [[V; 6]]) {
     let map = S::map(m);

@@ -1,7 +1,8 @@
 //! The measurement update: six independent scalar updates, whatever the neighbourhood.
 //!
-//! The measured jet has covariance `C = r (B^T B)^-1`. A unit triangular change of variables `i* = T i` makes it diagonal (for rectangles only
-//! `I* = I + a Ixx + b Iyy` differs from `I`; for 3x3 pixels it is their mean), so that each component is taken in by itself.
+//! The measured jet has covariance `C = r (B^T B)^-1`. A unit triangular change of variables `i* = T i` makes
+//! it diagonal (for rectangles only `I* = I + a Ixx + b Iyy` differs from `I`; for 3x3 pixels it is their
+//! mean), so that each component is taken in by itself.
 
 // Unrolled loops compare constant indices, the smallest of which is zero.
 #![allow(clippy::absurd_extreme_comparisons)]
@@ -13,7 +14,8 @@ use crate::simd::{Kernel, Lanes, SimdReal};
 /// What is measured, in working precision.
 #[derive(Debug, Clone)]
 pub(in crate::temporal) struct Decorrelation<T> {
-    /// `T` as elementary steps `(row, source, factor)`, in order: component `row` gains `factor` times component `source`.
+    /// `T` as elementary steps `(row, source, factor)`, in order: component `row` gains `factor` times
+    /// component `source`.
     pub steps: Vec<(usize, usize, T)>,
     /// Variances of the six decorrelated components.
     pub variances: [T; 6],
@@ -51,7 +53,8 @@ impl<T: SimdReal> Decorrelation<T> {
 pub(in crate::temporal) struct Update<'a, T> {
     /// States.
     pub blocks: &'a mut [T],
-    /// Measured jets, six rows of `BLOCK` for each block, then a row that is one where there is a measurement and zero where not.
+    /// Measured jets, six rows of `BLOCK` for each block, then a row that is one where there is a measurement
+    /// and zero where not.
     pub measured: &'a [T],
     /// Set to one for each pixel that was repaired.
     pub repaired: &'a mut [u8],
@@ -95,8 +98,9 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
 
 /// The update of one vector of pixels.
 ///
-/// Only the brightness block has to be worked through component by component; what that does to one column of the other blocks is the same six
-/// elimination steps, done with the column in registers, and the motion block takes all six at once.
+/// Only the brightness block has to be worked through component by component; what that does to one column of
+/// the other blocks is the same six elimination steps, done with the column in registers, and the motion
+/// block takes all six at once.
 #[inline(always)]
 fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelation: &Decorrelation<V::Scalar>) {
     let steps = &decorrelation.steps;
@@ -227,7 +231,8 @@ impl<V: Lanes> Elimination<V> {
 
 /// Updates mean and covariance of the brightness with six components of variances `r`.
 ///
-/// A component's own row is multiplied by `r / s`, exactly what subtraction would leave, without the cancellation.
+/// A component's own row is multiplied by `r / s`, exactly what subtraction would leave, without the
+/// cancellation.
 #[inline(always)]
 fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V::Scalar; 6]) -> Elimination<V> {
     let (zero, missing) = (V::zero(), V::constant(1.0) - present);

@@ -16,14 +16,15 @@ const TASK_BLOCKS: usize = 64;
 
 /// One information filter a site, fed with fields. See [the module](super) for what it computes.
 ///
-/// The state is 56 planes of the field's size, whatever the number of frames. Motion in px/frame and 1/frame (or units of the pixel pitch), covariances in their squares.
+/// The state is 56 planes of the field's size, whatever the number of frames. Motion in px/frame and 1/frame
+/// (or units of the pixel pitch), covariances in their squares.
 ///
 /// ```
-/// use jacoflow::flow::{Common, Estimator, Method};
+/// use jacoflow::flow::{EstimatorOptions, Estimator, Method};
 /// use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
 /// use jacoflow::types::Frame;
 /// # fn main() -> jacoflow::Result<()> {
-/// let common = Common { covariance: true, systematic: true, ..Common::default() };
+/// let common = EstimatorOptions { covariance: true, systematic: true, ..EstimatorOptions::default() };
 /// let estimator = Estimator::new(Method::parse("windowed")?, common)?;
 /// let mut fusion = RecursiveFusion::<f64>::new(&estimator, RecursiveOptions::default())?;
 /// let frames: Vec<Frame<f64>> = (0..6)
@@ -60,7 +61,8 @@ impl<T: SimdReal> RecursiveFusion<T> {
     /// A fusion without memory yet, for the fields of `estimator`.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `forgetting`; `method` where the model is not affine; `covariance` where the estimator computes none.
+    /// [`Error::Argument`] naming `forgetting`; `method` where the model is not affine; `covariance` where
+    /// the estimator computes none.
     pub fn new(estimator: &Estimator, options: RecursiveOptions) -> Result<Self> {
         options.check()?;
         let model = estimator.model().name();
@@ -86,7 +88,8 @@ impl<T: SimdReal> RecursiveFusion<T> {
         (self.sites, self.blocks) = (0, Vec::new());
     }
 
-    /// Number of sites, 0 before the first field, and the states of all: for those who keep them, with [`restore`](Self::restore).
+    /// Number of sites, 0 before the first field, and the states of all: for those who keep them, with
+    /// [`restore`](Self::restore).
     pub fn state(&self) -> (usize, &[T]) {
         (self.sites, &self.blocks)
     }
@@ -105,10 +108,12 @@ impl<T: SimdReal> RecursiveFusion<T> {
         Ok(())
     }
 
-    /// Takes in the next field and puts the fused motion and covariance in its place. Sites without an estimate get the prediction, once there is one.
+    /// Takes in the next field and puts the fused motion and covariance in its place. SamplingGrid without an
+    /// estimate get the prediction, once there is one.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `field` when it is of another size than the first, not affine or without covariance.
+    /// [`Error::Argument`] naming `field` when it is of another size than the first, not affine or without
+    /// covariance.
     pub fn fuse(&mut self, field: &mut FlowField<T>) -> Result<()> {
         let n = field.len();
         let known = field.covariance.as_ref().map(Vec::len);

@@ -3,14 +3,17 @@
 use crate::flow::windowed::solve::{ENTRIES, factor, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
-/// Sites of a block.
+/// SamplingGrid of a block.
 pub(super) const BLOCK: usize = 16;
 
-/// Normalised innovations squared beyond this start a pixel anew: chi-square with six degrees of freedom, one in ten thousand.
+/// Normalised innovations squared beyond this start a pixel anew: chi-square with six degrees of freedom, one
+/// in ten thousand.
 pub const RESTART: f64 = 27.86;
-/// Normalised mean innovations squared beyond this shorten the memory; six are expected, one in sixteen is larger.
+/// Normalised mean innovations squared beyond this shorten the memory; six are expected, one in sixteen is
+/// larger.
 pub const FADE: f64 = 12.0;
-/// Share of the covariance that is taken for systematic where the method does not tell: measured on the coarse-to-fine estimate of textures with 4 grey levels of noise.
+/// Share of the covariance that is taken for systematic where the method does not tell: measured on the
+/// coarse-to-fine estimate of textures with 4 grey levels of noise.
 pub const SHARE: f64 = 0.3;
 /// Normalised mean innovations squared below this are chance, and no lag.
 const LAG: f64 = 8.0;

@@ -5,8 +5,9 @@ use crate::error::{Error, Result};
 /// Options of [`RecursiveFusion`](super::RecursiveFusion).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecursiveOptions {
-    /// By what the information of the past is multiplied each frame, above 0 and at most 1 (no unit). The memory is `1 / (1 - forgetting)` frames; 1 never forgets, and is right only for motion
-    /// that is steady for ever. Default 0.95: 20 frames.
+    /// By what the information of the past is multiplied each frame, above 0 and at most 1 (no unit). The
+    /// memory is `1 / (1 - forgetting)` frames; 1 never forgets, and is right only for motion that is steady
+    /// for ever. Default 0.95: 20 frames.
     pub forgetting: f64,
 }
 
@@ -17,10 +18,12 @@ impl Default for RecursiveOptions {
 }
 
 impl RecursiveOptions {
-    /// The options that a user's words mean: `temporal` is `none` (the default) or `recursive`, `forgetting` its factor.
+    /// The options that a user's words mean: `temporal` is `none` (the default) or `recursive`, `forgetting`
+    /// its factor.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `temporal` for another word, and `forgetting` without recursion or out of range.
+    /// [`Error::Argument`] naming `temporal` for another word, and `forgetting` without recursion or out of
+    /// range.
     pub fn parse(temporal: Option<&str>, forgetting: Option<f64>) -> Result<Option<Self>> {
         match temporal.unwrap_or("none") {
             "none" => match forgetting {

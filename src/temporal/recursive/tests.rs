@@ -3,11 +3,11 @@
 use super::fusion::RecursiveFusion;
 use super::options::RecursiveOptions;
 use crate::flow::windowed::solve::upper;
-use crate::flow::{Common, Estimator, Method};
+use crate::flow::{Estimator, EstimatorOptions, Method};
 use crate::math::random::CounterRng;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
-use crate::types::{FieldLayout, FlowField, Sites, Status};
+use crate::types::{FieldLayout, FlowField, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 
 const SIDE: usize = 40;
@@ -15,7 +15,7 @@ const SITES: usize = SIDE * SIDE;
 
 fn fusion<T: SimdReal>(forgetting: f64, threads: usize, simd: Option<Level>) -> RecursiveFusion<T> {
     let threads = Threads::new(Some(threads)).unwrap();
-    let common = Common { covariance: true, systematic: true, threads, simd, ..Common::default() };
+    let common = EstimatorOptions { covariance: true, systematic: true, threads, simd, ..EstimatorOptions::default() };
     let estimator = Estimator::new(Method::parse("windowed").unwrap(), common).unwrap();
     RecursiveFusion::new(&estimator, RecursiveOptions { forgetting }).unwrap()
 }
@@ -49,7 +49,7 @@ impl Estimates {
     fn field<T: SimdReal>(&self, k: usize, more: &Vector6<f64>) -> FlowField<T> {
         let layout = FieldLayout {
             frame_size: (SIDE, SIDE),
-            sites: Sites::default(),
+            sites: SamplingGrid::default(),
             model: "affine".into(),
             parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
             frame_period: None,
@@ -97,7 +97,8 @@ fn still() -> Vector6<f64> {
     Vector6::zeros()
 }
 
-/// Slope of the logarithm of the error over the logarithm of the number of estimates, 1 to 32, and normalised errors squared that average six.
+/// Slope of the logarithm of the error over the logarithm of the number of estimates, 1 to 32, and normalised
+/// errors squared that average six.
 fn law<T: SimdReal>() {
     let made = Estimates::new(0.0);
     let mut fusion = fusion::<T>(1.0, 1, None);
@@ -285,7 +286,7 @@ fn options_and_methods_that_cannot_be_fused_are_named() {
         assert!(parse(temporal, forgetting).unwrap_err().to_string().contains(word));
     }
     for (method, covariance, word) in [("lucas_kanade", true, "method"), ("windowed", false, "covariance")] {
-        let common = Common { covariance, ..Common::default() };
+        let common = EstimatorOptions { covariance, ..EstimatorOptions::default() };
         let estimator = Estimator::new(Method::parse(method).unwrap(), common).unwrap();
         let message = RecursiveFusion::<f32>::new(&estimator, RecursiveOptions::default()).unwrap_err().to_string();
         assert!(message.starts_with(word), "{message}");

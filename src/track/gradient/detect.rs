@@ -23,12 +23,14 @@ const SOFT: f64 = 3.0;
 const FEWEST: usize = 8;
 /// Farthest displacement from frame to frame, px.
 const REACH: isize = 10;
-/// Of displacements whose cost is within this factor of the best, or that leave no more than so many times the noise, the smallest is taken: larger ones explain an even target as well.
-/// Noise alone leaves 1.13 times.
+/// Of displacements whose cost is within this factor of the best, or that leave no more than so many times
+/// the noise, the smallest is taken: larger ones explain an even target as well. Noise alone leaves 1.13
+/// times.
 const ALIKE: (f64, f64) = (1.05, 1.4);
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
-/// Pixels of an object that judge a displacement, about: of larger ones every second along both axes, every third ...
+/// Pixels of an object that judge a displacement, about: of larger ones every second along both axes, every
+/// third ...
 const VOTES: f64 = 4096.0;
 /// Smallest side of what is found, px.
 const LEAST_SIDE: f64 = 3.0;
@@ -44,8 +46,9 @@ pub struct MovingTarget {
 
 /// Finds what moves between two frames of a still scene: the largest thing, or that nearest to a point.
 ///
-/// Changed pixels differ by three deviations of the noise and have changed neighbours. The displacement within 10 px along each axis is the smallest that explains them nearly best, as what came or as what
-/// went; the box is the extent of the changed pixels less the displacement. `None` where nothing moves.
+/// Changed pixels differ by three deviations of the noise and have changed neighbours. The displacement
+/// within 10 px along each axis is the smallest that explains them nearly best, as what came or as what went;
+/// the box is the extent of the changed pixels less the displacement. `None` where nothing moves.
 pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Option<[f64; 2]>) -> Option<MovingTarget> {
     if first.size() != second.size() {
         return None;
@@ -59,7 +62,8 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let object = objects.swap_remove(chosen);
     let between = half_a_pixel_around(first);
     let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
-    // What an even target uncovers and what it covers lie apart, as far as it is long: together they are explained without a rest.
+    // What an even target uncovers and what it covers lie apart, as far as it is long: together they are
+    // explained without a rest.
     let whole = objects.iter().filter(|other| are_ends(&object, other)).filter_map(|other| {
         let both = [&object[..], other].concat();
         let (cost, displacement) = explain(&both)?;
@@ -91,7 +95,8 @@ pub(super) fn much_changes(first: &Frame<f64>, second: &Frame<f64>) -> bool {
     count as f64 > MUCH * changed.data().len() as f64
 }
 
-/// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along x or along y.
+/// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along
+/// x or along y.
 fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
     let [a, b] = [a, b].map(|object| bounds(extent(object), [0, 0]));
     let alike = |a: [f64; 2], b: [f64; 2]| {
@@ -101,7 +106,8 @@ fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
     alike([a.x, a.width], [b.x, b.width]) || alike([a.y, a.height], [b.y, b.height])
 }
 
-/// Whether two groups of changed pixels that lie apart along an axis are as thick there as their object moved: two objects that move alike are thicker.
+/// Whether two groups of changed pixels that lie apart along an axis are as thick there as their object
+/// moved: two objects that move alike are thicker.
 fn are_as_thick(a: &[(usize, usize)], b: &[(usize, usize)], displacement: [isize; 2]) -> bool {
     let (a, b) = (extent(a), extent(b));
     (0..2).filter(|&k| a[k][1] < b[k][0] || b[k][1] < a[k][0]).all(|k| {
@@ -125,7 +131,8 @@ fn crowded(changed: &Frame<bool>) -> Frame<bool> {
     Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(&middle, x, y) > 0)
 }
 
-/// Pixels that belong together, gaps of a few pixels included: squares of pixels that hold changed ones, and at most one empty square between them.
+/// Pixels that belong together, gaps of a few pixels included: squares of pixels that hold changed ones, and
+/// at most one empty square between them.
 fn objects(changed: &Frame<bool>) -> Vec<Vec<(usize, usize)>> {
     let (width, height) = changed.size();
     let (columns, rows) = (width.div_ceil(CELL), height.div_ceil(CELL));
@@ -164,8 +171,9 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
     pixels.iter().map(far).sum::<f64>() / pixels.len() as f64
 }
 
-/// The smallest displacement that explains the changed pixels nearly best, and what is left then, grey levels: their extent less the displacement holds what was there in the first frame, `between` these
-/// levels within half a pixel.
+/// The smallest displacement that explains the changed pixels nearly best, and what is left then, grey
+/// levels: their extent less the displacement holds what was there in the first frame, `between` these levels
+/// within half a pixel.
 fn displacement(
     between: &Frame<[f64; 2]>,
     second: &Frame<f64>,
@@ -197,7 +205,8 @@ fn displacement(
     alike.min_by_key(|(_, d)| size(d))
 }
 
-/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels, objects do not move by those.
+/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels,
+/// objects do not move by those.
 pub(super) fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
     let (width, height) = frame.size();
     Frame::from_fn(width, height, |x, y| {
@@ -224,7 +233,8 @@ fn extent(object: &[(usize, usize)]) -> [[usize; 2]; 2] {
     })
 }
 
-/// What of the changed pixels' extent is the object in the second frame: it was at one end of them and is at the other.
+/// What of the changed pixels' extent is the object in the second frame: it was at one end of them and is at
+/// the other.
 fn bounds([columns, rows]: [[usize; 2]; 2], displacement: [isize; 2]) -> TargetBox {
     let along = |[low, high]: [usize; 2], moved: isize| {
         let (low, high) = (low as f64 - 0.5, high as f64 + 0.5);

@@ -1,5 +1,6 @@
-//! The gradient equation in the windows around all pixels, summed: M. Chiba and S. Ozawa, equations (5) to (8). In single precision: windows hold few pixels of some hundred grey levels, and ill-conditioned
-//! ones are refused.
+//! The gradient equation in the windows around all pixels, summed: M. Chiba and S. Ozawa, equations (5) to
+//! (8). In single precision: windows hold few pixels of some hundred grey levels, and ill-conditioned ones
+//! are refused.
 
 use super::kernels::{DerivativeKernels, REACH};
 use super::local_flow::LocalFlowOptions;
@@ -10,7 +11,8 @@ use std::ops::Range;
 /// Sums of products of derivatives.
 const SUMS: usize = 6;
 
-/// `G'G`, `G'b` and `b'b` of the windows around all pixels; NaN where a window reaches over the border or holds NaN.
+/// `G'G`, `G'b` and `b'b` of the windows around all pixels; NaN where a window reaches over the border or
+/// holds NaN.
 pub(super) struct Equations {
     /// Row-major planes of `xx, xy, yy, xt, yt, tt`.
     sums: [Vec<f32>; SUMS],
@@ -110,9 +112,11 @@ impl Build<'_> {
         }
     }
 
-    /// Derivatives along x and y of the mean of both frames, and by time of their smoothed difference; row-major, nothing along the border.
+    /// Derivatives along x and y of the mean of both frames, and by time of their smoothed difference;
+    /// row-major, nothing along the border.
     ///
-    /// The masks are even or odd along each axis: rows and columns as far above as below are added or subtracted first, which leaves a third of the products.
+    /// The masks are even or odd along each axis: rows and columns as far above as below are added or
+    /// subtracted first, which leaves a third of the products.
     #[inline(always)]
     fn derivatives<V: Lanes<Scalar = f32>>(&self) -> [Vec<f32>; 3] {
         let (width, height) = self.first.size();
@@ -183,7 +187,8 @@ impl Folded {
     }
 }
 
-/// First indices of vectors that cover a range at least one vector long; the last one may overlap the one before.
+/// First indices of vectors that cover a range at least one vector long; the last one may overlap the one
+/// before.
 #[inline(always)]
 fn starts<V: Lanes>(range: Range<usize>) -> impl Iterator<Item = usize> {
     let last = range.end - V::LANES;

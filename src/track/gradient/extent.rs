@@ -1,7 +1,9 @@
 //! How far what moves reaches: where a target is whose middle does not show it.
 //!
-//! Of an even target only the outline moves, some of it more plainly than the rest, and the mean of that is not its middle; of one that is partly beyond the border, the mean of what is left is not either.
-//! Its two ends along either axis are: the middle between them, or, where one is missing, the other one and how far apart they usually are.
+//! Of an even target only the outline moves, some of it more plainly than the rest, and the mean of that is
+//! not its middle; of one that is partly beyond the border, the mean of what is left is not either. Its two
+//! ends along either axis are: the middle between them, or, where one is missing, the other one and how far
+//! apart they usually are.
 
 use super::local_flow::LocalFlow;
 
@@ -69,7 +71,8 @@ impl Extent {
         self.usual
     }
 
-    /// The middle along x and y, where the ends are the target's; `expected` middle and `lengths` of the picture, px.
+    /// The middle along x and y, where the ends are the target's; `expected` middle and `lengths` of the
+    /// picture, px.
     pub fn middle(&self, ends: &Ends, expected: [f64; 2], lengths: [f64; 2]) -> [Option<Middle>; 2] {
         std::array::from_fn(|k| {
             let ([low, high], usual) = (ends[k], self.usual[k]);
@@ -133,7 +136,8 @@ mod tests {
     fn the_end_that_is_seen_tells_where_the_target_is() {
         let extent = Extent::new([20.0, 20.0]);
         let ends = [[40.0, 50.0], [10.0, 30.0]];
-        // Half of it is beyond the right border, then beyond the left one, then behind something in the picture.
+        // Half of it is beyond the right border, then beyond the left one, then behind something in the
+        // picture.
         let at = |expected: f64, length: f64| extent.middle(&ends, [expected, 20.0], [length, 80.0])[0].unwrap();
         assert_eq!((at(51.0, 54.0).at, at(51.0, 54.0).missing), (50.0, 0.0));
         let left = extent.middle(&[[6.0, 14.0], [10.0, 30.0]], [5.0, 20.0], [60.0, 80.0])[0].unwrap();

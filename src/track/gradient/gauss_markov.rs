@@ -1,7 +1,10 @@
-//! The paper's filter: position, velocity and acceleration of each axis, the acceleration a first-order Gauss-Markov sequence.
+//! The paper's filter: position, velocity and acceleration of each axis, the acceleration a first-order
+//! Gauss-Markov sequence.
 //!
-//! M. Chiba and S. Ozawa, equations (12) to (24). Unit of time is the frame. Per axis `F = [1 1 1/2; 0 1 1; 0 0 alpha]`, `Q = diag(0, 0, q)`, `R = diag(r_pos, r_vel)`.
-//! What flow measures is the mean velocity since the frame before, `x' - x'' / (2 alpha)`: that is the second row of H here. With [`Velocity::AsPrinted`] it is `x'`.
+//! M. Chiba and S. Ozawa, equations (12) to (24). Unit of time is the frame. Per axis `F = [1 1 1/2; 0 1 1; 0
+//! 0 alpha]`, `Q = diag(0, 0, q)`, `R = diag(r_pos, r_vel)`. What flow measures is the mean velocity since
+//! the frame before, `x' - x'' / (2 alpha)`: that is the second row of H here. With [`Velocity::AsPrinted`]
+//! it is `x'`.
 
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
@@ -91,14 +94,17 @@ impl GaussMarkovFilter {
         [row(RowVector3::new(1.0, 0.0, 0.0), z.position), row(RowVector3::new(0.0, 1.0, lag), z.velocity)]
     }
 
-    /// Normalised innovation squared of a measurement, both axes together: chi squared with as many degrees of freedom as numbers were measured.
+    /// Normalised innovation squared of a measurement, both axes together: chi squared with as many degrees
+    /// of freedom as numbers were measured.
     pub fn innovation(&self, z: &Measurement) -> f64 {
         let mut after = self.clone();
-        // The innovations of rows taken one after the other are independent, and their squares add up to that of all.
+        // The innovations of rows taken one after the other are independent, and their squares add up to that
+        // of all.
         (0..2).map(|axis| after.update_axis(axis, z)).sum()
     }
 
-    /// Takes a measurement (16)(17), with the covariance in Joseph's form (18); returns its normalised innovation squared.
+    /// Takes a measurement (16)(17), with the covariance in Joseph's form (18); returns its normalised
+    /// innovation squared.
     pub fn update(&mut self, z: &Measurement) -> f64 {
         (0..2).map(|axis| self.update_axis(axis, z)).sum()
     }

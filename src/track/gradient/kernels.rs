@@ -1,7 +1,7 @@
 //! Beaudet's operators: value and first derivatives at the centre of a polynomial fitted to 5 x 5 pixels.
 //!
-//! P. R. Beaudet, "Rotationally invariant image operators" (1978): the least-squares polynomial of total degree `order` in a square neighbourhood; its coefficients
-//! are correlations with fixed masks.
+//! P. R. Beaudet, "Rotationally invariant image operators" (1978): the least-squares polynomial of total
+//! degree `order` in a square neighbourhood; its coefficients are correlations with fixed masks.
 
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -30,7 +30,8 @@ pub(super) fn kernels_of(order: usize) -> &'static DerivativeKernels {
     &KERNELS.get_or_init(|| [1, 2, 3, 4].map(derivative_kernels))[order.clamp(1, 4) - 1]
 }
 
-/// Largest gradient that rounding to whole grey levels makes of a flat picture, grey levels/px: half a level at each pixel, by the mask along x.
+/// Largest gradient that rounding to whole grey levels makes of a flat picture, grey levels/px: half a level
+/// at each pixel, by the mask along x.
 pub(super) fn gradient_of_rounding(order: usize) -> f64 {
     0.5 * kernels_of(order).x.iter().flatten().map(|k| k.abs()).sum::<f64>()
 }

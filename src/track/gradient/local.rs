@@ -1,7 +1,9 @@
-//! The paper's loop (its figure 6): local flow in a moving window, its mean over what moves, a Gauss-Markov filter that steers the window.
+//! The paper's loop (its figure 6): local flow in a moving window, its mean over what moves, a Gauss-Markov
+//! filter that steers the window.
 //!
-//! M. Chiba and S. Ozawa, section on the tracking algorithm, equations (11) to (26), with the repairs that it needs: a gate for weak gradients, two starts of the flow, steering by position, a
-//! gate for innovations, and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
+//! M. Chiba and S. Ozawa, section on the tracking algorithm, equations (11) to (26), with the repairs that it
+//! needs: a gate for weak gradients, two starts of the flow, steering by position, a gate for innovations,
+//! and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
 use super::detect::detect_moving_target;
 use super::extent::{Ends, Extent, ends};
@@ -21,15 +23,18 @@ const FEWEST: usize = 12;
 const GATE: f64 = 16.0;
 /// Refusals in a row after which a measurement is taken all the same.
 const REFUSALS: usize = 3;
-/// Variance of the position and velocity of what is too fast for local flow, px^2: whole pixels, an outline of changed ones.
+/// Variance of the position and velocity of what is too fast for local flow, px^2: whole pixels, an outline
+/// of changed ones.
 const FAST: f64 = 1.0;
 /// Its sides differ from the target's by less than this factor.
 const ALIKE: f64 = 1.6;
-/// How fast the usual count of moving pixels follows a larger one, and a smaller one: parts are hidden more often than they grow.
+/// How fast the usual count of moving pixels follows a larger one, and a smaller one: parts are hidden more
+/// often than they grow.
 const USUAL: [f64; 2] = [0.1, 0.03];
 /// Share of the usual count from which on all of the target is seen: counts scatter.
 const WHOLE: f64 = 0.85;
-/// Deviation of the mean flow of what is left over the target's speed, where nearly all is hidden: the edge that hides it stands still.
+/// Deviation of the mean flow of what is left over the target's speed, where nearly all is hidden: the edge
+/// that hides it stands still.
 const SLIP: f64 = 2.0;
 /// Least speed for that, px/frame.
 const LEAST_SPEED: f64 = 1.0;
@@ -42,7 +47,8 @@ const LOST_AFTER: usize = 15;
 /// Least automatic `eps`, px/frame.
 const LEAST_EPS: f64 = 0.3;
 
-/// Moving pixels around the target, over those of all that moves, from which on they are more than a few strays.
+/// Moving pixels around the target, over those of all that moves, from which on they are more than a few
+/// strays.
 const ALL: f64 = 0.25;
 /// What is said where what is around the target moves as well.
 const ALL_MOVES: &str = "all around the target moves, too";
@@ -170,8 +176,10 @@ impl LocalLoop {
         }
     }
 
-    /// Where the target is by what moves, and the deviations of that along x and y beyond what noise makes, px, where a share of what usually moves is `missing`: the middle between its ends, or the mean
-    /// where these are not the target's alone. Outlines are what moves, so that a side that is hidden takes its quarter of the mean from far out.
+    /// Where the target is by what moves, and the deviations of that along x and y beyond what noise makes,
+    /// px, where a share of what usually moves is `missing`: the middle between its ends, or the mean where
+    /// these are not the target's alone. Outlines are what moves, so that a side that is hidden takes its
+    /// quarter of the mean from far out.
     fn place(&self, mean: &MeanFlow, ends: Option<&Ends>, missing: f64) -> ([f64; 2], [f64; 2]) {
         let of_mean = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
         let Some(ends) = ends else { return (of_mean, self.size.map(|length| missing * length)) };
@@ -182,7 +190,8 @@ impl LocalLoop {
         ([0, 1].map(|k| between[k].map_or(of_mean[k], |middle| middle.at)), [0, 1].map(lean))
     }
 
-    /// Deviations of the mean flow from the target's along x and y, px/frame, where a share of what usually moves is `missing`.
+    /// Deviations of the mean flow from the target's along x and y, px/frame, where a share of what usually
+    /// moves is `missing`.
     fn slip(&self, missing: f64) -> [f64; 2] {
         self.filter.speed().map(|speed| SLIP * missing * speed.abs().max(LEAST_SPEED))
     }
@@ -200,7 +209,8 @@ impl LocalLoop {
         self.usual += gain * (count_now - self.usual);
     }
 
-    /// A target that moves farther from what is expected than local flow reaches, seen in the `second` window.
+    /// A target that moves farther from what is expected than local flow reaches, seen in the `second`
+    /// window.
     fn too_fast(&self, second: &Frame<f64>) -> Option<Measurement> {
         let (corner, expected, speed) = (self.corner(), self.filter.position(), self.filter.speed());
         let near = [0, 1].map(|k| expected[k] - corner[k]);
@@ -283,7 +293,8 @@ impl LocalLoop {
         (3.0 * MAD * median(&mut sizes)).max(LEAST_EPS)
     }
 
-    /// Whether most of what is around the target moves, and is a good part of all that does: the camera moves, or the window shows something else.
+    /// Whether most of what is around the target moves, and is a good part of all that does: the camera
+    /// moves, or the window shows something else.
     fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, eps: f64) -> bool {
         let (mut moving, mut all) = (0, 0);
         for w in self.around(flow) {

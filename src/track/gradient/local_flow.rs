@@ -1,4 +1,5 @@
-//! Flow of single pixels from the gradient equation in a small window: M. Chiba and S. Ozawa, equations (1) to (10).
+//! Flow of single pixels from the gradient equation in a small window: M. Chiba and S. Ozawa, equations (1)
+//! to (10).
 
 use super::equations::Equations;
 use super::kernels::kernels_of;
@@ -20,8 +21,9 @@ pub struct LocalFlowOptions {
     pub order: usize,
     /// Largest condition number `sqrt(lambda_max / lambda_min)` of the gradients in the window (8).
     pub cond_max: f64,
-    /// Least gradient along the weaker direction, `sqrt(lambda_min / m)`, grey levels/px. Above 0 it is at least 0.7 times the noise of the frames: the condition number does not change with contrast, so
-    /// that weak texture and noise pass it.
+    /// Least gradient along the weaker direction, `sqrt(lambda_min / m)`, grey levels/px. Above 0 it is at
+    /// least 0.7 times the noise of the frames: the condition number does not change with contrast, so that
+    /// weak texture and noise pass it.
     pub min_sigma: f64,
     /// Longest step of one solution (4), px.
     pub step_max: f64,
@@ -56,7 +58,8 @@ pub struct MeanFlow {
 /// Pixels that the noise is told from, about.
 const NOISE_SAMPLES: usize = 2048;
 
-/// Noise of the frames from their difference: `1.4826 median|E(t+1) - E(t)| / sqrt 2`, grey levels; 0 where they have no common pixel.
+/// Noise of the frames from their difference: `1.4826 median|E(t+1) - E(t)| / sqrt 2`, grey levels; 0 where
+/// they have no common pixel.
 pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>) -> f64 {
     let every = (first.data().len() / NOISE_SAMPLES).max(1) | 1;
     let pairs = first.data().iter().zip(second.data()).step_by(every);
@@ -75,8 +78,9 @@ impl LocalFlowOptions {
         if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second)) } else { 0.0 }
     }
 
-    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction (7) is made. Windows with gradients up to `flat`, grey levels/px, are flat: their condition number
-    /// (8) is infinite.
+    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction
+    /// (7) is made. Windows with gradients up to `flat`, grey levels/px, are flat: their condition number (8)
+    /// is infinite.
     pub(super) fn flow_from(
         &self,
         first: &Frame<f64>,
@@ -132,7 +136,8 @@ pub fn local_flow(first: &Frame<f64>, second: &Frame<f64>, options: &LocalFlowOp
     options.flow_from(first, second, &[[0.0; 2]], 0.0)
 }
 
-/// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the frame.
+/// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the
+/// frame.
 pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
     if shift == [0.0; 2] {
         return frame.clone();

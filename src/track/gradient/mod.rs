@@ -1,9 +1,11 @@
 //! The gradient tracker: a moving target followed by the gradient equation, a prediction and a moving window.
 //!
-//! Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ).
+//! Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
+//! (IPSJ).
 //!
-//! Three systems follow the target ([`Mode`]): the paper's loop to the letter, the same with the repairs that it needs, and one that keeps its idea (the gradient equation, a
-//! prediction in place of iterations, a stopped background, a Gauss-Markov filter) but solves the equation once over the whole segmented target.
+//! Three systems follow the target ([`Mode`]): the paper's loop to the letter, the same with the repairs that
+//! it needs, and one that keeps its idea (the gradient equation, a prediction in place of iterations, a
+//! stopped background, a Gauss-Markov filter) but solves the equation once over the whole segmented target.
 
 mod detect;
 mod equations;
@@ -81,10 +83,12 @@ pub struct GradientTracker {
 }
 
 impl GradientTracker {
-    /// Begins with the first frame. Without a box the target is what moves first ([`detect_moving_target`]): until then its status is lost and its box empty.
+    /// Begins with the first frame. Without a box the target is what moves first ([`detect_moving_target`]):
+    /// until then its status is lost and its box empty.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px, wholly outside, not finite), `center` (outside) or the option.
+    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px,
+    /// wholly outside, not finite), `center` (outside) or the option.
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
         options.check()?;
         options.check_camera(start)?;

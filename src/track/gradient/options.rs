@@ -6,10 +6,12 @@ use crate::types::TargetBox;
 /// Which system follows the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
-    /// Target and background as layers, one gradient step over the whole segmented target from the prediction. The default.
+    /// Target and background as layers, one gradient step over the whole segmented target from the
+    /// prediction. The default.
     #[default]
     Layered,
-    /// The paper's loop: local flow in a moving window, its mean over what moves, a Gauss-Markov Kalman filter; with the repairs that it needs.
+    /// The paper's loop: local flow in a moving window, its mean over what moves, a Gauss-Markov Kalman
+    /// filter; with the repairs that it needs.
     Local,
     /// The paper's text to the letter, for comparison: it loses targets on all but flat backgrounds.
     Paper,
@@ -76,7 +78,8 @@ pub enum Start {
 pub struct GradientOptions {
     /// Which system.
     pub mode: Mode,
-    /// Side of the window that is looked at, px (`local`, `paper`), made odd; `None` (default): 51, or 1.6 times the longer side of the target's box where that is more.
+    /// Side of the window that is looked at, px (`local`, `paper`), made odd; `None` (default): 51, or 1.6
+    /// times the longer side of the target's box where that is more.
     pub fov: Option<usize>,
     /// How that window moves; default whole pixels.
     pub control: Control,
@@ -84,7 +87,8 @@ pub struct GradientOptions {
     pub window: Option<usize>,
     /// Degree of the polynomials behind the derivatives, 1 to 4; default 4 (`paper` 2).
     pub order: Option<usize>,
-    /// Slowest flow that counts as motion, px/frame; `None`: three deviations of the flow outside the target, at least 0.3. Default 0.5.
+    /// Slowest flow that counts as motion, px/frame; `None`: three deviations of the flow outside the target,
+    /// at least 0.3. Default 0.5.
     pub eps: Option<f64>,
     /// What the target may do; default similarity.
     pub shape: Shape,

@@ -14,7 +14,8 @@ pub struct RefineOptions {
     pub local: LocalFlowOptions,
     /// Most steps at a level.
     pub steps: usize,
-    /// Sides of the square windows that both frames are smoothed with, one level after the other, px; 1 leaves them as they are.
+    /// Sides of the square windows that both frames are smoothed with, one level after the other, px; 1
+    /// leaves them as they are.
     pub levels: [usize; 3],
 }
 
@@ -27,9 +28,11 @@ impl Default for RefineOptions {
 /// Side of the square that the median of the field is taken over between levels, px.
 const MEDIAN: usize = 5;
 
-/// Flow of single pixels from the first frame to the second, refined by warping with cubic splines (9)(10), coarse to fine; motions up to about 3 px.
+/// Flow of single pixels from the first frame to the second, refined by warping with cubic splines (9)(10),
+/// coarse to fine; motions up to about 3 px.
 ///
-/// At a level a pixel goes on as long as the residual of its window strictly falls. Pixels without a solution keep what the level before found.
+/// At a level a pixel goes on as long as the residual of its window strictly falls. Pixels without a solution
+/// keep what the level before found.
 pub fn refine_flow(first: &Frame<f64>, second: &Frame<f64>, options: &RefineOptions) -> LocalFlow {
     let (width, height) = first.size();
     let mut field = Frame::filled(width, height, [0.0; 2]);
@@ -91,7 +94,8 @@ fn refine_level(
     accepted
 }
 
-/// A frame that is read between its pixels: as a cubic spline, whose error is far below that of cubic convolution on fine texture.
+/// A frame that is read between its pixels: as a cubic spline, whose error is far below that of cubic
+/// convolution on fine texture.
 struct Between<'a> {
     frame: &'a Frame<f64>,
     spline: Spline<f64>,
@@ -134,7 +138,8 @@ impl<'a> Between<'a> {
     }
 }
 
-/// The field goes on towards the border, where windows reach over it, as it is `margin` px from there: what stayed at rest there would pull its neighbours back.
+/// The field goes on towards the border, where windows reach over it, as it is `margin` px from there: what
+/// stayed at rest there would pull its neighbours back.
 fn continued(field: &Frame<[f64; 2]>, margin: usize) -> Frame<[f64; 2]> {
     let (width, height) = field.size();
     if width <= 2 * margin || height <= 2 * margin {

@@ -7,7 +7,8 @@ const FOV: usize = 51;
 /// Side of the window over that of a large target.
 const ROOM: f64 = 1.6;
 
-/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a window has a middle.
+/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a
+/// window has a middle.
 pub(super) fn side(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
     let needed = (ROOM * bounds.width.max(bounds.height)) as usize;
     wanted.unwrap_or(needed.max(FOV)).min(2 * width.max(height)) | 1

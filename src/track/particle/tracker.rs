@@ -260,7 +260,8 @@ impl ParticleTracker {
             self.coast();
             return Ok(());
         }
-        // Corners are followed from the last frame that showed something: the camera must cover the same time.
+        // Corners are followed from the last frame that showed something: the camera must cover the same
+        // time.
         let missed = std::mem::take(&mut self.missed).into_iter().map(|camera| camera.map(CameraMotion::from_affine));
         let known = missed.chain([known]).reduce(|first, next| Some(first?.then(&next?))).flatten();
         let pyramid = Corners::pyramid(view.grey.clone());

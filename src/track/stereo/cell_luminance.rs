@@ -1,4 +1,5 @@
-//! Luminance reduced to the cells of the grid, and templates compared in it: equation (29) of the stereo paper.
+//! Luminance reduced to the cells of the grid, and templates compared in it: equation (29) of the stereo
+//! paper.
 
 use super::exposure::Exposure;
 use super::voxels::Lattice;
@@ -29,7 +30,8 @@ pub(super) struct Match {
 }
 
 impl CellLuminance {
-    /// Averages grey levels (0 to 255) over cells: `floor(Y levels / 256)`. Pixels that are not finite are left out.
+    /// Averages grey levels (0 to 255) over cells: `floor(Y levels / 256)`. Pixels that are not finite are
+    /// left out.
     pub fn new(frame: &Frame<f32>, lattice: &Lattice, levels: usize) -> Self {
         let (columns, rows) = (lattice.grid.columns, lattice.grid.rows);
         let (cell_columns, cell_rows) = (lattice.cell_columns(), lattice.cell_rows());
@@ -73,8 +75,9 @@ impl CellLuminance {
         Some(self.levels[(y * self.columns + x) as usize]).filter(|&level| level != NONE)
     }
 
-    /// Moves the template, cells of `self`, over `next`, up to `reach` cells along x and y: the shift with the least mean absolute difference over what stays in the picture, at least half of it (29).
-    /// The shorter one of equals; `None` where no shift keeps half.
+    /// Moves the template, cells of `self`, over `next`, up to `reach` cells along x and y: the shift with
+    /// the least mean absolute difference over what stays in the picture, at least half of it (29). The
+    /// shorter one of equals; `None` where no shift keeps half.
     pub fn find(&self, template: &[[u16; 2]], next: &Self, reach: i32) -> Option<Match> {
         let cells: Vec<(i32, i32, i32)> = template
             .iter()

@@ -29,7 +29,8 @@ pub(super) fn nearest(map: &Frame<f32>, x: f64, y: f64) -> Option<f64> {
     best.map(|(_, value)| value)
 }
 
-/// Mean of numbers among outliers: from the median, weights `1 / (1 + (e / 2 s)^2)^2`. `None` of fewer than three.
+/// Mean of numbers among outliers: from the median, weights `1 / (1 + (e / 2 s)^2)^2`. `None` of fewer than
+/// three.
 pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
     if values.len() < 3 {
         return None;

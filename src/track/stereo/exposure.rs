@@ -1,6 +1,8 @@
 //! Brightness of one step beside that of the next: what another exposure does to all of a picture alike.
 //!
-//! Motion is found from brightness that stays; a hundredth less of it is a fiftieth of a pixel of false motion, a fifth less is worse than none. Both cameras of a pair are exposed alike, so disparities do not suffer.
+//! Motion is found from brightness that stays; a hundredth less of it is a fiftieth of a pixel of false
+//! motion, a fifth less is worse than none. Both cameras of a pair are exposed alike, so disparities do not
+//! suffer.
 
 use super::clusters::Clusters;
 use super::lucas_kanade::PlaneMotion;
@@ -12,7 +14,8 @@ use crate::types::Frame;
 const COMPARED: [f64; 2] = [64.0, 192.0];
 /// Exposures that differ by less, grey levels, are one: the noise of what is measured.
 const ALIKE: f64 = 0.3;
-/// Smaller changes of the shares of bright and dark pixels may be those of what the picture shows, grey levels; motion is found well enough without knowing them.
+/// Smaller changes of the shares of bright and dark pixels may be those of what the picture shows, grey
+/// levels; motion is found well enough without knowing them.
 const LARGE: f64 = 12.0;
 /// Every how many pixels along x and y one is looked at for these shares.
 const SAMPLED: usize = 4;
@@ -59,8 +62,9 @@ impl Exposure {
         self.difference(other) > ALIKE
     }
 
-    /// A large change that the shares of bright and dark pixels of both pictures tell before any motion is known: the line through their deciles, by medians of slopes.
-    /// What comes into the picture changes the shares, too; so small changes are not told.
+    /// A large change that the shares of bright and dark pixels of both pictures tell before any motion is
+    /// known: the line through their deciles, by medians of slopes. What comes into the picture changes the
+    /// shares, too; so small changes are not told.
     pub fn large(before: &Frame<f32>, after: &Frame<f32>) -> Self {
         let told = || {
             let (x, y) = (deciles(before)?, deciles(after)?);
@@ -74,7 +78,8 @@ impl Exposure {
         told().filter(|told| told.difference(&Self::SAME) > LARGE).unwrap_or(Self::SAME)
     }
 
-    /// The exposure that pixels show which are known to be the same: a line through their brightness before and after, among outliers. `None` where they are too few or all alike.
+    /// The exposure that pixels show which are known to be the same: a line through their brightness before
+    /// and after, among outliers. `None` where they are too few or all alike.
     fn of_pairs(pairs: &[[f64; 2]]) -> Option<Self> {
         let inside = |pair: &&[f64; 2]| pair.iter().all(|value| CUT_OFF.contains(value));
         let pairs: Vec<[f64; 2]> = pairs.iter().filter(inside).copied().collect();
@@ -115,7 +120,9 @@ impl Exposure {
     }
 }
 
-/// The line of least weighted squares of the distances from it: both pictures are equally noisy, and least squares of the later brightness alone would tell too small a gain. `None` where what it goes through is all alike.
+/// The line of least weighted squares of the distances from it: both pictures are equally noisy, and least
+/// squares of the later brightness alone would tell too small a gain. `None` where what it goes through is
+/// all alike.
 fn weighted_line(pairs: &[[f64; 2]], weight: impl Fn(&[f64; 2]) -> f64) -> Option<Exposure> {
     let sum = |of: &dyn Fn(&[f64; 2]) -> f64| pairs.iter().map(|pair| weight(pair) * of(pair)).sum::<f64>();
     let all = sum(&|_| 1.0);
@@ -130,7 +137,8 @@ fn weighted_line(pairs: &[[f64; 2]], weight: impl Fn(&[f64; 2]) -> f64) -> Optio
     Some(Exposure { gain, offset: y - gain * x })
 }
 
-/// Brightness below which one to nine tenths of a picture's pixels are; `None` of one that shows hardly anything.
+/// Brightness below which one to nine tenths of a picture's pixels are; `None` of one that shows hardly
+/// anything.
 fn deciles(frame: &Frame<f32>) -> Option<[f64; SHARES]> {
     let rows = (0..frame.height()).step_by(SAMPLED).map(|y| frame.row(y));
     let mut values: Vec<f32> =

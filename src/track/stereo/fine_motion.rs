@@ -10,7 +10,8 @@ pub(super) struct FineMotion {
     pub plane: PlaneMotion,
     /// Change of the disparity.
     pub depth: f64,
-    /// Share of the cluster's pixels at whose new places the next step shows an edge in the new depth; 0 of what was not measured.
+    /// Share of the cluster's pixels at whose new places the next step shows an edge in the new depth; 0 of
+    /// what was not measured.
     pub support: f64,
 }
 
@@ -22,7 +23,8 @@ impl FineMotion {
         AffineFlow { u, v, ..flow }.to_array()
     }
 
-    /// `(u, v, w)` at the centre, px and disparity: medians of the pixels along x and y, which stray pixels hardly move.
+    /// `(u, v, w)` at the centre, px and disparity: medians of the pixels along x and y, which stray pixels
+    /// hardly move.
     pub fn at_centre(&self) -> [f64; 3] {
         [self.plane.flow.u, self.plane.flow.v, self.depth]
     }
@@ -54,8 +56,9 @@ impl FineMotion {
     }
 }
 
-/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew. Counting in whole cells of the picture moves it by up to half of one more or less than
-/// the pixels; in depth their means count. `None` for a cluster without pixels.
+/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew.
+/// Counting in whole cells of the picture moves it by up to half of one more or less than the pixels; in
+/// depth their means count. `None` for a cluster without pixels.
 pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -> Option<[f64; 3]> {
     let (lattice, pixels) = (clusters.lattice(), &clusters.pixels[k]);
     let mut sum = [0.0; 2];

@@ -23,11 +23,13 @@ pub struct Node {
     pub mean: [f64; 3],
     /// Covariance of `(x, y, d)`, px^2.
     pub covariance: [[f64; 3]; 3],
-    /// Motion `(u, v, w)` since the last step, medians over its pixels then, px/step and disparity/step; none where it was not measured.
+    /// Motion `(u, v, w)` since the last step, medians over its pixels then, px/step and disparity/step; none
+    /// where it was not measured.
     pub velocity: Option<[f64; 3]>,
     /// Motion `(u, v, w)` to the next step, medians over its pixels, as soon as that is known.
     pub next_velocity: Option<[f64; 3]>,
-    /// Medians of its pixels along x and y, px; in the improved mode of those that show its own surface, neither strays nor those of its outline that are beyond it.
+    /// Medians of its pixels along x and y, px; in the improved mode of those that show its own surface,
+    /// neither strays nor those of its outline that are beyond it.
     pub middle: [f64; 2],
     /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle.
     pub affine: Option<[f64; 6]>,
@@ -140,10 +142,12 @@ impl TrackGraph {
         arcs.into_iter().flatten().map(|(_, arc)| arc).filter(move |arc| arc.to == index)
     }
 
-    /// A track: the clusters `(time, index)` reached from one along arcs whose score is at least `threshold`, forwards in time or backwards; itself among them.
+    /// A track: the clusters `(time, index)` reached from one along arcs whose score is at least `threshold`,
+    /// forwards in time or backwards; itself among them.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `node` where there is no such cluster, `threshold` for one that no score can be.
+    /// [`Error::Argument`] named `node` where there is no such cluster, `threshold` for one that no score can
+    /// be.
     pub fn follow(&self, time: usize, index: usize, threshold: f64, backward: bool) -> Result<Vec<(usize, usize)>> {
         if !(0.0..=2.0).contains(&threshold) {
             return Err(Error::argument("threshold", "a score, 0 to 2", threshold));
@@ -184,7 +188,8 @@ impl TrackGraph {
     /// From [`TrackGraph::to_json`], number for number.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `json` for text that is no graph or tells a cluster or an arc twice, `arc` for arcs between clusters that are missing.
+    /// [`Error::Argument`] named `json` for text that is no graph or tells a cluster or an arc twice, `arc`
+    /// for arcs between clusters that are missing.
     pub fn from_json(json: &str) -> Result<Self> {
         let refuse = |got: String| Error::argument("json", "a graph as to_json writes it", got);
         let written: Written = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;

@@ -28,11 +28,15 @@ impl GroupMotion {
     }
 }
 
-/// The least member of each cluster's group: joins clusters no farther apart in the picture than the reach whose affine motions differ, in the median over the pixels
-/// of both, by no more than asked, and whose motions in depth agree, as they are or as those of one thing that comes nearer. Clusters without a motion stay alone.
+/// The least member of each cluster's group: joins clusters no farther apart in the picture than the reach
+/// whose affine motions differ, in the median over the pixels of both, by no more than asked, and whose
+/// motions in depth agree, as they are or as those of one thing that comes nearer. Clusters without a motion
+/// stay alone.
 ///
-/// What comes nearer grows, at a rate `g = D c` for a disparity `D` from that at infinity and a constant `c` of the thing, and its disparity changes by `w = D^2 c`. So of two of its parts
-/// `w_a - w_b = (D_a + D_b)(D_a - D_b) c = (g_a + g_b)(d_a - d_b)`: nearer parts come nearer faster, by what the growth of both says, wherever infinity is.
+/// What comes nearer grows, at a rate `g = D c` for a disparity `D` from that at infinity and a constant `c`
+/// of the thing, and its disparity changes by `w = D^2 c`. So of two of its parts `w_a - w_b = (D_a +
+/// D_b)(D_a - D_b) c = (g_a + g_b)(d_a - d_b)`: nearer parts come nearer faster, by what the growth of both
+/// says, wherever infinity is.
 pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limits: &Grouping) -> Vec<usize> {
     let count = clusters.components();
     let mut parent: Vec<usize> = (0..count).collect();
@@ -146,7 +150,8 @@ mod tests {
     }
     #[test]
     fn nearer_parts_of_what_comes_nearer_come_faster() {
-        // Disparities -30 and -10, 40 and 60 px nearer than infinity at -70: parts of one thing that grows by a fiftieth and by three hundredths a step.
+        // Disparities -30 and -10, 40 and 60 px nearer than infinity at -70: parts of one thing that grows by
+        // a fiftieth and by three hundredths a step.
         let clusters = made_up(&[([10, 5, 10], 0), ([12, 5, 30], 1)], 2);
         let part = |growth: f64, depth: f64| {
             let affine = [growth * -92.0, growth * -44.0, growth, 0.0, 0.0, growth];

@@ -1,4 +1,5 @@
-//! Which track each component is: kept while it covers its moved self, rested when lost, recognised; section 6.6 of the stereo tracker's design.
+//! Which track each component is: kept while it covers its moved self, rested when lost, recognised; section
+//! 6.6 of the stereo tracker's design.
 
 use super::moment::Moment;
 use super::options::Recognition;
@@ -9,13 +10,15 @@ pub(super) struct Identity {
     pub id: u64,
     /// When it began, ordinary steps.
     pub born: f64,
-    /// Last good motion, cells along x, y and disparity per ordinary step: measured ones as far as the component was seen where they lead.
+    /// Last good motion, cells along x, y and disparity per ordinary step: measured ones as far as the
+    /// component was seen where they lead.
     pub velocity: Option<[f64; 3]>,
     /// Steps of like motion.
     pub steady: usize,
     /// Time coasted without a break, ordinary steps.
     pub coasted: f64,
-    /// Where it is, cells: its middle, or where it went since while it is mostly covered, which shifts the middle.
+    /// Where it is, cells: its middle, or where it went since while it is mostly covered, which shifts the
+    /// middle.
     pub position: [f64; 3],
     /// Most edge pixels of late.
     pub peak: f64,
@@ -31,26 +34,31 @@ pub(super) struct Sighting {
     pub position: [f64; 3],
     /// Edge pixels.
     pub pixels: usize,
-    /// Median deviations from these along x, y and in depth, cells and layers. Wrong matches that are in every component change neither much.
+    /// Median deviations from these along x, y and in depth, cells and layers. Wrong matches that are in
+    /// every component change neither much.
     pub spread: [f64; 3],
 }
 
-/// Share of the most pixels of late below which a track counts as partly covered: its middle is then that of what is left.
+/// Share of the most pixels of late below which a track counts as partly covered: its middle is then that of
+/// what is left.
 const COVERED: f64 = 0.8;
-/// By how much a thing may be thicker or thinner than a lost one that it is taken for: a factor, and layers. What covers part of a thing does not change its extent in depth.
+/// By how much a thing may be thicker or thinner than a lost one that it is taken for: a factor, and layers.
+/// What covers part of a thing does not change its extent in depth.
 const AS_THICK: (f64, f64) = (2.0, 0.5);
 /// How many times as many pixels as the lost one had a thing that is taken for it may have.
 const AS_LARGE: f64 = 1.5;
 /// Half the extent of something even, over its median deviation.
 const HALF_EXTENT: f64 = 2.0;
-/// What the memory of the most pixels keeps for each ordinary step: little enough to forget what shrinks as it goes away, and so much that what is being covered over several steps is not taken for that.
+/// What the memory of the most pixels keeps for each ordinary step: little enough to forget what shrinks as
+/// it goes away, and so much that what is being covered over several steps is not taken for that.
 const FORGET: f64 = 0.95;
 
 /// Times differ by more than this, ordinary steps, unless they are the same one summed up otherwise.
 const SAME_TIME: f64 = 1e-6;
 
-/// Share of a component's pixels that must be seen where a measured motion leads for it to be believed although it is a jump. What is being hidden jumps onto what hides it, where few of them meet
-/// anything. What stops, or moves twice as far because a frame is missing, is seen nearly whole.
+/// Share of a component's pixels that must be seen where a measured motion leads for it to be believed
+/// although it is a jump. What is being hidden jumps onto what hides it, where few of them meet anything.
+/// What stops, or moves twice as far because a frame is missing, is seen nearly whole.
 const SEEN_THERE: f64 = 0.6;
 
 /// A motion that was measured.
@@ -100,7 +108,9 @@ impl Identities {
         self.next - 1
     }
 
-    /// The motion that carries component `k` on over a gap of so many ordinary steps: what was measured, or the last good motion of a steady track for a while after that jumped, with little to be seen there, or was not measured.
+    /// The motion that carries component `k` on over a gap of so many ordinary steps: what was measured, or
+    /// the last good motion of a steady track for a while after that jumped, with little to be seen there, or
+    /// was not measured.
     pub fn carry(
         &mut self,
         k: usize,
@@ -140,7 +150,8 @@ impl Identities {
         measured.map(|motion| Carried { motion, coasting: false })
     }
 
-    /// Takes the tracks of the components for which `lost` holds, to be waited for; they were last seen at `since`, ordinary steps.
+    /// Takes the tracks of the components for which `lost` holds, to be waited for; they were last seen at
+    /// `since`, ordinary steps.
     pub fn rest(&mut self, since: f64, lost: impl Fn(usize) -> bool) {
         for k in 0..self.live.len() {
             if lost(k)
@@ -154,8 +165,9 @@ impl Identities {
         }
     }
 
-    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component that is larger than its own, may be it as well, and has no track, one that has only just begun, or a younger
-    /// one that it outgrows; which its own component gets in exchange.
+    /// What comes to light is first seen in parts: a track that is mostly covered goes over to a component
+    /// that is larger than its own, may be it as well, and has no track, one that has only just begun, or a
+    /// younger one that it outgrows; which its own component gets in exchange.
     fn pass_to_larger_parts(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(identity) = self.live[own.component].as_ref() else { continue };
@@ -177,8 +189,10 @@ impl Identities {
         }
     }
 
-    /// Gives every component that is seen and has no track one: a lost track that is expected there, the largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new one. A component
-    /// whose track is of a part that was seen of something, which more and more of comes to light, is called after the lost whole instead. Then all are where they were seen.
+    /// Gives every component that is seen and has no track one: a lost track that is expected there, the
+    /// largest component first and of its tracks the nearest, if there are at least `least` pixels, or a new
+    /// one. A component whose track is of a part that was seen of something, which more and more of comes to
+    /// light, is called after the lost whole instead. Then all are where they were seen.
     pub fn name_all(&mut self, at: Moment, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.resting.retain(|resting| {
             limits.is_some_and(|limits| at.now - resting.since <= limits.patience as f64 + SAME_TIME)
@@ -224,7 +238,8 @@ impl Identities {
 }
 
 impl Identity {
-    /// Takes over where it is seen, with how many pixels and how far spread, so many ordinary steps after it was last.
+    /// Takes over where it is seen, with how many pixels and how far spread, so many ordinary steps after it
+    /// was last.
     fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 3]), gap: f64) {
         self.peak = pixels.max(FORGET.powf(gap) * self.peak);
         self.position = match self.velocity {
@@ -238,7 +253,8 @@ impl Identity {
         };
     }
 
-    /// How far a component is from where the track is expected after so many ordinary steps, in tolerances; `None` beyond them, and for one that does not resemble it.
+    /// How far a component is from where the track is expected after so many ordinary steps, in tolerances;
+    /// `None` beyond them, and for one that does not resemble it.
     fn distance(&self, steps: f64, seen: &Sighting, limits: &Recognition) -> Option<f64> {
         let velocity = self.velocity.filter(|_| self.resembles(seen))?;
         // The middle of what is not covered is as far from that of the whole as the other part allows.

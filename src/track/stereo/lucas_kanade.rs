@@ -1,4 +1,5 @@
-//! Affine motion of a cluster on its edge pixels (B. Lucas and T. Kanade, 1981), coarse to fine, robustly weighted; section 6.4 of the stereo tracker's design.
+//! Affine motion of a cluster on its edge pixels (B. Lucas and T. Kanade, 1981), coarse to fine, robustly
+//! weighted; section 6.4 of the stereo tracker's design.
 
 mod task;
 mod visible;
@@ -13,8 +14,9 @@ use crate::types::{AffineFlow, Frame};
 
 /// Deviations of the Gaussians, coarse to fine, px.
 const SIGMAS: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
-/// Ways to the finest level: steps with a translation, and after those with an affine map, at each level before it. Of what grows the rim moves farther than a fine level can follow: the map has to be affine
-/// from the coarsest one on. Of what is about to leave the picture too little is seen there, and less says more.
+/// Ways to the finest level: steps with a translation, and after those with an affine map, at each level
+/// before it. Of what grows the rim moves farther than a fine level can follow: the map has to be affine from
+/// the coarsest one on. Of what is about to leave the picture too little is seen there, and less says more.
 const WAYS: [[[usize; 2]; FINE]; 2] = [[[4, 4], [3, 3], [3, 3]], [[0, 0], [4, 0], [3, 3]]];
 /// Those at the finest level.
 const FINE_STEPS: [usize; 2] = [1, 6];
@@ -26,7 +28,8 @@ const SETTLED: f64 = 1e-3;
 const LEAST_DEVIATION: f64 = 0.3;
 /// Mean absolute deviation from the median, to the deviation of a normal distribution.
 const MAD: f64 = 1.4826;
-/// Deviation beforehand of a translation from its start, px, and of what the derivatives change within the cluster's radius over that radius.
+/// Deviation beforehand of a translation from its start, px, and of what the derivatives change within the
+/// cluster's radius over that radius.
 const PRIOR: [f64; 2] = [16.0, 0.15];
 /// Pixels that an affine map needs.
 const AFFINE_PIXELS: usize = 40;
@@ -42,7 +45,8 @@ pub(super) struct SmoothedLevels([Frame<f32>; SIGMAS.len()]);
 impl SmoothedLevels {
     /// Smooths a frame in grey levels.
     pub fn new(frame: &Frame<f32>) -> Self {
-        // Deviations of this size are always taken; each level is smoothed from the frame itself, so that NaN stays where it reaches.
+        // Deviations of this size are always taken; each level is smoothed from the frame itself, so that NaN
+        // stays where it reaches.
         Self(SIGMAS.map(|sigma| {
             GaussianSmoother::with(f64::from(sigma), 3.0, crate::image::Border::Reflect)
                 .map_or_else(|_| frame.clone(), |smoother| smoother.apply(frame))
@@ -86,9 +90,11 @@ impl PlaneMotion {
     }
 }
 
-/// Finds the motion of pixels `(x, y)` between two smoothed frames from the best of some first guesses of the translation, px.
+/// Finds the motion of pixels `(x, y)` between two smoothed frames from the best of some first guesses of the
+/// translation, px.
 ///
-/// `None` where fewer than half of the pixels stay in the picture, there are fewer than three, or the equations have no solution.
+/// `None` where fewer than half of the pixels stay in the picture, there are fewer than three, or the
+/// equations have no solution.
 pub(super) fn affine_motion(
     before: &SmoothedLevels,
     after: &SmoothedLevels,

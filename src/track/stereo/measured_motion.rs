@@ -13,11 +13,13 @@ use std::borrow::Cow;
 
 /// First guesses nearer than this to one another are one, px.
 const SAME_START: f64 = 3.0;
-/// Least share of a cluster's pixels at whose new places there must be a disparity, and of those disparities that agree.
+/// Least share of a cluster's pixels at whose new places there must be a disparity, and of those disparities
+/// that agree.
 const LEAST_SHARE: f64 = 0.15;
 /// Changes of disparity that agree differ from their mean by no more than this, layers of voxels.
 const AGREEING: f64 = 0.5;
-/// Deviations of what its motion leaves above this, over that of motions in general, need another explanation than noise.
+/// Deviations of what its motion leaves above this, over that of motions in general, need another explanation
+/// than noise.
 const UNEXPLAINED: f64 = 2.0;
 
 /// What the next step shows before anything is clustered in it.
@@ -56,10 +58,13 @@ impl<'a> LastView<'a> {
     }
 }
 
-/// Motion of all clusters with at least so many pixels towards the next view by affine Lucas-Kanade, from the template's shift (up to `reach` cells) and from a guess. What leaves much more of the picture than motions in general is
-/// partly hidden, or a coincidence: it is looked for again from what is expected. Where the exposure changed, both are done in the last picture as that would have made it.
+/// Motion of all clusters with at least so many pixels towards the next view by affine Lucas-Kanade, from the
+/// template's shift (up to `reach` cells) and from a guess. What leaves much more of the picture than motions
+/// in general is partly hidden, or a coincidence: it is looked for again from what is expected. Where the
+/// exposure changed, both are done in the last picture as that would have made it.
 ///
-/// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture or the disparities do not tell, or tell of more than is searched for.
+/// Depth: robust mean of what the disparity is at the moved pixels less what it was. `None` where the picture
+/// or the disparities do not tell, or tell of more than is searched for.
 pub(super) fn fine_motions(
     from: &Seen,
     next: NextView<'_>,
@@ -111,7 +116,8 @@ fn plane_motions(
     (0..last.clusters.components()).into_par_iter().map(search).collect()
 }
 
-/// Change of the disparity of a cluster's pixels that move in the picture, and the share of all its pixels that meet it; `None` where too few meet a disparity, or too few of those agree.
+/// Change of the disparity of a cluster's pixels that move in the picture, and the share of all its pixels
+/// that meet it; `None` where too few meet a disparity, or too few of those agree.
 fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &Frame<f32>) -> Option<(f64, f64)> {
     let pixels = &clusters.pixels[k];
     let change = |&i: &u32| {
@@ -129,7 +135,8 @@ fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &
     (agreeing as f64 >= LEAST_SHARE * changes.len() as f64).then_some((depth, agreeing as f64 / pixels.len() as f64))
 }
 
-/// Deviation of what motions leave in general, grey levels: the median over the pixels of all clusters that have one.
+/// Deviation of what motions leave in general, grey levels: the median over the pixels of all clusters that
+/// have one.
 fn noise(clusters: &Clusters, planes: &[Option<PlaneMotion>]) -> Option<f64> {
     let mut told: Vec<(f64, usize)> = planes
         .iter()
@@ -179,7 +186,8 @@ mod tests {
 
     #[test]
     fn disparities_of_other_surfaces_are_no_motion_in_depth() {
-        // Three columns of pixels, disparity -10; what is there next: half a disparity more, or something else in each row.
+        // Three columns of pixels, disparity -10; what is there next: half a disparity more, or something
+        // else in each row.
         let cells: Vec<_> = (0..30).map(|i| ([10 + i % 3, i / 3, 30], 0)).collect();
         let clusters = made_up(&cells, 1);
         let plane = FineMotion::translation([2.0, 0.0, 0.0], [88.0, 44.0]).plane;

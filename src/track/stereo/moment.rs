@@ -34,7 +34,8 @@ impl Moment {
         change.map(|change| change / (self.gap * self.step_time))
     }
 
-    /// How far, in cells, to search what is searched `ordinary` cells far from one ordinary step to the next. Nothing is searched less far for being seen sooner: there is little to gain.
+    /// How far, in cells, to search what is searched `ordinary` cells far from one ordinary step to the next.
+    /// Nothing is searched less far for being seen sooner: there is little to gain.
     pub fn reach(self, ordinary: usize) -> i32 {
         (ordinary as f64 * self.gap.max(1.0)).ceil().min(MOST_REACH as f64).max(ordinary as f64) as i32
     }

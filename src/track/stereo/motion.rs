@@ -25,8 +25,9 @@ pub(super) struct CellMotion {
     pub overlaps: Row,
 }
 
-/// Motion in cells of all clusters towards another step, looked for up to `reach` cells far: (29), then (30) to (32). `None` for empty ones, those whose template leaves the picture, and all where the other step has no
-/// edge pixels: every template fits somewhere in a picture of nothing.
+/// Motion in cells of all clusters towards another step, looked for up to `reach` cells far: (29), then (30)
+/// to (32). `None` for empty ones, those whose template leaves the picture, and all where the other step has
+/// no edge pixels: every template fits somewhere in a picture of nothing.
 pub(super) fn cell_motions(from: &Seen, to: &Seen, reach: i32) -> Vec<Option<CellMotion>> {
     if to.clusters.points.is_empty() {
         return vec![None; from.clusters.components()];

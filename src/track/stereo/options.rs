@@ -8,10 +8,12 @@ use crate::stereo::Method;
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StereoMode {
-    /// Motion is measured first, by affine Lucas-Kanade, and carries the mixture to the next step; what is hidden is recognised. The default.
+    /// Motion is measured first, by affine Lucas-Kanade, and carries the mixture to the next step; what is
+    /// hidden is recognised. The default.
     #[default]
     Improved,
-    /// The stereo paper's text: a new mixture each step, template matching in cells, overlaps in both directions.
+    /// The stereo paper's text: a new mixture each step, template matching in cells, overlaps in both
+    /// directions.
     Paper,
 }
 
@@ -35,7 +37,8 @@ pub struct VoxelGrid {
     pub columns: usize,
     /// Cells along y; default 60.
     pub rows: usize,
-    /// Layers of one disparity each; default 64. The disparity after the last layer's is counted in it, and so is what refinement led at most 1.5 px farther; anything else is left out.
+    /// Layers of one disparity each; default 64. The disparity after the last layer's is counted in it, and
+    /// so is what refinement led at most 1.5 px farther; anything else is left out.
     pub layers: usize,
     /// Disparity of the first layer, px; default -40.
     pub first_disparity: i32,
@@ -59,7 +62,8 @@ pub struct StereoCamera {
 }
 
 impl StereoCamera {
-    /// Depth `Z = f B / (d - d_infinity)`, in units of the baseline; NaN for a disparity at or beyond infinity.
+    /// Depth `Z = f B / (d - d_infinity)`, in units of the baseline; NaN for a disparity at or beyond
+    /// infinity.
     pub fn depth(&self, disparity: f64) -> f64 {
         let from_infinity = disparity - self.d_infinity;
         if from_infinity > 0.0 { self.focal * self.baseline / from_infinity } else { f64::NAN }
@@ -79,13 +83,15 @@ pub struct Recognition {
     pub least_overlap: f64,
     /// Ordinary steps that a lost track is waited for; default 10.
     pub patience: usize,
-    /// How far from where it is expected a new component may be to be the lost one, cells along x, y and disparity; default (3, 4, 1).
+    /// How far from where it is expected a new component may be to be the lost one, cells along x, y and
+    /// disparity; default (3, 4, 1).
     pub tolerance: [f64; 3],
     /// How much farther for each ordinary step since it was lost; default (0.5, 0.5, 0.2).
     pub tolerance_per_step: [f64; 3],
     /// Steps of like motion after which a track is steady; default 2.
     pub steady: usize,
-    /// Most ordinary steps that a steady track coasts through a jump behind which less than 0.6 of its pixels are seen; default 3.
+    /// Most ordinary steps that a steady track coasts through a jump behind which less than 0.6 of its pixels
+    /// are seen; default 3.
     pub coast: usize,
     /// A jump in the picture: change of the motion, px per ordinary step; default 24.
     pub jump: f64,
@@ -113,7 +119,8 @@ impl Default for Recognition {
 pub struct Grouping {
     /// Farthest that clusters which touch are apart in the picture, cells; default 3.5.
     pub reach: f64,
-    /// Most that their affine motions differ, median over the pixels of both, px per ordinary step; default 1.
+    /// Most that their affine motions differ, median over the pixels of both, px per ordinary step; default
+    /// 1.
     pub motion: f64,
     /// Most that their motions in depth differ, disparity per ordinary step; default 0.15.
     pub depth_motion: f64,
@@ -125,7 +132,8 @@ impl Default for Grouping {
     }
 }
 
-/// Options of the stereo tracker. Begin with [`StereoTrackerOptions::new`]: some defaults differ between the modes.
+/// Options of the stereo tracker. Begin with [`StereoTrackerOptions::new`]: some defaults differ between the
+/// modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StereoTrackerOptions {
     /// Which system.
@@ -136,7 +144,8 @@ pub struct StereoTrackerOptions {
     pub disparity_range: [i32; 2],
     /// Least and greatest offset of rows looked for, px; default (-4, 4).
     pub row_range: [i32; 2],
-    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated at the first step that shows enough and kept as long as the views agree with it (`SemiGlobal`).
+    /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated
+    /// at the first step that shows enough and kept as long as the views agree with it (`SemiGlobal`).
     pub row_offset: Option<f64>,
     /// How views are matched; default classes (`paper`), semi-global (`improved`).
     pub matching: Method,
@@ -154,7 +163,8 @@ pub struct StereoTrackerOptions {
     pub max_iter: usize,
     /// Most rounds from where the last step's components moved to (`improved`); default 30.
     pub warm_max_iter: usize,
-    /// The mixture stops when its lower bound grows by less than this for each pixel; none: never. Default none (`paper`), 1e-4 (`improved`).
+    /// The mixture stops when its lower bound grows by less than this for each pixel; none: never. Default
+    /// none (`paper`), 1e-4 (`improved`).
     pub tol: Option<f64>,
     /// Cold starts of which the best is kept; default 1.
     pub n_init: usize,
@@ -162,13 +172,16 @@ pub struct StereoTrackerOptions {
     pub prune_weight: f64,
     /// Seed of the cold starts; default 0.
     pub seed: u64,
-    /// How far templates and depths are searched from one ordinary step to the next, cells and disparities; default 8. Over a gap farther in proportion, at most 64.
+    /// How far templates and depths are searched from one ordinary step to the next, cells and disparities;
+    /// default 8. Over a gap farther in proportion, at most 64.
     pub search: usize,
     /// Levels of the reduced luminance; default 64.
     pub luminance_levels: usize,
     /// Least score of an arc that tracks follow, 0 to 2; default 0.4.
     pub arc_threshold: f64,
-    /// Components with fewer pixels after moving are seeded anew, and a start from seeds is looked over for pieces of one surface and for small things that share a component (`improved`); 0: neither; default 20.
+    /// Components with fewer pixels after moving are seeded anew, and a start from seeds is looked over for
+    /// pieces of one surface and for small things that share a component (`improved`); 0: neither; default
+    /// 20.
     pub reseed_below: f64,
     /// Whether lost tracks are waited for (`improved`).
     pub recognition: Option<Recognition>,
@@ -176,7 +189,9 @@ pub struct StereoTrackerOptions {
     pub grouping: Option<Grouping>,
     /// The cameras, if depths are wanted.
     pub camera: Option<StereoCamera>,
-    /// Time between ordinary steps, in the unit that times are told and velocities are counted in; default 1, a step. Everything here that is counted in steps means these; 1/30 where times are in seconds and every frame is taken of 30 a second.
+    /// Time between ordinary steps, in the unit that times are told and velocities are counted in; default 1,
+    /// a step. Everything here that is counted in steps means these; 1/30 where times are in seconds and
+    /// every frame is taken of 30 a second.
     pub step_time: f64,
     /// Number of threads; results do not depend on it.
     pub threads: Threads,
@@ -222,7 +237,8 @@ impl StereoTrackerOptions {
         }
     }
 
-    /// The same for another range of disparities, with a layer of the grid for each but the greatest, which is counted with the one before it.
+    /// The same for another range of disparities, with a layer of the grid for each but the greatest, which
+    /// is counted with the one before it.
     pub fn with_disparities(mut self, range: [i32; 2]) -> Self {
         let [least, greatest] = range;
         self.disparity_range = range;

@@ -25,8 +25,9 @@ fn occupied(clusters: &Clusters, cluster: usize, other: &Clusters, by: [i32; 3])
     counts
 }
 
-/// Looks for the shift in depth, up to `reach` layers, at which one cluster of `other` occupies most voxels (31), the smaller shift of equals;
-/// the overlaps are those with all clusters there (32). Both counts are of voxels, so that they stay between 0 and 1.
+/// Looks for the shift in depth, up to `reach` layers, at which one cluster of `other` occupies most voxels
+/// (31), the smaller shift of equals; the overlaps are those with all clusters there (32). Both counts are of
+/// voxels, so that they stay between 0 and 1.
 pub(super) fn depth_motion(
     clusters: &Clusters,
     cluster: usize,
@@ -50,8 +51,8 @@ pub(super) fn depth_motion(
     Depth { shift, overlaps: counts.into_iter().map(|n| f64::from(n) / all).collect() }
 }
 
-/// Shares of a cluster's voxels that each cluster of `other` meets once every edge pixel is moved by itself: `moved` tells where pixel `i` is then,
-/// `(x, y, d)`, px. As (32), for motions that are not whole cells.
+/// Shares of a cluster's voxels that each cluster of `other` meets once every edge pixel is moved by itself:
+/// `moved` tells where pixel `i` is then, `(x, y, d)`, px. As (32), for motions that are not whole cells.
 pub(super) fn moved_overlaps(
     clusters: &Clusters,
     cluster: usize,
@@ -69,7 +70,8 @@ pub(super) fn moved_overlaps(
             row[met] += 1.0;
         }
     }
-    // What left the picture counts as not met: the cluster's own number of voxels is the least that there are.
+    // What left the picture counts as not met: the cluster's own number of voxels is the least that there
+    // are.
     let all = cells.len().max(clusters.members[cluster].len()).max(1) as f64;
     for share in &mut row {
         *share /= all;

@@ -1,7 +1,9 @@
 //! Which pixels of a cluster show its own surface.
 //!
-//! An edge is located to a pixel: along the outline of a thing half of its edge pixels lie just beyond the line, on what is behind it, and which half differs from side to side. They move with the thing, and have
-//! its disparity, but medians over the cluster's pixels shift by rows where they are many on one side; of what grows or shrinks the motion there is another. A pixel shows what it has the brightness of.
+//! An edge is located to a pixel: along the outline of a thing half of its edge pixels lie just beyond the
+//! line, on what is behind it, and which half differs from side to side. They move with the thing, and have
+//! its disparity, but medians over the cluster's pixels shift by rows where they are many on one side; of
+//! what grows or shrinks the motion there is another. A pixel shows what it has the brightness of.
 
 use super::clusters::Clusters;
 use super::fine_motion::places;
@@ -17,13 +19,15 @@ const RINGS: i64 = 3;
 const RADIUS: f64 = SQUARE * RINGS as f64;
 /// Farther along the gradient than this, px, a neighbour is on one side of the edge and not on it.
 const ON_EDGE: f64 = 2.0;
-/// Farther along the edge than so many times the distance from it, a neighbour may be on it as well: the gradient is not known better.
+/// Farther along the edge than so many times the distance from it, a neighbour may be on it as well: the
+/// gradient is not known better.
 const ALONG: f64 = 2.5;
 /// Neighbours that make a side of an edge one that the cluster is on.
 const LEAST_NEIGHBOURS: usize = 3;
 /// Distances, px, at which the brightness on both sides of an edge is taken.
 const SIDES: [f64; 3] = [2.0, 2.5, 3.0];
-/// Least share of the way from the brightness beyond an edge to that before it of a pixel that is before it: half, and what makes those exactly on the line, which are on neither side, not go by the noise.
+/// Least share of the way from the brightness beyond an edge to that before it of a pixel that is before it:
+/// half, and what makes those exactly on the line, which are on neither side, not go by the noise.
 const BEFORE: f64 = 0.55;
 /// Share of the neighbours of pixels in general below which a pixel is a stray one.
 const STRAY: f64 = 0.1;
@@ -35,7 +39,8 @@ pub(super) struct View<'a> {
     pub smooth: &'a Frame<f32>,
 }
 
-/// Medians along x and y, px, of the pixels of a cluster that show its own surface: neither stray ones, nor those of its outline that are beyond it. Of all where hardly half would be left.
+/// Medians along x and y, px, of the pixels of a cluster that show its own surface: neither stray ones, nor
+/// those of its outline that are beyond it. Of all where hardly half would be left.
 pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64; 2] {
     let all = places(clusters, k);
     let own = own_places(&all, view);
@@ -83,7 +88,8 @@ struct Squares<'a> {
     first: [i64; 2],
     size: [i64; 2],
     places: Vec<Vec<&'a [f64; 2]>>,
-    /// Steps to the squares of a neighbourhood, nearest rings first: most pixels are among others, and the nearest ones say so.
+    /// Steps to the squares of a neighbourhood, nearest rings first: most pixels are among others, and the
+    /// nearest ones say so.
     rings: Vec<[i64; 2]>,
 }
 
@@ -128,7 +134,8 @@ impl<'a> Squares<'a> {
         all.iter().filter_map(|place| self.index(square_of(place[0]), square_of(place[1]))).map(|i| crowds[i]).collect()
     }
 
-    /// On which side of the edge at a place with a unit normal all the cluster's others are, 1 or -1 along the normal; `None` where they are on both, or too few.
+    /// On which side of the edge at a place with a unit normal all the cluster's others are, 1 or -1 along
+    /// the normal; `None` where they are on both, or too few.
     fn only_side(&self, [x, y]: [f64; 2], normal: [f64; 2]) -> Option<f64> {
         let mut counts = [0, 0];
         for other in self.about(square_of(x), square_of(y)).flatten() {
@@ -159,7 +166,8 @@ fn square_of(along: f64) -> i64 {
 mod tests {
     use super::*;
 
-    /// A bright thing from `left` to `left + 40` px and as high, on black; its outline is as wide as that of a picture is, and what it shows has edges within.
+    /// A bright thing from `left` to `left + 40` px and as high, on black; its outline is as wide as that of
+    /// a picture is, and what it shows has edges within.
     fn square(left: f64) -> Frame<f32> {
         let ramp = |along: f64| (along / 1.4 + 0.5).clamp(0.0, 1.0);
         Frame::from_fn(120, 120, |x, y| {

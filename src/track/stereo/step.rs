@@ -7,7 +7,8 @@ use super::graph::Node;
 pub struct Step {
     /// Step, from 0.
     pub time: usize,
-    /// Time since the first step, in the unit of the tracker's `step_time`: by default steps, and the same number where none is late or early.
+    /// Time since the first step, in the unit of the tracker's `step_time`: by default steps, and the same
+    /// number where none is late or early.
     pub clock: f64,
     /// Clusters with edge pixels, by component.
     pub clusters: Vec<Node>,
@@ -21,9 +22,11 @@ pub struct Step {
     pub labels: Vec<u32>,
     /// Disparities that no layer of the grid holds, which take no part.
     pub left_out: usize,
-    /// How many rows lower the right view shows a point, px, as the views were matched; none where disparities were given.
+    /// How many rows lower the right view shows a point, px, as the views were matched; none where
+    /// disparities were given.
     pub row_offset: Option<f64>,
-    /// Whether that was searched and the views hardly agree with it, see [`EdgeDisparity`](crate::stereo::EdgeDisparity::rows_doubtful).
+    /// Whether that was searched and the views hardly agree with it, see
+    /// [`EdgeDisparity`](crate::stereo::EdgeDisparity::rows_doubtful).
     pub rows_doubtful: bool,
     /// Rounds of the mixture; 0 where there was nothing to cluster.
     pub rounds: usize,

@@ -1,14 +1,19 @@
-//! Which component of a step goes on for which one of the last: a component is the object that most of it moves with.
+//! Which component of a step goes on for which one of the last: a component is the object that most of it
+//! moves with.
 //!
-//! Two components may lie in one flat thing, a large one and a few pixels at its rim. Both explain it, the sharper one wins, and once in a while that is the small one: it takes the thing over, and the large one is left with the rim.
+//! Two components may lie in one flat thing, a large one and a few pixels at its rim. Both explain it, the
+//! sharper one wins, and once in a while that is the small one: it takes the thing over, and the large one is
+//! left with the rim.
 
 use super::overlap::Row;
 
-/// What each component is called from now on: as the one of the last step with which it shares most voxels, where that is true of both and their arc is of at least `least`. The others keep their
-/// names as far as these are free, and else get what is left over.
+/// What each component is called from now on: as the one of the last step with which it shares most voxels,
+/// where that is true of both and their arc is of at least `least`. The others keep their names as far as
+/// these are free, and else get what is left over.
 ///
-/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step, and the other way round; `sizes` are the voxels of both steps' components. Shares alone would
-/// do for none: all of a few pixels goes into whatever takes them over, and so does all of a large thing.
+/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step,
+/// and the other way round; `sizes` are the voxels of both steps' components. Shares alone would do for none:
+/// all of a few pixels goes into whatever takes them over, and so does all of a large thing.
 pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2], least: f64) -> Vec<usize> {
     let count = backward.len();
     if forward.len() != count {

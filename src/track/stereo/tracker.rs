@@ -22,7 +22,8 @@ use std::collections::BTreeMap;
 
 /// Follows everything that moves before a pair of cameras, which may move too.
 ///
-/// It is deterministic: the same steps give the same result, bit for bit, on any number of threads. Memory grows with the graph only.
+/// It is deterministic: the same steps give the same result, bit for bit, on any number of threads. Memory
+/// grows with the graph only.
 #[derive(Debug)]
 pub struct StereoTracker {
     options: StereoTrackerOptions,
@@ -67,7 +68,8 @@ impl StereoTracker {
         &self.options
     }
 
-    /// How many rows lower the right view shows a point, px, where that is given or was found and the views still agree with it.
+    /// How many rows lower the right view shows a point, px, where that is given or was found and the views
+    /// still agree with it.
     pub fn row_offset(&self) -> Option<f64> {
         self.rows.known()
     }
@@ -87,11 +89,14 @@ impl StereoTracker {
         &self.tracks
     }
 
-    /// Says how long after the last step the next one is, in the unit of [`StereoTrackerOptions::step_time`]: 2 where a frame is missing. Without it, an ordinary step. Velocities are for the unit of time, motions are
-    /// predicted and limits that are counted in steps hold over the time that went by. Of the first step it means nothing.
+    /// Says how long after the last step the next one is, in the unit of [`StereoTrackerOptions::step_time`]:
+    /// 2 where a frame is missing. Without it, an ordinary step. Velocities are for the unit of time, motions
+    /// are predicted and limits that are counted in steps hold over the time that went by. Of the first step
+    /// it means nothing.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `dt` unless it is a time above 0, from a millionth of an ordinary step to a million of them.
+    /// [`Error::Argument`] named `dt` unless it is a time above 0, from a millionth of an ordinary step to a
+    /// million of them.
     pub fn after(&mut self, dt: f64) -> Result<&mut Self> {
         if !GAPS.contains(&(dt / self.options.step_time)) {
             return Err(Error::argument("dt", "a time above 0, from a millionth to a million of step_time", dt));
@@ -103,7 +108,8 @@ impl StereoTracker {
     /// The next step from both views, grey levels 0 to 255.
     ///
     /// # Errors
-    /// [`Error::Argument`] for views of different size, of less than 17 px or of another size than before (`left`, with both shapes), and for options of the matching out of range.
+    /// [`Error::Argument`] for views of different size, of less than 17 px or of another size than before
+    /// (`left`, with both shapes), and for options of the matching out of range.
     pub fn update(&mut self, left: &Frame<f32>, right: &Frame<f32>) -> Result<Step> {
         self.check(left, &EdgePoints::default())?;
         let found = self.rows.match_next(left, right, &self.options.matching_options(None))?;
@@ -112,11 +118,13 @@ impl StereoTracker {
         Ok(Step { row_offset: Some(row_offset), rows_doubtful, ..step })
     }
 
-    /// The next step from the left view (grey levels, 0 to 255) and the disparities of its edge pixels. No edge pixels give a step without clusters; those more than 1.5 px beyond the disparities that
-    /// the grid has layers for are left out, and counted.
+    /// The next step from the left view (grey levels, 0 to 255) and the disparities of its edge pixels. No
+    /// edge pixels give a step without clusters; those more than 1.5 px beyond the disparities that the grid
+    /// has layers for are left out, and counted.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `left` for a view of another size than before, `points` for pixels outside of it, disparities that are not finite or lists of different length.
+    /// [`Error::Argument`] named `left` for a view of another size than before, `points` for pixels outside
+    /// of it, disparities that are not finite or lists of different length.
     pub fn update_edges(&mut self, left: &Frame<f32>, points: EdgePoints) -> Result<Step> {
         let lattice = self.check(left, &points)?;
         self.options.threads.check()?.install(|| self.advance(left, points, lattice))

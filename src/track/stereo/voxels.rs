@@ -5,7 +5,8 @@ use crate::types::Frame;
 
 /// Mark of a voxel that nothing is in.
 const EMPTY: u32 = u32::MAX;
-/// Farthest from a whole disparity that its refinement leads: half a pixel by the fit between candidates, one by Lucas-Kanade, px.
+/// Farthest from a whole disparity that its refinement leads: half a pixel by the fit between candidates, one
+/// by Lucas-Kanade, px.
 const REFINED: f64 = 1.5;
 
 /// Edge pixels of the left view with their disparities: points `(x, y, d)`.
@@ -88,7 +89,8 @@ impl Lattice {
         (0..self.size.1).map(|y| (y * self.grid.rows / self.size.1) as u16).collect()
     }
 
-    /// Whether a disparity is in one of the layers: as far beyond the first and the last one as fractions of a pixel may lead from a whole disparity that was looked for.
+    /// Whether a disparity is in one of the layers: as far beyond the first and the last one as fractions of
+    /// a pixel may lead from a whole disparity that was looked for.
     pub fn holds(&self, disparity: f64) -> bool {
         let from_first = disparity - f64::from(self.grid.first_disparity);
         (-REFINED..=self.grid.layers as f64 + REFINED).contains(&from_first)
@@ -120,7 +122,8 @@ impl Lattice {
         Some(std::array::from_fn(|i| (at[i] as usize).min(last[i]) as u16))
     }
 
-    /// Cells along x, y and disparity in which an edge pixel at real coordinates would be counted; along x and y also outside of the picture.
+    /// Cells along x, y and disparity in which an edge pixel at real coordinates would be counted; along x
+    /// and y also outside of the picture.
     pub fn cell_at(&self, [x, y, d]: [f64; 3]) -> [f64; 3] {
         let [cx, cy, _] = self.cell();
         [(x.round() / cx).floor(), (y.round() / cy).floor(), f64::from(self.layer(d))]
@@ -216,7 +219,8 @@ impl Voxels {
         [f64::from(x), f64::from(y), self.depths[n]]
     }
 
-    /// Places in cells, row-major (N, 3). Layers cut flat things where nothing is: a component of centres is as thin as its layer, and knows nothing of those of its own points whose noise rounds to the next one.
+    /// Places in cells, row-major (N, 3). Layers cut flat things where nothing is: a component of centres is
+    /// as thin as its layer, and knows nothing of those of its own points whose noise rounds to the next one.
     pub fn places(&self) -> Vec<f64> {
         (0..self.cells.len()).flat_map(|n| self.place(n)).collect()
     }

@@ -1,4 +1,5 @@
-//! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the stereo tracker's design.
+//! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the
+//! stereo tracker's design.
 
 mod blobs;
 mod rearranged;
@@ -18,12 +19,15 @@ const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
 /// Share of the pixels above which what is not explained is another scene.
 const ANOTHER_SCENE: f64 = 0.5;
 
-/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in whole cells of the picture alone moves one.
+/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in
+/// whole cells of the picture alone moves one.
 const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
 
-/// The components with their means moved, cells, and as much wider as the motion is uncertain; those without a motion stay.
+/// The components with their means moved, cells, and as much wider as the motion is uncertain; those without
+/// a motion stay.
 ///
-/// A flat component is as thin as what its pixels' disparities are told with. Moved by more than that, wrongly, it would explain few of its own voxels; its shape is found again in the first round.
+/// A flat component is as thin as what its pixels' disparities are told with. Moved by more than that,
+/// wrongly, it would explain few of its own voxels; its shape is found again in the first round.
 pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Posterior {
     let mut out = posterior.clone();
     for (matrix, nu) in out.scale_inverses.chunks_exact_mut(D * D).zip(&out.degrees_of_freedom) {
@@ -39,11 +43,16 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed would explain better than the others do, the largest blobs first. Tells
-/// which were seeded anew, and what is neither explained nor in such a blob; `None` where that and such blobs are most of the pixels: another scene.
+/// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over
+/// whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed
+/// would explain better than the others do, the largest blobs first. Tells which were seeded anew, and what
+/// is neither explained nor in such a blob; `None` where that and such blobs are most of the pixels: another
+/// scene.
 ///
-/// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step or two, and then one of them, whichever, would take it over and with it the identity.
-/// Pixels that are explained already do not count: a seed beside a flat component could take that over, as the sharper of the two.
+/// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step
+/// or two, and then one of them, whichever, would take it over and with it the identity. Pixels that are
+/// explained already do not count: a seed beside a flat component could take that over, as the sharper of the
+/// two.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -81,7 +90,8 @@ pub(super) fn reseed(
     Ok(Some(Seeded { seeds, strays }))
 }
 
-/// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains none: what others left over.
+/// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains
+/// none: what others left over.
 pub(super) fn is_left_over(
     posterior: &Posterior,
     k: usize,
@@ -91,7 +101,8 @@ pub(super) fn is_left_over(
     pixels < options.reseed_below || log_density(pixels / all, &covariance(posterior, k)) < explaining(all, options)
 }
 
-/// Logarithm of the density from which on a voxel counts as explained: what a typical seed with the fewest pixels would make of it, one standard deviation off.
+/// Logarithm of the density from which on a voxel counts as explained: what a typical seed with the fewest
+/// pixels would make of it, one standard deviation off.
 fn explaining(all: f64, options: &StereoTrackerOptions) -> f64 {
     let least = options.reseed_below.max(1.0);
     log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()))
@@ -107,7 +118,8 @@ fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
 pub(super) struct Seeded {
     /// Which components were seeded anew.
     pub seeds: Vec<bool>,
-    /// Voxels that nothing explains and that are too few or too thinly spread to be something: wrong matches, which are not to be fitted.
+    /// Voxels that nothing explains and that are too few or too thinly spread to be something: wrong matches,
+    /// which are not to be fitted.
     pub strays: Vec<usize>,
 }
 
@@ -196,7 +208,8 @@ pub(super) mod tests {
 
     #[test]
     fn nobody_is_seeded_into_what_is_explained() {
-        // A flat block with a few voxels beside its layer: near one of them there are enough pixels, but not of its kind.
+        // A flat block with a few voxels beside its layer: near one of them there are enough pixels, but not
+        // of its kind.
         let block = |z: u16, n: u16| (0..n).map(move |i| ([10 + i % 3, 10 + i / 3 % 3, z], 0));
         let cells: Vec<_> = block(30, 90).chain(block(31, 9)).collect();
         let voxels = made_up(&cells, 1).voxels;

@@ -4,12 +4,13 @@ use crate::parallel::Threads;
 use crate::synth::{RotatingRamp, Scene};
 
 fn estimate(options: HornSchunckOptions, threads: usize, frames: &[Frame<f64>]) -> FlowField<f64> {
-    let common = Common { threads: Threads::new(Some(threads)).unwrap(), ..Common::default() };
+    let common = EstimatorOptions { threads: Threads::new(Some(threads)).unwrap(), ..EstimatorOptions::default() };
     let estimator = Estimator::new(Method::HornSchunck(options), common).unwrap();
     estimator.estimate(&frames.iter().collect::<Vec<_>>(), 0).unwrap()
 }
 
-/// WO2010/098160, (50), (51) with the y-extent b where the print has a: `u = -w y + g w sinh(beta y / g) / (beta cosh(beta b / g))`.
+/// WO2010/098160, (50), (51) with the y-extent b where the print has a: `u = -w y + g w sinh(beta y / g) /
+/// (beta cosh(beta b / g))`.
 #[test]
 fn the_turning_ramp_gives_the_biased_closed_form() {
     let (w, h) = (23, 83);
@@ -80,7 +81,7 @@ fn intensity_gain_changes_nothing_and_failure_to_converge_is_told() {
         }
     }
     let hurried = HornSchunckOptions { iterations: 1, ..HornSchunckOptions::default() };
-    let estimator = Estimator::new(Method::HornSchunck(hurried), Common::default()).unwrap();
+    let estimator = Estimator::new(Method::HornSchunck(hurried), EstimatorOptions::default()).unwrap();
     let f = frames(1.0);
     assert!(matches!(estimator.estimate(&[&f[0], &f[1], &f[2]], 0), Err(Error::Numerical(_))));
 }

@@ -14,7 +14,7 @@ fn frames(u: f64, v: f64) -> Vec<Frame<f64>> {
         .collect()
 }
 
-fn estimate(options: LucasKanadeOptions, common: Common, frames: &[Frame<f64>]) -> FlowField<f64> {
+fn estimate(options: LucasKanadeOptions, common: EstimatorOptions, frames: &[Frame<f64>]) -> FlowField<f64> {
     let estimator = Estimator::new(Method::LucasKanade(options), common).unwrap();
     let some: Vec<&Frame<f64>> = frames.iter().take(estimator.frames_needed()).collect();
     estimator.estimate(&some, 7).unwrap()
@@ -25,7 +25,7 @@ fn a_translation_is_found_with_either_window_and_difference() {
     let f = frames(0.3, -0.2);
     for window in [Window::Gaussian(3.0), Window::Box(11)] {
         for differences in [Differences::Central, Differences::Pair] {
-            let field = estimate(LucasKanadeOptions { window, differences }, Common::default(), &f);
+            let field = estimate(LucasKanadeOptions { window, differences }, EstimatorOptions::default(), &f);
             assert_eq!(field.layout.frame_index, 7 + usize::from(differences == Differences::Central));
             let i = 20 * field.width + 24;
             assert_eq!((field.status[i], field.status[0]), (Status::Ok, Status::Border));
@@ -38,15 +38,15 @@ fn a_translation_is_found_with_either_window_and_difference() {
 #[test]
 fn points_equal_the_dense_field_and_one_direction_is_not_enough() {
     let f = frames(0.3, -0.2);
-    let dense = estimate(LucasKanadeOptions::default(), Common::default(), &f);
-    let sites = Sites::Points(vec![(24, 20), (20, 18)]);
-    let points = estimate(LucasKanadeOptions::default(), Common { sites, ..Common::default() }, &f);
+    let dense = estimate(LucasKanadeOptions::default(), EstimatorOptions::default(), &f);
+    let sites = SamplingGrid::Points(vec![(24, 20), (20, 18)]);
+    let points = estimate(LucasKanadeOptions::default(), EstimatorOptions { sites, ..EstimatorOptions::default() }, &f);
     for (k, (x, y)) in [(24, 20), (20, 18)].into_iter().enumerate() {
         assert!((points.motion[k] - dense.motion[y * 48 + x]).abs() < 1e-12);
     }
     let stripes: Vec<Frame<f64>> =
         (0..3).map(|t| Frame::from_fn(48, 40, |x, _| (0.3 * (x as f64 - 0.2 * f64::from(t))).sin())).collect();
-    let field = estimate(LucasKanadeOptions::default(), Common::default(), &stripes);
+    let field = estimate(LucasKanadeOptions::default(), EstimatorOptions::default(), &stripes);
     assert!(field.status[20 * 48 + 24] == Status::Unobservable && field.motion[20 * 48 + 24].is_nan());
 }
 
@@ -56,7 +56,7 @@ fn masks_and_bad_samples_touch_only_their_windows() {
     f[1].row_mut(20)[24] = f64::NAN;
     let mask = Mask::from_fn(48, 40, |x, y| (x, y) != (10, 12));
     let options = LucasKanadeOptions { window: Window::Box(5), ..LucasKanadeOptions::default() };
-    let field = estimate(options, Common { mask: Some(mask), ..Common::default() }, &f);
+    let field = estimate(options, EstimatorOptions { mask: Some(mask), ..EstimatorOptions::default() }, &f);
     for y in 3..37usize {
         for x in 3..45usize {
             let near = |cx: usize, cy: usize, r: usize| x.abs_diff(cx) <= r && y.abs_diff(cy) <= r;
@@ -74,7 +74,7 @@ fn masks_and_bad_samples_touch_only_their_windows() {
 #[test]
 fn a_window_is_cut_off_at_the_edge_and_only_the_rim_has_no_estimate() {
     let f = frames(0.3, -0.2);
-    let common = Common { covariance: true, ..Common::default() };
+    let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
     let dense = estimate(LucasKanadeOptions::default(), common.clone(), &f);
     for (i, status) in dense.status.iter().enumerate() {
         let (x, y) = (i % 48, i / 48);
@@ -84,7 +84,7 @@ fn a_window_is_cut_off_at_the_edge_and_only_the_rim_has_no_estimate() {
         assert!(rim || (m.u - 0.3).abs() < 0.02 && (m.v + 0.2).abs() < 0.02, "{x} {y} {m:?}");
     }
     // Half the window, half the knowledge: the variance of both components is about twice that of the middle.
-    let known = Common { noise: Some(1.0), ..common.clone() };
+    let known = EstimatorOptions { noise: Some(1.0), ..common.clone() };
     let variance = estimate(LucasKanadeOptions::default(), known, &f).covariance.unwrap();
     let mean = |columns: &[usize]| {
         let sites = columns.iter().flat_map(|x| (13..27).map(move |y| y * 48 + x));
@@ -93,14 +93,14 @@ fn a_window_is_cut_off_at_the_edge_and_only_the_rim_has_no_estimate() {
     let ratio = mean(&[1, 46]) / mean(&(16..32).collect::<Vec<_>>());
     assert!((1.7..2.2).contains(&ratio), "{ratio}");
     let places = vec![(1, 1), (46, 38), (3, 20), (24, 37)];
-    let points = Common { sites: Sites::Points(places.clone()), ..common };
+    let points = EstimatorOptions { sites: SamplingGrid::Points(places.clone()), ..common };
     let points = estimate(LucasKanadeOptions::default(), points, &f);
     for (k, (x, y)) in places.into_iter().enumerate() {
         assert!((points.motion[k] - dense.motion[y * 48 + x]).abs() < 1e-12);
     }
     // A frame that holds less than a tenth of its windows knows too little.
     let wide = LucasKanadeOptions { window: Window::Gaussian(100.0), ..LucasKanadeOptions::default() };
-    assert!(estimate(wide, Common::default(), &f).status.iter().all(|s| *s == Status::Border));
+    assert!(estimate(wide, EstimatorOptions::default(), &f).status.iter().all(|s| *s == Status::Border));
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn gain_in_intensity_changes_nothing() {
     let f = frames(0.3, -0.2);
     let of = |gain: f64| {
         let brighter: Vec<_> = f.iter().map(|frame| frame.map(|v| v * gain)).collect();
-        let common = Common { covariance: true, noise: Some(gain), ..Common::default() };
+        let common = EstimatorOptions { covariance: true, noise: Some(gain), ..EstimatorOptions::default() };
         estimate(LucasKanadeOptions::default(), common, &brighter)
     };
     let one = of(1.0);

@@ -13,7 +13,8 @@ const ROUNDS: usize = 3;
 /// Root-mean-square change of a round that was the last, px.
 const SETTLED: f64 = 0.004;
 
-/// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with its derivatives by differences of neighbouring sites.
+/// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with its derivatives by differences of
+/// neighbouring sites.
 pub(super) fn half_acceleration<T: SimdReal>(space: &Space<T>, motion: &Planes<T>) -> Planes<T> {
     let (width, height) = (motion.width, motion.height);
     let mut out = space.planes(width, height, MOTION);
@@ -32,9 +33,11 @@ pub(super) fn half_acceleration<T: SimdReal>(space: &Space<T>, motion: &Planes<T
 
 /// The same for flow of any speed, from that of slow flow and the `mean` of the steps.
 ///
-/// With the mean step `d`, a thing comes from `x + c - d(x)` and goes to `x + c + d(x)`, its half acceleration `c` the middle of the two less `x`. One who starts at either end goes the
-/// same way, a step later or earlier, so that what the steps there differ by, taken backwards ahead and forwards behind, is twice `c`:
-/// `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`. Half of this equation's error is taken off in each round.
+/// With the mean step `d`, a thing comes from `x + c - d(x)` and goes to `x + c + d(x)`, its half
+/// acceleration `c` the middle of the two less `x`. One who starts at either end goes the same way, a step
+/// later or earlier, so that what the steps there differ by, taken backwards ahead and forwards behind, is
+/// twice `c`: `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`. Half of this equation's
+/// error is taken off in each round.
 pub(super) fn settled<T: SimdReal>(space: &Space<T>, mean: &Planes<T>, mut acceleration: Planes<T>) -> Planes<T> {
     for _ in 0..ROUNDS {
         let better = round(space, mean, &acceleration);
@@ -69,10 +72,12 @@ fn round<T: SimdReal>(space: &Space<T>, mean: &Planes<T>, acceleration: &Planes<
     out
 }
 
-/// The step to the next frame where the mean of both steps is `mean` and half the acceleration is `acceleration`.
+/// The step to the next frame where the mean of both steps is `mean` and half the acceleration is
+/// `acceleration`.
 ///
-/// Frames warped by `+m` and `-m` meet in the middle of where a thing was and will be: what is at `x` in the middle frame goes from `x + c - m` to `x + c + m` and is told at `x + c`.
-/// So the next step is `c(x) + m(x + c(x))`, and its Jacobian follows by the chain rule.
+/// Frames warped by `+m` and `-m` meet in the middle of where a thing was and will be: what is at `x` in the
+/// middle frame goes from `x + c - m` to `x + c + m` and is told at `x + c`. So the next step is `c(x) + m(x
+/// + c(x))`, and its Jacobian follows by the chain rule.
 pub(super) fn next_step<T: SimdReal>(space: &Space<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
     at_sites(space, mean, |x, y| {
         let [u, v, u_x, v_x, u_y, v_y]: [f64; MOTION] = std::array::from_fn(|k| acceleration.at(k, x, y).to_f64());
@@ -166,7 +171,8 @@ mod tests {
 
     #[test]
     fn fast_rotation_goes_on_in_its_circle() {
-        // Turning by `w` a frame, things meet their former and later selves nearer to the centre by cos w, and move by sin w.
+        // Turning by `w` a frame, things meet their former and later selves nearer to the centre by cos w,
+        // and move by sin w.
         let (w, space) = (0.3_f64, Space::default());
         let mean = rotation(w.tan());
         let acceleration = settled(&space, &mean, half_acceleration(&space, &mean));

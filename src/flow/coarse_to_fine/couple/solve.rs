@@ -26,10 +26,11 @@ pub(super) const PLACES: [(usize, usize); ENTRIES] = {
     places
 };
 
-/// Keeps pivots positive: each diagonal entry grows by a share of itself that is larger than what rounding can do to it, and by a little that no data
-/// term feels.
+/// Keeps pivots positive: each diagonal entry grows by a share of itself that is larger than what rounding
+/// can do to it, and by a little that no data term feels.
 ///
-/// The unknowns are increments, so that neither moves the solution that the visits converge to: it only shortens steps that nothing supports.
+/// The unknowns are increments, so that neither moves the solution that the visits converge to: it only
+/// shortens steps that nothing supports.
 pub(super) struct Guard<V> {
     share: V,
     least: V,
@@ -44,10 +45,11 @@ impl<V: Lanes> Guard<V> {
     }
 }
 
-/// Turns the lower triangle of a positive semidefinite matrix into its factors `L D L^T`: `L` below the diagonal, on it the inverse of `D`.
+/// Turns the lower triangle of a positive semidefinite matrix into its factors `L D L^T`: `L` below the
+/// diagonal, on it the inverse of `D`.
 ///
-/// Pivots are taken two by two, since that needs one division for two: with the leading block `[[a, b], [b, c]]` and its determinant `d` they are `a` and
-/// `d / a`, and their inverses follow from `1 / (a d)`.
+/// Pivots are taken two by two, since that needs one division for two: with the leading block `[[a, b], [b,
+/// c]]` and its determinant `d` they are `a` and `d / a`, and their inverses follow from `1 / (a d)`.
 #[inline(always)]
 pub(super) fn factorise<V: Lanes>(m: &mut [V; ENTRIES], guard: &Guard<V>) {
     for i in 0..6 {
@@ -78,7 +80,8 @@ pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     x
 }
 
-/// Turns columns `i` and `i + 1` of the rest of a matrix into those of `L`, takes them out of the columns behind, and returns the inverses of both pivots.
+/// Turns columns `i` and `i + 1` of the rest of a matrix into those of `L`, takes them out of the columns
+/// behind, and returns the inverses of both pivots.
 #[inline(always)]
 fn eliminate<V: Lanes>(m: &mut [V; ENTRIES], i: usize, guard: &Guard<V>) -> [V; 2] {
     let (a, b, c) = (m[lower(i, i)], m[lower(i + 1, i)], m[lower(i + 1, i + 1)]);

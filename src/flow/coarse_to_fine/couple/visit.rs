@@ -7,7 +7,8 @@ use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
 use crate::simd::{Lanes, SimdReal};
 use std::ops::Range;
 
-/// The values of an expression for each index in a list, written out: the optimiser does not unroll loops with this much in them.
+/// The values of an expression for each index in a list, written out: the optimiser does not unroll loops
+/// with this much in them.
 macro_rules! each {
     ($index:ident in [$($value:literal)*] => $expression:expr) => {
         [$({ let $index: usize = $value; $expression }),*]
@@ -22,26 +23,28 @@ pub(super) struct Bonds<'a, T> {
     pub coupling: &'a Coupling,
 }
 
-/// Sites of a row that are visited together: their bonds to the right stay in the first-level cache.
+/// SamplingGrid of a row that are visited together: their bonds to the right stay in the first-level cache.
 const RUN: usize = 128;
 /// The pulls of a bond along the row on the sites at its ends.
 const PULLS: usize = 6;
 /// These for a run of sites, sample [`LEFT`] the first's.
 type Pulls<T> = [[T; LEFT + RUN + LEFT]; PULLS];
 
-/// What the visits to a row need, made when they begin: a row is visited many times, and this is one stream of memory.
+/// What the visits to a row need, made when they begin: a row is visited many times, and this is one stream
+/// of memory.
 #[derive(Debug, Default)]
 pub(super) struct Packed<T> {
     /// For each vector of sites its equations over their noise, [`EQUATIONS`] planes one after the other.
     equations: Vec<T>,
     /// For each vector of sites the factors of its matrix, bonds included, [`ENTRIES`] planes.
     factors: Vec<T>,
-    /// The row of the data term, fetched in the order of memory: the planes' short lines, read side by side, would come one by one.
+    /// The row of the data term, fetched in the order of memory: the planes' short lines, read side by side,
+    /// would come one by one.
     near: Vec<T>,
 }
 
-/// Lines of a row's weights `omega`: of the bonds from each site to the next in its row, to the row above and to the row below; 0 where there is none,
-/// and beside the sites.
+/// Lines of a row's weights `omega`: of the bonds from each site to the next in its row, to the row above and
+/// to the row below; 0 where there is none, and beside the sites.
 pub(super) const WEIGHTS: usize = 3;
 const ALONG: usize = 0;
 const UP: usize = 1;
@@ -211,8 +214,9 @@ impl<V: Lanes> Strain<V> {
         V::constant(1.0) / strain
     }
 
-    /// What a bond of such a strength does to the site at its beginning, `omega flow du` and `omega jacobian dJ`; to the one at its end it does the
-    /// opposite, but for the flow's pull on the derivative along the bond, which is the same at both ends.
+    /// What a bond of such a strength does to the site at its beginning, `omega flow du` and `omega jacobian
+    /// dJ`; to the one at its end it does the opposite, but for the flow's pull on the derivative along the
+    /// bond, which is the same at both ends.
     #[inline(always)]
     fn pull(mut self, weight: V, strengths: &Strengths<V>) -> Self {
         let (by_flow, by_jacobian) = (weight * strengths.flow, weight * strengths.jacobian);
@@ -265,7 +269,8 @@ fn lines<T>(row: &[T], stride: usize, first: usize, len: usize) -> [&[T]; 6] {
     std::array::from_fn(|k| &row[k * stride + first..][..len])
 }
 
-/// Solves the equations of each site of the row `own` with its neighbours as they are, those in the row as they were before the visit.
+/// Solves the equations of each site of the row `own` with its neighbours as they are, those in the row as
+/// they were before the visit.
 #[inline(always)]
 pub(super) fn visit<V: Lanes<Scalar = T>, T: SimdReal>(
     bonds: &Bonds<'_, T>,

@@ -1,16 +1,20 @@
 //! The order of the visits.
 //!
-//! A sweep visits all even rows, then all odd ones; the next begins with the odd rows, and so on in turn. Rows of one parity do not see each other, so what
-//! counts is the order of a row and the two beside it, and the visits may be arranged such that little memory is walked through:
+//! A sweep visits all even rows, then all odd ones; the next begins with the odd rows, and so on in turn.
+//! Rows of one parity do not see each other, so what counts is the order of a row and the two beside it, and
+//! the visits may be arranged such that little memory is walked through:
 //!
-//! * The second half of a sweep and the first of the next visit the same rows: each is visited twice while its data are near. This leaves one *pass* more than
-//!   there are sweeps; pass `p` visits rows of the parity of `p`, twice but in the first and last pass.
-//! * Pass `p` comes to row `y` right after pass `p - 1` has left row `y + 1`: a wave as many rows deep as there are passes runs down the frame, and
-//!   a row's data come from far memory once for all sweeps.
-//! * Threads take bands of rows; from the band's edges inwards each pass ends one row earlier, since it lacks what the other band does. The wedges between
-//!   the bands that are left out are done afterwards, growing by one row a pass.
+//! * The second half of a sweep and the first of the next visit the same rows: each is visited twice while
+//!   its data are near. This leaves one *pass* more than there are sweeps; pass `p` visits rows of the parity
+//!   of `p`, twice but in the first and last pass.
+//! * Pass `p` comes to row `y` right after pass `p - 1` has left row `y + 1`: a wave as many rows deep as
+//!   there are passes runs down the frame, and a row's data come from far memory once for all sweeps.
+//! * Threads take bands of rows; from the band's edges inwards each pass ends one row earlier, since it lacks
+//!   what the other band does. The wedges between the bands that are left out are done afterwards, growing by
+//!   one row a pass.
 //!
-//! Whatever the number of bands, each visit finds what it would find in the plain order: the results are the same to the last bit.
+//! Whatever the number of bands, each visit finds what it would find in the plain order: the results are the
+//! same to the last bit.
 
 use super::Planes;
 use super::visit::{Around, Bonds, Packed, WEIGHTS, visit, weigh};
@@ -121,7 +125,8 @@ impl<T: SimdReal> Kernel<T> for Wave<'_, T> {
                 if !span.contains(y, pass) {
                     continue;
                 }
-                // A row is visited during `passes` fronts, and the row that takes its place in the ring comes after.
+                // A row is visited during `passes` fronts, and the row that takes its place in the ring comes
+                // after.
                 let place = y % passes;
                 let packed = &mut ring.packed[place];
                 let mut is_new = ring.rows[place] != Some(y);

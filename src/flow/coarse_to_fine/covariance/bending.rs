@@ -1,11 +1,13 @@
 //! What smoothing takes away from bent flow.
 //!
-//! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow bends on the scale of windows this goes the way of the error that is in it already: in
-//! turbulence the two correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a place, is the covariance; a share of that
-//! of the slopes goes any way.
+//! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow
+//! bends on the scale of windows this goes the way of the error that is in it already: in turbulence the two
+//! correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a
+//! place, is the covariance; a share of that of the slopes goes any way.
 //!
-//! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so
-//! the motion loses `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
+//! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing
+//! that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so the motion loses
+//! `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, PITCH, SPACING, TERMS};
@@ -21,7 +23,8 @@ const SIGMA: f64 = 6.0;
 const WIDER: f64 = 1.25;
 /// The narrowest window that has one of its own, px.
 const NARROWEST: f64 = 3.5;
-/// Share of the slopes' squared errors that goes any way, not that of what is lost: turbulence without divergence bends without it, yet its estimate diverges.
+/// Share of the slopes' squared errors that goes any way, not that of what is lost: turbulence without
+/// divergence bends without it, yet its estimate diverges.
 const ANY_WAY: f64 = 0.2;
 /// Places that one thread smooths at a time.
 const PIECE: usize = 1024;
@@ -101,7 +104,8 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     rows.concat()
 }
 
-/// The sum over the windows of weight times `(1 - G)^4` of the motion, G being [`WIDER`] than the window. The motion there is smooth enough to be smoothed from place to place.
+/// The sum over the windows of weight times `(1 - G)^4` of the motion, G being [`WIDER`] than the window. The
+/// motion there is smooth enough to be smoothed from place to place.
 fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>) -> Vec<Loss> {
     let (width, height) = evidence.size();
     let places: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
@@ -142,10 +146,11 @@ fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec
     every().map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
 }
 
-/// Sites and their weights.
+/// SamplingGrid and their weights.
 type Taps = Vec<(usize, f64)>;
 
-/// A Gaussian of `sigma` sites about each of some places, so many and so far apart; beyond the edges values go on by reflection at the point on the edge, so that affine motion is not bent.
+/// A Gaussian of `sigma` sites about each of some places, so many and so far apart; beyond the edges values
+/// go on by reflection at the point on the edge, so that affine motion is not bent.
 fn gaussians(sigma: f64, (places, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
     let radius = (3.0 * sigma).ceil() as isize;
     let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();

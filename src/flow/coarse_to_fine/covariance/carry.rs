@@ -1,7 +1,7 @@
 //! A pair's covariance, known midway between the frames, told at the pixels of the first.
 //!
-//! The motion `m` of the place `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 = N M` with `N = (I - M / 2)^-1`. To first order errors go along as
-//! `N du` and `N dM N`.
+//! The motion `m` of the place `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 =
+//! N M` with `N = (I - M / 2)^-1`. To first order errors go along as `N du` and `N dM N`.
 
 use super::super::grid::Planes;
 use super::super::refine::{PITCH, SPACING};

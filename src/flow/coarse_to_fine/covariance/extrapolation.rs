@@ -1,7 +1,9 @@
 //! What motion differs by from its affine continuation: the error of sites without data.
 //!
-//! The field itself tells. Over a distance `d`, as far as it is seen, `e_u(d) = u(p + d) - u(p) - M(p) d` and `e_M(d) = M(p + d) - M(p)` are measured along both axes; their mean squares are the variances of
-//! motion that is continued by `d`. They are taken from mean absolute values, as of Gaussian errors, so that the few pairs of places across a motion boundary do not tell for all others.
+//! The field itself tells. Over a distance `d`, as far as it is seen, `e_u(d) = u(p + d) - u(p) - M(p) d` and
+//! `e_M(d) = M(p + d) - M(p)` are measured along both axes; their mean squares are the variances of motion
+//! that is continued by `d`. They are taken from mean absolute values, as of Gaussian errors, so that the few
+//! pairs of places across a motion boundary do not tell for all others.
 
 use super::super::grid::Planes;
 use super::super::refine::{Evidence, PITCH, SPACING};
@@ -74,7 +76,8 @@ impl Extrapolation {
         Self { variances }
     }
 
-    /// Adds them at a place so far (px, along both axes) from the edge of the seen; `sigmas`: of the windows that flow and slopes have there, px.
+    /// Adds them at a place so far (px, along both axes) from the edge of the seen; `sigmas`: of the windows
+    /// that flow and slopes have there, px.
     pub fn add(&self, place: &mut Entries, distances: [f64; 2], sigmas: [f64; 2]) {
         for (kind, (sigma, entries)) in sigmas.into_iter().zip([0..2, 2..6]).enumerate() {
             let [x, y] = distances.map(|d| continued(d, sigma));
@@ -83,7 +86,8 @@ impl Extrapolation {
         }
     }
 
-    /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one, and between them; constant beyond the last.
+    /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one,
+    /// and between them; constant beyond the last.
     fn variance(&self, kind: usize, distance: f64) -> f64 {
         let (mut from, mut least) = (0.0, 0.0);
         for (step, variances) in STEPS.into_iter().zip(&self.variances) {

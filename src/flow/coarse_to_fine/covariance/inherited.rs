@@ -1,10 +1,13 @@
 //! What motion keeps of the errors of coarser levels: finer ones correct them only where they see something.
 //!
-//! A coarse level sees further into an area without texture than a fine one, and is less exact. How exact it is, the places with texture tell, where the refined motion is known to be better: the
-//! mean squares of its differences from what a level found are the variances of what was handed down from there. They are taken from mean absolute values, as of Gaussian errors, so that the few
-//! places at motion boundaries do not tell for all others.
+//! A coarse level sees further into an area without texture than a fine one, and is less exact. How exact it
+//! is, the places with texture tell, where the refined motion is known to be better: the mean squares of its
+//! differences from what a level found are the variances of what was handed down from there. They are taken
+//! from mean absolute values, as of Gaussian errors, so that the few places at motion boundaries do not tell
+//! for all others.
 //!
-//! The windows of refinement carry such errors a little way out of those areas, and where they grow, the slopes err by their rise.
+//! The windows of refinement carry such errors a little way out of those areas, and where they grow, the
+//! slopes err by their rise.
 
 use super::super::data::MOTION;
 use super::super::grid::Planes;
@@ -16,7 +19,8 @@ use std::f64::consts::FRAC_PI_2;
 
 /// How far a level sees into what has no texture, px of the level: its stencils and the windows of its data.
 const REACH: f64 = 4.0;
-/// Variance of the slopes over the mean square of the rise of the flow's deviation: errors are not as steep everywhere as at their steepest.
+/// Variance of the slopes over the mean square of the rise of the flow's deviation: errors are not as steep
+/// everywhere as at their steepest.
 const STEEP: f64 = 0.35;
 
 /// What a place has of the errors of coarser levels.
@@ -67,7 +71,8 @@ impl Inherited {
         (0..own.len()).map(with_rise).collect()
     }
 
-    /// In which directions places inherit: in those that are not led there, and where all is led as their neighbours, whose deviations are `own`, as far as errors are carried and rise.
+    /// In which directions places inherit: in those that are not led there, and where all is led as their
+    /// neighbours, whose deviations are `own`, as far as errors are carried and rise.
     fn directions(&self, own: &[[f64; 2]], size: (usize, usize)) -> Vec<[f64; 3]> {
         let mut around: Vec<[f64; 4]> = (0..own.len())
             .map(|n| {
@@ -85,8 +90,9 @@ impl Inherited {
         (0..own.len()).map(mean).collect()
     }
 
-    /// Of the flow (`kind` 0) or the slopes (1), so far from where data lead, px: all that a level left from where on the next finer one sees nothing, linear between levels, nothing
-    /// below half the reach of the finest.
+    /// Of the flow (`kind` 0) or the slopes (1), so far from where data lead, px: all that a level left from
+    /// where on the next finer one sees nothing, linear between levels, nothing below half the reach of the
+    /// finest.
     fn variance(&self, kind: usize, distance: f64) -> f64 {
         if distance.is_infinite() {
             return self.searched(kind);
@@ -105,13 +111,15 @@ impl Inherited {
         least * (pixels / from).powi(2)
     }
 
-    /// Where nothing tells how exact the levels are: the motions that the coarsest of them tells apart, a pixel of it within its reach.
+    /// Where nothing tells how exact the levels are: the motions that the coarsest of them tells apart, a
+    /// pixel of it within its reach.
     fn searched(&self, kind: usize) -> f64 {
         if kind == 0 { 4f64.powi(self.variances.len() as i32) } else { REACH.powi(-2) }
     }
 }
 
-/// Of the motion found so many levels above: the flow's and the slopes' mean square difference at those of its sites that data lead, on lines through the places; if there are any.
+/// Of the motion found so many levels above: the flow's and the slopes' mean square difference at those of
+/// its sites that data lead, on lines through the places; if there are any.
 fn differences<T: SimdReal>(motion: &Planes<T>, (coarse, above): (&Planes<T>, usize), led: &Led) -> Option<[f64; 2]> {
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     let step = (1 << above).max(SPACING);
@@ -130,7 +138,8 @@ fn differences<T: SimdReal>(motion: &Planes<T>, (coarse, above): (&Planes<T>, us
     (count > 0.0).then(|| [sums[0] / 2.0, sums[1] / 4.0].map(|sum| FRAC_PI_2 * (sum / count).powi(2)))
 }
 
-/// The mean square of how steeply values rise or fall next to a place, per px: along each axis that of both sides.
+/// The mean square of how steeply values rise or fall next to a place, per px: along each axis that of both
+/// sides.
 fn squared_rise(values: &[f64], (width, height): (usize, usize), n: usize) -> f64 {
     let (x, y) = (n % width, n / width);
     let both = |before: Option<usize>, after: Option<usize>| {
@@ -148,7 +157,7 @@ mod tests {
     use super::super::led::{ALL, Directions, NONE};
     use super::*;
 
-    /// Sites led but for a square of them, all seen; and how many places there are along a side.
+    /// SamplingGrid led but for a square of them, all seen; and how many places there are along a side.
     fn but_for(side: usize, square: std::ops::Range<usize>) -> (Led, usize) {
         let led = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
         let sites: Vec<Directions> = (0..side * side).map(|n| if led(n) { NONE } else { ALL }).collect();

@@ -12,13 +12,13 @@ use std::f64::consts::SQRT_2;
 const TELLING: f64 = 0.02;
 /// Usable share of a window from which on a site counts as seen.
 const USABLE: f64 = 0.1;
-/// Sites whose information is told together reach so far from one.
+/// SamplingGrid whose information is told together reach so far from one.
 const NEAR: usize = 1;
-/// Sites that one thread looks at, at a time.
+/// SamplingGrid that one thread looks at, at a time.
 const PIECE: usize = 4096;
 
-/// The matrix `xx, xy, yy` that leaves of motion what data do not lead: zero where they lead all of it, the unit matrix where they lead nothing, and else
-/// the projection onto the direction without texture.
+/// The matrix `xx, xy, yy` that leaves of motion what data do not lead: zero where they lead all of it, the
+/// unit matrix where they lead nothing, and else the projection onto the direction without texture.
 pub(super) type Directions = [f32; 3];
 /// Nothing is led.
 pub(super) const ALL: Directions = [1.0, 0.0, 1.0];
@@ -28,8 +28,9 @@ pub(super) const NONE: Directions = [0.0; 3];
 /// Where data lead the motion.
 pub(super) struct Led {
     width: usize,
-    /// How far every site is from the next where data lead all of the motion, px, row by row; 0 where nothing is seen at all: that is another matter. Infinite where one direction is
-    /// unknown and nearly nothing else is there.
+    /// How far every site is from the next where data lead all of the motion, px, row by row; 0 where nothing
+    /// is seen at all: that is another matter. Infinite where one direction is unknown and nearly nothing
+    /// else is there.
     distances: Vec<f64>,
     /// The sites that tell how exact coarser levels are, row by row: seen, and led.
     telling: Vec<bool>,
@@ -58,7 +59,8 @@ impl Led {
         Self::with((width, &sites), places, seen)
     }
 
-    /// For sites whose directions these are. Where nearly none is led in all of them, they do not tell; what is known then is that motion along a texture of one direction is not.
+    /// For sites whose directions these are. Where nearly none is led in all of them, they do not tell; what
+    /// is known then is that motion along a texture of one direction is not.
     pub fn with((width, sites): (usize, &[Directions]), places: (usize, usize), seen: impl Fn(usize) -> bool) -> Self {
         let led: Vec<bool> = sites.iter().map(|directions| *directions == NONE).collect();
         let count = led.iter().filter(|led| **led).count();

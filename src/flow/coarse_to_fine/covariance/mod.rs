@@ -1,16 +1,23 @@
-//! How far the refined motion can be trusted: the covariance of `(u, v, u_x, v_x, u_y, v_y)`, at every eighth pixel and linear in between.
+//! How far the refined motion can be trusted: the covariance of `(u, v, u_x, v_x, u_y, v_y)`, at every eighth
+//! pixel and linear in between.
 //!
 //! Errors of several kinds add up, all seen in the frames themselves:
 //!
-//! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is read from how much the flow changes from window to window.
-//! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed. What smoothing once more takes away, as one
-//!   vector of six, tells the direction and the size of the error: a bent flow without divergence has errors without divergence.
-//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it is that of other sites, continued; the field itself tells how fast it departs from that.
-//! * *Inheritance* ([`inherited`]). Where there is no texture, or only in one direction, finer levels do not correct what coarser ones left.
+//! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is
+//!   read from how much the flow changes from window to window.
+//! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed.
+//!   What smoothing once more takes away, as one vector of six, tells the direction and the size of the
+//!   error: a bent flow without divergence has errors without divergence.
+//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it
+//!   is that of other sites, continued; the field itself tells how fast it departs from that.
+//! * *Inheritance* ([`inherited`]). Where there is no texture, or only in one direction, finer levels do not
+//!   correct what coarser ones left.
 //! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
-//! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a share of the acceleration.
+//! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a
+//!   share of the acceleration.
 //!
-//! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs and triples) and checked on others; `benchmarks/coverage.py` measures what they hold.
+//! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs
+//! and triples) and checked on others; `benchmarks/coverage.py` measures what they hold.
 
 mod bending;
 mod carry;
@@ -30,8 +37,9 @@ pub(super) use noise::Energy;
 use rayon::prelude::*;
 pub(super) use spread::Spread;
 
-/// Variance of the flow over that of averaged white noise of the density that changes between windows show: the noise is not white, and strongest in what windows do not remove.
-/// Of pairs, and of triples, whose last linearisation is about the refined motion.
+/// Variance of the flow over that of averaged white noise of the density that changes between windows show:
+/// the noise is not white, and strongest in what windows do not remove. Of pairs, and of triples, whose last
+/// linearisation is about the refined motion.
 const FLOW_NOISE: [f64; 2] = [1.15, 1.35];
 /// The same for the slopes.
 const SLOPE_NOISE: f64 = 0.42;
@@ -46,13 +54,16 @@ const LOCKING: f64 = 0.33;
 const AMPLITUDE: f64 = 0.06;
 /// White noise in the difference of two frames over that in half the difference of the outer ones of three.
 const AHEAD_ENERGY: f64 = 4.0;
-/// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: what the next frame alone has beside what all three have.
+/// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: what the next frame alone has beside what all
+/// three have.
 const CHANGE: f64 = 0.55;
 /// Share of the acceleration, px/frame^2, that a triple takes for motion.
 const ACCELERATION: f64 = 0.015;
-/// Where no more than this share of the places has texture, they do not tell how motion differs from place to place.
+/// Where no more than this share of the places has texture, they do not tell how motion differs from place to
+/// place.
 const TELLING: f64 = 0.02;
-/// Share of the variance of noise that repeats itself in the next frames' estimates: the texture moves on slowly, and its part of the errors with it.
+/// Share of the variance of noise that repeats itself in the next frames' estimates: the texture moves on
+/// slowly, and its part of the errors with it.
 const REPEATED: f64 = 0.3;
 
 /// A covariance: its upper triangle, row by row.
@@ -67,8 +78,9 @@ pub(super) struct Spreads<T> {
 
 /// The covariance at every place of the evidence.
 ///
-/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first frame, where the motion of a pair is found midway. `apart`: with the systematic part beside it, all
-/// that is not noise, and a share of that.
+/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first frame, where the
+/// motion of a pair is found midway. `apart`: with the systematic part beside it, all that is not noise, and
+/// a share of that.
 pub(super) fn covariance<T: SimdReal>(
     estimate: &Estimate<T>,
     energy: Energy,
@@ -133,7 +145,8 @@ fn known<T: SimdReal>(noise: &noise::Noise<'_, T>, data: &Planes<T>, size: (usiz
     tells.then(|| seen::Seen::textured(data, size, &textured))
 }
 
-/// Adds noise of the density times its share in the flow and in the derivatives along x and y; `factors` for the flow and for the slopes.
+/// Adds noise of the density times its share in the flow and in the derivatives along x and y; `factors` for
+/// the flow and for the slopes.
 fn add_noise(place: &mut Entries, left: &noise::Left, [flow, slopes]: [f64; 2]) {
     let factors = [flow * left.flow, slopes * left.slopes[0], slopes * left.slopes[1]];
     for (block, factor) in factors.into_iter().enumerate() {
@@ -183,7 +196,8 @@ fn add_locking(place: &mut Entries, motion: &[f64; 6], locking: &Locking) {
     }
 }
 
-/// Adds what paths that are curved, `M (u, v)` in a steady flow, do to a triple: its outer frames are warped as if the steps before and after were equal.
+/// Adds what paths that are curved, `M (u, v)` in a steady flow, do to a triple: its outer frames are warped
+/// as if the steps before and after were equal.
 fn add_acceleration(place: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) {
     place[upper(0, 0)] += (ACCELERATION * (u_x * u + u_y * v)).powi(2);
     place[upper(1, 1)] += (ACCELERATION * (v_x * u + v_y * v)).powi(2);

@@ -1,18 +1,23 @@
 //! What windows leave of the noise of the flow.
 //!
-//! White noise of density `D` (variance times area) leaves in the windows' means and slopes (standard deviation `s`, transfer function `H = 1 - (1 - G)^4`) the covariances
+//! White noise of density `D` (variance times area) leaves in the windows' means and slopes (standard
+//! deviation `s`, transfer function `H = 1 - (1 - G)^4`) the covariances
 //!
-//! `C(u, v) = D integral H^2 / (2 pi)^2 = F D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2 H^2 / (2 pi)^2 = S D / (8 pi s^4)`,
+//! `C(u, v) = D integral H^2 / (2 pi)^2 = F D / (4 pi s^2)`, `C(u_x, v_x) = C(u_y, v_y) = D integral w_x^2
+//! H^2 / (2 pi)^2 = S D / (8 pi s^4)`,
 //!
 //! where `H = sum c_n G^n` gives `F = sum c_m c_n 2 / (m + n)` and `S = sum c_m c_n (2 / (m + n))^2`.
 //!
-//! Its shape is that of `e P^-1`, `P` being the information and `e` the residual energy around a place. Its size is not: errors of brightness go into two orders of
-//! derivatives, texture has its own spectrum, and coupling takes away the finest part. So the size is taken from the flow: between two windows that were both accepted the
-//! flow changes by noise, over that of white noise of unit density. The geometric mean of this excess over the frame is well determined, a single place's is not.
+//! Its shape is that of `e P^-1`, `P` being the information and `e` the residual energy around a place. Its
+//! size is not: errors of brightness go into two orders of derivatives, texture has its own spectrum, and
+//! coupling takes away the finest part. So the size is taken from the flow: between two windows that were
+//! both accepted the flow changes by noise, over that of white noise of unit density. The geometric mean of
+//! this excess over the frame is well determined, a single place's is not.
 //!
-//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to fifteen times the variance, slopes across it twenty-four times. These are
-//! the factors of white noise drawn and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge has been continued with slopes as noisy as those of the
-//! data's windows.
+//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to
+//! fifteen times the variance, slopes across it twenty-four times. These are the factors of white noise drawn
+//! and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge
+//! has been continued with slopes as noisy as those of the data's windows.
 
 use super::super::data::{SEEN, UU, UV, VV};
 use super::super::grid::Planes;
@@ -24,8 +29,9 @@ use std::f64::consts::PI;
 
 /// Bounds of the excess: beyond them the flow tells nothing about noise.
 const EXCESS: [f64; 2] = [0.5, 50.0];
-/// Of white noise with variance 1, rows 1 to 3 with gradients weighing 4 have the information 52.25 times the variance of the mean frame and the residual energy
-/// 8.25 times that of the rate: 1/2 and 2 for pairs, 3/8 and 1/2 for triples. A third of that is hidden where motion was fitted to nothing but noise.
+/// Of white noise with variance 1, rows 1 to 3 with gradients weighing 4 have the information 52.25 times the
+/// variance of the mean frame and the residual energy 8.25 times that of the rate: 1/2 and 2 for pairs, 3/8
+/// and 1/2 for triples. A third of that is hidden where motion was fitted to nothing but noise.
 const PAIR_GRADIENT: f64 = 52.25 / 8.25 * 0.25 * HIDDEN;
 const TRIPLE_GRADIENT: f64 = 52.25 / 8.25 * 0.75 * HIDDEN;
 const HIDDEN: f64 = 1.5;
@@ -41,10 +47,12 @@ const LEAST_LEFT: f64 = 1e-3;
 const COUNTS: f64 = 0.1;
 /// Texture is looked for within so many sites of a place.
 const NEAR: usize = 2;
-/// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2 px.
+/// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2
+/// px.
 const TEXTURED: f64 = 10.0;
 
-/// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are stronger, but pull where the neighbours are led as well.
+/// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are
+/// stronger, but pull where the neighbours are led as well.
 const LEADING: f64 = 0.5;
 /// The same, where motion in the other direction is not led: as strong as the bonds.
 const BOUND: f64 = 20.0;
@@ -68,13 +76,15 @@ impl Energy {
     }
 }
 
-/// `sum c_m c_n (2 / (m + n))^power` of the windows: their noise over that of a Gaussian alone, of the flow and of its slopes for powers 1 and 2.
+/// `sum c_m c_n (2 / (m + n))^power` of the windows: their noise over that of a Gaussian alone, of the flow
+/// and of its slopes for powers 1 and 2.
 fn of_white_noise(power: i32) -> f64 {
     let terms = || TERMS.into_iter().zip(1..);
     terms().flat_map(|(c, m)| terms().map(move |(d, n)| c * d * (2.0 / f64::from(m + n)).powi(power))).sum()
 }
 
-/// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the flow and into the derivatives along x and y.
+/// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the
+/// flow and into the derivatives along x and y.
 pub(super) struct Left {
     pub density: [f64; 3],
     pub flow: f64,
@@ -84,7 +94,8 @@ pub(super) struct Left {
 /// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
 const UNSEEN: f64 = 0.5;
 
-/// What an edge of the frame adds to the noise that a window leaves: the factor of means and of slopes along the edge, and that of slopes across it.
+/// What an edge of the frame adds to the noise that a window leaves: the factor of means and of slopes along
+/// the edge, and that of slopes across it.
 fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
     let t = edge.distance / sigma;
     if t > FAR {
@@ -116,7 +127,8 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// With an excess that is no less than that of the `other`, from the same frames: where nearly nothing is accepted, little is seen of it.
+    /// With an excess that is no less than that of the `other`, from the same frames: where nearly nothing is
+    /// accepted, little is seen of it.
     pub fn no_quieter_than(self, other: &Self) -> Self {
         Self { excess: self.excess.max(other.excess), ..self }
     }
@@ -129,7 +141,8 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// Whether there is texture within [`NEAR`] sites of a place, that is whether motion in any direction is known from there alone.
+    /// Whether there is texture within [`NEAR`] sites of a place, that is whether motion in any direction is
+    /// known from there alone.
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
         let around = |place: usize, len: usize| {
             let middle = (SPACING * place).min(len - 1);
@@ -147,7 +160,8 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         self.excess * energy * best <= TEXTURED
     }
 
-    /// In which directions the data of sites near a place, whose mean information this is, do not lead their motion, so that the first visits do not correct it.
+    /// In which directions the data of sites near a place, whose mean information this is, do not lead their
+    /// motion, so that the first visits do not correct it.
     pub fn not_led(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> Directions {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
         let radius = half.hypot(b);
@@ -186,8 +200,9 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     }
 }
 
-/// The inverse of the information without what noise seems to add to it in every direction: `N` in the frames has gradients of its own, and where there is nothing
-/// else, nothing is known. A share of [`LEAST_LEFT`] is left in any case.
+/// The inverse of the information without what noise seems to add to it in every direction: `N` in the frames
+/// has gradients of its own, and where there is nothing else, nothing is known. A share of [`LEAST_LEFT`] is
+/// left in any case.
 fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
     let radius = half.hypot(b);
@@ -204,7 +219,8 @@ fn informed([a, b, c]: [f64; 3]) -> [f64; 3] {
     [a + least, b, c + least]
 }
 
-/// Geometric mean over the places with data: the density that the accepted changes show over that of the residuals.
+/// Geometric mean over the places with data: the density that the accepted changes show over that of the
+/// residuals.
 fn excess<T: SimdReal>(evidence: &Evidence<T>, data: &Planes<T>) -> f64 {
     let (width, height) = evidence.size();
     let (mut sum, mut count) = (0.0, 0.0);

@@ -1,7 +1,8 @@
 //! How far places are from the edge of what all frames see.
 //!
-//! Where motion leads out of a frame there are no data, and the motion is that of the nearest seen sites, continued. That edge, and not the frame's, is where windows see less.
-//! Areas without texture are continued in the same way.
+//! Where motion leads out of a frame there are no data, and the motion is that of the nearest seen sites,
+//! continued. That edge, and not the frame's, is where windows see less. Areas without texture are continued
+//! in the same way.
 
 use super::super::data::SEEN;
 use super::super::grid::Planes;
@@ -13,7 +14,8 @@ const LEAST: f64 = 0.1;
 
 /// Where the places of the evidence lie in what is seen.
 pub(super) struct Seen {
-    /// Signed distances, px, along x and along y, to the outermost seen site; negative where a place itself is not seen.
+    /// Signed distances, px, along x and along y, to the outermost seen site; negative where a place itself
+    /// is not seen.
     distances: Vec<[f64; 2]>,
     along: Axis,
     across: Axis,
@@ -34,7 +36,8 @@ impl Seen {
         Self::with(data, size, |_, _| true)
     }
 
-    /// The same, where only those sites count as seen whose nearest place has texture (`textured`, row by row): where there is none, motion is continued as well.
+    /// The same, where only those sites count as seen whose nearest place has texture (`textured`, row by
+    /// row): where there is none, motion is continued as well.
     pub fn textured<T: SimdReal>(data: &Planes<T>, size: (usize, usize), textured: &[bool]) -> Self {
         let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
         Self::with(data, size, |x, y| textured[nearest(y, size.1) * size.0 + nearest(x, size.0)])
@@ -60,7 +63,8 @@ impl Seen {
         Self { distances: distances.collect(), along, across, width }
     }
 
-    /// Of a place, along x and along y, px: to the outermost seen site of its run, or, negative, back to the nearest seen one.
+    /// Of a place, along x and along y, px: to the outermost seen site of its run, or, negative, back to the
+    /// nearest seen one.
     pub fn distances(&self, x: usize, y: usize) -> [f64; 2] {
         self.distances[y * self.width + x]
     }
@@ -90,7 +94,8 @@ struct Axis {
 }
 
 impl Axis {
-    /// For lines of so many sites and so many lines of them; the same of places; whether the site at a position on a line is seen.
+    /// For lines of so many sites and so many lines of them; the same of places; whether the site at a
+    /// position on a line is seen.
     fn new(sites: [usize; 2], places: [usize; 2], seen: impl Fn(usize, usize) -> bool) -> Self {
         let any: Vec<bool> = (0..sites[1]).map(|line| (0..sites[0]).any(|at| seen(at, line))).collect();
         let (mut distances, mut own, mut ends) = (Vec::with_capacity(places[0] * places[1]), Vec::new(), Vec::new());

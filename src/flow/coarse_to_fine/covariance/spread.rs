@@ -48,7 +48,8 @@ pub(in crate::flow::coarse_to_fine) struct Spread<T> {
 }
 
 impl<T: SimdReal> Spread<T> {
-    /// Of places, row by row, of the given level of the pyramid: flow in pixels of the frame is so many times larger, slopes are the same.
+    /// Of places, row by row, of the given level of the pyramid: flow in pixels of the frame is so many times
+    /// larger, slopes are the same.
     pub(super) fn new(places: &[Entries], (along, across): (Places, Places), level: usize) -> Self {
         let factor = f64::from(1 << level as u32);
         let mut scale = [0.0; ENTRIES];

@@ -1,4 +1,5 @@
-//! A band of site rows, tile after tile, row after row: what a row needs from the rows above stays in the processor's caches.
+//! A band of site rows, tile after tile, row after row: what a row needs from the rows above stays in the
+//! processor's caches.
 
 use super::super::grid::{LEFT as GRID_LEFT, Planes};
 use super::View;
@@ -47,7 +48,8 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
         let radius = self.task.taps.len() - 1;
         let width = sites.div_ceil(sites.div_ceil(TILE)).next_multiple_of(CHUNK);
         for from in (0..sites).step_by(width) {
-            // The stencils read one pixel beyond the window, and the last odd column is not blended with the site after it.
+            // The stencils read one pixel beyond the window, and the last odd column is not blended with the
+            // site after it.
             let columns = Columns::new(from, (from + width).min(sites), self.task.size.0, radius / 2 + 2, V::LANES);
             self.scratch.prepare(columns, radius);
             self.tile::<V>(&columns);

@@ -21,7 +21,8 @@ pub(super) fn dense_row<V: Lanes>(
     }
 }
 
-/// Component `c` and its slope along x where row `y` of pixels crosses the columns of sites, and one site further than the level has.
+/// Component `c` and its slope along x where row `y` of pixels crosses the columns of sites, and one site
+/// further than the level has.
 #[inline(always)]
 fn site_row<V: Lanes>(
     motion: &Planes<V::Scalar>,

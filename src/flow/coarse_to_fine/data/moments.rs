@@ -1,7 +1,7 @@
 //! Windowed moments of the products: the normal equations of every site.
 //!
-//! For the unknowns `(u, v, u_x, v_x, u_y, v_y)` of a site, number `2 k + c` with `k` the power (1, x, y) that they are multiplied by and `c` the component,
-//! the normal matrix and the right side are
+//! For the unknowns `(u, v, u_x, v_x, u_y, v_y)` of a site, number `2 k + c` with `k` the power (1, x, y)
+//! that they are multiplied by and `c` the component, the normal matrix and the right side are
 //!
 //! ```text
 //! N[(k, c), (l, d)] = sum over the window of g x_k x_l P_cd        x_0, x_1, x_2 = 1, x, y px from the site
@@ -18,7 +18,8 @@ use crate::simd::{Lanes, SimdReal};
 
 /// Number of planes.
 pub(in super::super) const COUNT: usize = 26;
-/// First plane of the right sides; before it lie six moments (1, x, y, x^2, xy, y^2) each of `P_uu`, `P_uv` and `P_vv`.
+/// First plane of the right sides; before it lie six moments (1, x, y, x^2, xy, y^2) each of `P_uu`, `P_uv`
+/// and `P_vv`.
 const RIGHT: usize = 18;
 /// Plane of the window's mean of `e`.
 pub(in super::super) const ERROR: usize = 24;
@@ -37,7 +38,8 @@ pub(in super::super) const fn right(i: usize) -> usize {
     RIGHT + 3 * (i % 2) + i / 2
 }
 
-/// The filters of one axis at distance 0, 1, ...: `[g, g k, g k^2]` of the Gaussian of `sigma` px, its full sum 1.
+/// The filters of one axis at distance 0, 1, ...: `[g, g k, g k^2]` of the Gaussian of `sigma` px, its full
+/// sum 1.
 pub(super) fn taps<T: SimdReal>(sigma: f64) -> Vec<[T; 3]> {
     // The margins of the rows hold no wider window.
     let radius = ((3.0 * sigma + 0.5) as usize).min(2 * LEFT - 2);
@@ -46,7 +48,8 @@ pub(super) fn taps<T: SimdReal>(sigma: f64) -> Vec<[T; 3]> {
     raw.iter().enumerate().map(|(k, g)| [0, 1, 2].map(|p| T::from_f64(g / sum * (k as f64).powi(p)))).collect()
 }
 
-/// Filters down the columns: `source(-r ..= r)` are the rows of one plane, `out` are `N` planes: with `g`, `y g`, `y^2 g`.
+/// Filters down the columns: `source(-r ..= r)` are the rows of one plane, `out` are `N` planes: with `g`, `y
+/// g`, `y^2 g`.
 #[inline(always)]
 pub(super) fn vertical<V: Lanes, const N: usize>(
     columns: &Columns,
@@ -98,7 +101,8 @@ fn vertical_unrolled<V: Lanes, const N: usize, const U: usize>(
     }
 }
 
-/// Filters along the row at the sites only: `source` is one plane's row, `out` the output row, where `N` planes start at `places`: with `g`, `x g`, `x^2 g`.
+/// Filters along the row at the sites only: `source` is one plane's row, `out` the output row, where `N`
+/// planes start at `places`: with `g`, `x g`, `x^2 g`.
 #[inline(always)]
 pub(super) fn horizontal<V: Lanes, const N: usize>(
     columns: &Columns,

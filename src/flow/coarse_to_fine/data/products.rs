@@ -3,7 +3,8 @@
 use super::scratch::{Columns, IMAGE, LEFT, PRODUCTS};
 use crate::simd::{Lanes, SimdReal};
 
-/// Cubic B-spline stencils down the columns: value b = [1, 4, 1]/6, slope d = [-1, 0, 1]/2, curvature s = [1, -2, 1] of `A`, value and slope of `R`.
+/// Cubic B-spline stencils down the columns: value b = [1, 4, 1]/6, slope d = [-1, 0, 1]/2, curvature s = [1,
+/// -2, 1] of `A`, value and slope of `R`.
 ///
 /// `rows` are the image rows above, at and below; `out` a row of the five planes.
 #[inline(always)]
@@ -104,7 +105,8 @@ fn places<'a, T>(columns: &Columns, row: &'a mut [T]) -> [[&'a mut [T]; 2]; PROD
     })
 }
 
-/// `P_uu, P_uv, P_vv, q_u, q_v, e` and validity of some pixels from the vertical stencils at their left, at them and at their right.
+/// `P_uu, P_uv, P_vv, q_u, q_v, e` and validity of some pixels from the vertical stencils at their left, at
+/// them and at their right.
 #[inline(always)]
 fn products<V: Lanes>(near: [[V; 3]; 5], [u, v, valid]: [V; 3], weights: Weights<V>) -> [V; PRODUCTS] {
     let [_, ax, axx] = along(near[0]);

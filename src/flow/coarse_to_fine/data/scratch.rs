@@ -1,7 +1,8 @@
 //! The rows that a band keeps at hand.
 //!
-//! Every row of pixels lies as two halves, the even and the odd columns: column `2X` is sample `X` of the first half, column `2X + 1` sample `X` of the second.
-//! Motion on the sites widens to such rows, and windows on the sites read them, without moving a sample across lanes.
+//! Every row of pixels lies as two halves, the even and the odd columns: column `2X` is sample `X` of the
+//! first half, column `2X + 1` sample `X` of the second. Motion on the sites widens to such rows, and windows
+//! on the sites read them, without moving a sample across lanes.
 
 use crate::simd::SimdReal;
 
@@ -30,7 +31,8 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Site columns `from..to` of a level of `width` pixels, with `halo` more to both sides, as far as the level has them.
+    /// Site columns `from..to` of a level of `width` pixels, with `halo` more to both sides, as far as the
+    /// level has them.
     pub fn new(from: usize, to: usize, width: usize, halo: usize, lanes: usize) -> Self {
         let first = from.saturating_sub(halo);
         let count = ((to + halo).min(width.div_ceil(2)) - first).next_multiple_of(lanes);

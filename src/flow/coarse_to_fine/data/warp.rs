@@ -8,9 +8,11 @@ use crate::types::Mask;
 /// Most lanes of a vector.
 const MOST_LANES: usize = 16;
 
-/// Mean and rate of the views in row `y` of a level of `width x height` pixels, and 1 where every view is seen inside the rim on a usable pixel.
+/// Mean and rate of the views in row `y` of a level of `width x height` pixels, and 1 where every view is
+/// seen inside the rim on a usable pixel.
 ///
-/// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are known.
+/// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are
+/// known.
 #[inline(always)]
 pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     views: &[View<'_, T>],

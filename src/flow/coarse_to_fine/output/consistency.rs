@@ -7,23 +7,26 @@ use crate::simd::SimdReal;
 use crate::types::Mask;
 use rayon::prelude::*;
 
-/// Sites that the usual energy is taken from, about.
+/// SamplingGrid that the usual energy is taken from, about.
 const MOST_SAMPLES: usize = 20_000;
 /// Rows of a task, at least.
 const ROWS: usize = 16;
 
 /// Residual energy, over that of the usual textured site, from which on frames contradict the motion.
 const CONTRADICTION: f64 = 10.0;
-/// Residual energy over information, px^2: where texture is strong, so are the errors of its interpolation, and a residual that a shift of this square explains is none.
+/// Residual energy over information, px^2: where texture is strong, so are the errors of its interpolation,
+/// and a residual that a shift of this square explains is none.
 const EXPLAINED: f64 = 0.01;
 /// Share of the brightness' standard deviation that is never a residual.
 const LEAST: f64 = 4e-3;
 
-/// Residual energy over information, px^2, beyond which frames have nothing to do with each other, however usual that is; and the share of the brightness' standard deviation
-/// that the residual then has at least, so that noise where there is no texture is no contradiction.
+/// Residual energy over information, px^2, beyond which frames have nothing to do with each other, however
+/// usual that is; and the share of the brightness' standard deviation that the residual then has at least, so
+/// that noise where there is no texture is no contradiction.
 const UNRELATED: (f64, f64) = (0.5, 0.15);
 
-/// The sites of the data whose residual, along the motion, stands out: what is seen in one frame is hidden in the other or has changed, or its motion was missed.
+/// The sites of the data whose residual, along the motion, stands out: what is seen in one frame is hidden in
+/// the other or has changed, or its motion was missed.
 #[derive(Debug)]
 pub(super) struct Consistency {
     contradicted: Mask,
@@ -67,7 +70,8 @@ fn sites<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item = [f64; 
     uu.iter().zip(vv).zip(energy).map(|((uu, vv), energy)| [uu.to_f64() + vv.to_f64(), energy.to_f64()])
 }
 
-/// Median of the energies of that half of the sites which has most information: untextured ones show no residual whatever the motion is.
+/// Median of the energies of that half of the sites which has most information: untextured ones show no
+/// residual whatever the motion is.
 fn usual<T: SimdReal>(data: &Planes<T>) -> f64 {
     let every = (data.width * data.height / MOST_SAMPLES).max(1);
     let mut known: Vec<_> = (0..data.height).flat_map(|y| sites(data, y)).step_by(every).collect();

@@ -1,7 +1,7 @@
 //! Which windows a site uses: O. V. Lepski's comparison of scales, softened.
 //!
-//! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider windows as long as the estimate changes by no more than noise
-//! explains.
+//! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider
+//! windows as long as the estimate changes by no more than noise explains.
 
 use super::Options;
 use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
@@ -15,7 +15,8 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 const NONE: f64 = 1e-2;
 /// Least noise density, px^4: below what frames of any kind show.
 const QUIET: f64 = 1e-9;
-/// The step of the ladder that tells whether the flow is restless: wider than what the coupling smooths, narrower than what smooth flow bends in.
+/// The step of the ladder that tells whether the flow is restless: wider than what the coupling smooths,
+/// narrower than what smooth flow bends in.
 const RESTLESS_STEP: usize = 2;
 /// Share of the change that counts.
 const RESTLESS_SHARE: f64 = 0.8;
@@ -46,7 +47,9 @@ impl Use {
     }
 }
 
-/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on coarser grids, for each grid, and the mean sigma, px; then the weights of the flow over the windows' regional misfits, and the noise density.
+/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on
+/// coarser grids, for each grid, and the mean sigma, px; then the weights of the flow over the windows'
+/// regional misfits, and the noise density.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Order {
     pub windows: usize,
@@ -167,7 +170,8 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
 }
 
 impl<T: SimdReal> Climb<'_, T> {
-    /// How restless the flow is, from 1 on: its change from one of the narrow windows to the next, over what white noise explains.
+    /// How restless the flow is, from 1 on: its change from one of the narrow windows to the next, over what
+    /// white noise explains.
     #[inline(always)]
     fn restless<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
         let one = V::constant(1.0);
@@ -226,7 +230,8 @@ fn power4<V: Lanes>(value: V) -> V {
     square * square
 }
 
-/// Noise density of the flow, px^2 per px^-2: the residual energy over the information, averaged over directions (trace of its inverse).
+/// Noise density of the flow, px^2 per px^-2: the residual energy over the information, averaged over
+/// directions (trace of its inverse).
 #[inline(always)]
 fn density<V: Lanes>(means: &[V::Scalar], stride: usize) -> V {
     let (uu, uv, vv) = (V::load(means), V::load(&means[stride..]), V::load(&means[2 * stride..]));

@@ -1,9 +1,11 @@
 //! Fits that keep to one side of a motion boundary.
 //!
-//! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows beside a site; here each of nine is an affine model, and all
-//! count: the better the closer to affine the flow is in the window, and the closer the model comes to the site's own flow.
+//! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows
+//! beside a site; here each of nine is an affine model, and all count: the better the closer to affine the
+//! flow is in the window, and the closer the model comes to the site's own flow.
 //!
-//! Slopes are taken from the best of windows some steps wider: where the flow jumps, what windows make of the jump has a slope that no motion has, and reaches as far as they do.
+//! Slopes are taken from the best of windows some steps wider: where the flow jumps, what windows make of the
+//! jump has a slope that no motion has, and reaches as far as they do.
 
 use super::choose::{Choice, Use};
 use super::field::{Field, RIM};
@@ -29,7 +31,8 @@ pub(super) struct Wanted {
     slopes_of: Vec<usize>,
 }
 
-/// The windows whose edge fits are used at any site, for the flow or for slopes; what would need a window wider than the widest has that one.
+/// The windows whose edge fits are used at any site, for the flow or for slopes; what would need a window
+/// wider than the widest has that one.
 pub(super) fn wanted<T: SimdReal>(choice: &Choice<T>) -> Vec<Wanted> {
     let windows = choice.order.windows;
     let flow: Vec<bool> = (0..windows).map(|l| choice.wants_edges(l)).collect();

@@ -6,7 +6,7 @@ use super::region::Layout;
 use crate::flow::coarse_to_fine::grid::Planes;
 use crate::simd::SimdReal;
 
-/// Sites from one place of the evidence to the next.
+/// SamplingGrid from one place of the evidence to the next.
 pub(in crate::flow::coarse_to_fine) const SPACING: usize = 1 << MAX_OCTAVE;
 
 /// Regional means and weights of windows, at every fourth site.
@@ -15,7 +15,7 @@ pub(in crate::flow::coarse_to_fine) struct Evidence<T> {
     means: Planes<T>,
     choice: Planes<T>,
     order: Order,
-    /// Sites of the motion along x and y.
+    /// SamplingGrid of the motion along x and y.
     sites: (usize, usize),
     /// Standard deviations of the windows, px.
     pub sigmas: &'static [f64],
@@ -36,7 +36,8 @@ impl<T: SimdReal> Evidence<T> {
         [self.means, self.choice]
     }
 
-    /// Places along x and y, [`SPACING`] sites apart; the last ones are those of the last sites, however near to the ones before.
+    /// Places along x and y, [`SPACING`] sites apart; the last ones are those of the last sites, however near
+    /// to the ones before.
     pub fn size(&self) -> (usize, usize) {
         (places(self.sites.0), places(self.sites.1))
     }
@@ -51,7 +52,8 @@ impl<T: SimdReal> Evidence<T> {
         at(&self.means, Layout::ENERGY, x, y).powi(4)
     }
 
-    /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field vanishes.
+    /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field
+    /// vanishes.
     pub fn weights(&self, l: usize, x: usize, y: usize) -> [f64; 2] {
         [Use::Flow, Use::Slopes].map(|of| at(&self.choice, self.order.weight(of, l), x, y))
     }
@@ -62,7 +64,8 @@ impl<T: SimdReal> Evidence<T> {
         weights.fold([0.0; 2], |sum, w| [sum[0] + w[0], sum[1] + w[1]])
     }
 
-    /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit density: a density, px^4.
+    /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit
+    /// density: a density, px^4.
     pub fn change(&self, l: usize, x: usize, y: usize) -> f64 {
         at(&self.means, Layout::change(l), x, y).powi(4) / difference_variance(self.sigmas[l], self.sigmas[l + 1])
     }

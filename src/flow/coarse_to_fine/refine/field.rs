@@ -5,7 +5,7 @@ use crate::flow::coarse_to_fine::memory::Space;
 use crate::simd::SimdReal;
 use std::ops::Range;
 
-/// Sites on each side of the frame: no window may reach farther.
+/// SamplingGrid on each side of the frame: no window may reach farther.
 pub(super) const RIM: usize = LEFT;
 
 /// How values go on beyond the edge.
@@ -47,7 +47,7 @@ impl<T: SimdReal> Field<T> {
         Self { planes: Planes::new(width, height + 2 * RIM, count), width, height }
     }
 
-    /// Sites that a kernel computes in a row.
+    /// SamplingGrid that a kernel computes in a row.
     pub fn padded(&self) -> usize {
         self.planes.padded()
     }

@@ -15,10 +15,12 @@ use std::ops::Range;
 
 /// Shares of the edge fits below this count as none, so that calm places can pass them by.
 const SHUT: f64 = 0.2;
-/// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for single precision.
+/// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for
+/// single precision.
 const WHOLE: f64 = 1e5;
-/// What the windows of the data and of the coupling, the same everywhere, smooth away: so much of the Laplacian of the flow and of its slopes, sites^2 (1 px^2 and somewhat less: at motion boundaries
-/// slopes lose more by it than they gain elsewhere).
+/// What the windows of the data and of the coupling, the same everywhere, smooth away: so much of the
+/// Laplacian of the flow and of its slopes, sites^2 (1 px^2 and somewhat less: at motion boundaries slopes
+/// lose more by it than they gain elsewhere).
 const SMOOTHED: [f64; 2] = [0.25, 0.2];
 /// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
@@ -67,7 +69,8 @@ impl<T: SimdReal> Last<'_, T> {
         gates
     }
 
-    /// Plane `k` of the plain estimate without the smoothing that is the same everywhere, as far as edge fits do not count: beside a step there is no smooth flow to be restored.
+    /// Plane `k` of the plain estimate without the smoothing that is the same everywhere, as far as edge fits
+    /// do not count: beside a step there is no smooth flow to be restored.
     #[inline(always)]
     fn sharpened<V: Lanes<Scalar = T>>(&self, k: usize, (at, y): (usize, usize), share: V) -> V {
         let row = y as isize;
@@ -188,7 +191,8 @@ fn ramp<T: SimdReal>() -> [T; CHUNK] {
     std::array::from_fn(|i| T::from_f64(i as f64))
 }
 
-/// The refined motion, with the window's sigma and the noise density: planes of [`RESULT`]. `base` (u, v, then the slopes, about site (0, 0)) is added; sites are `pitch` px apart.
+/// The refined motion, with the window's sigma and the noise density: planes of [`RESULT`]. `base` (u, v,
+/// then the slopes, about site (0, 0)) is added; sites are `pitch` px apart.
 pub(super) fn finish<T: SimdReal>(
     simd: Level,
     space: &Space<T>,

@@ -9,14 +9,16 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Planes of flow to be fitted: u, v and the mean of `u^2 + v^2` (of the flow itself, where u and v are smoothed).
+/// Planes of flow to be fitted: u, v and the mean of `u^2 + v^2` (of the flow itself, where u and v are
+/// smoothed).
 pub(super) const FLOW: usize = 3;
 /// Planes of a fit: u, v, u_x, v_x, u_y, v_y and the misfit's variance in the window, px^2.
 pub(super) const FIT: usize = 7;
 /// Least misfit that is told apart from none, px^2.
 pub(super) const LEAST: f64 = 1e-6;
 
-/// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds four lines.
+/// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds
+/// four lines.
 #[inline(always)]
 pub(super) fn fit_row<V: Lanes>(
     from: &Field<V::Scalar>,
@@ -158,7 +160,8 @@ pub(super) fn halve<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>,
     out
 }
 
-/// Continues a flow beyond the frame and completes its third plane, which holds the variance that smoothing took away.
+/// Continues a flow beyond the frame and completes its third plane, which holds the variance that smoothing
+/// took away.
 pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
     flow.extend(0..2, Beyond::Odd, RIM);
     flow.extend(2..3, Beyond::Even, RIM);

@@ -1,4 +1,5 @@
-//! The ladder of windows: which grid each is computed on, its taps, and how noise passes from one to the next.
+//! The ladder of windows: which grid each is computed on, its taps, and how noise passes from one to the
+//! next.
 
 use super::field::RIM;
 use crate::flow::windowed::window::weights;
@@ -11,7 +12,8 @@ pub(super) const MAX_OCTAVE: usize = 2;
 const VARIANCE_STEPS: usize = 12;
 /// The widest window of a grid, sites: beyond it, the next grid is fine enough.
 const WIDEST: f64 = 2.9;
-/// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a thousand times.
+/// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a
+/// thousand times.
 const BEFORE_HALVING: f64 = 1.5;
 
 /// Factors of what is smoothed once, twice, ...: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
@@ -19,7 +21,8 @@ pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.
 /// Passes after the first.
 pub(super) const AGAIN: usize = TERMS.len() - 1;
 
-/// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a weighted straight line.
+/// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a
+/// weighted straight line.
 #[derive(Debug, Clone)]
 pub(super) struct Taps<T> {
     /// Distance 0 ..= radius; the third filter of the type is not used.
@@ -48,7 +51,8 @@ impl<T: SimdReal> Taps<T> {
     fn cut_off(sigma: f64, radius: usize, pitch: f64) -> Self {
         let g = weights(sigma, radius);
         let variance = 2.0 * moment(&g, 2);
-        // Cut off, a Gaussian loses more of its fourth moment than of its second: one that is somewhat wider is made up for it.
+        // Cut off, a Gaussian loses more of its fourth moment than of its second: one that is somewhat wider
+        // is made up for it.
         let mut slope = sigma;
         for _ in 0..VARIANCE_STEPS {
             let h = weights(slope, radius);
@@ -122,9 +126,11 @@ impl<T: SimdReal> Ladder<T> {
     }
 }
 
-/// Variance of the difference between the estimates of two windows, for white noise of unit density (per px^2); the second may be infinite.
+/// Variance of the difference between the estimates of two windows, for white noise of unit density (per
+/// px^2); the second may be infinite.
 ///
-/// With the transfer functions `H = 1 - (1 - G)^4`, `G = exp(-sigma^2 w^2 / 2)`, it is `integral (H_a - H_b)^2 w dw / (2 pi)`, each term of which is a Gaussian.
+/// With the transfer functions `H = 1 - (1 - G)^4`, `G = exp(-sigma^2 w^2 / 2)`, it is `integral (H_a -
+/// H_b)^2 w dw / (2 pi)`, each term of which is a Gaussian.
 pub(super) fn difference_variance(a: f64, b: f64) -> f64 {
     let window = |sign: f64, s: f64| TERMS.into_iter().zip(1..).map(move |(c, n)| (sign * c, f64::from(n) * s * s));
     let terms: Vec<_> = window(1.0, a).chain(window(-1.0, b)).collect();

@@ -11,7 +11,8 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Least weight of the narrowest window of a coarse grid: interpolation to finer grids wants values everywhere.
+/// Least weight of the narrowest window of a coarse grid: interpolation to finer grids wants values
+/// everywhere.
 const LEAST_WEIGHT: f64 = 1e-3;
 /// What plain fits are used for.
 const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];
@@ -47,7 +48,8 @@ impl<T: SimdReal> Scratch<T> {
 }
 
 impl<T: SimdReal> Plain<'_, T> {
-    /// Planes of [`FIT`] along row `y`: the mean fit, and the mean relative misfit. On the finest grid the weights sum to 1, or to less where the field vanishes.
+    /// Planes of [`FIT`] along row `y`: the mean fit, and the mean relative misfit. On the finest grid the
+    /// weights sum to 1, or to less where the field vanishes.
     #[inline(always)]
     fn row<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
         let stride = self.grid.stride();

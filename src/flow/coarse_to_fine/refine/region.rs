@@ -1,6 +1,7 @@
 //! Robust regional levels: what is usual around a site, whatever few sites do.
 //!
-//! The level is a power mean `(G * f^p)^(1/p)`: with p = 1/4 it lies near a median, with p = -1/4 near the calm part of the region.
+//! The level is a power mean `(G * f^p)^(1/p)`: with p = 1/4 it lies near a median, with p = -1/4 near the
+//! calm part of the region.
 
 use super::Options;
 use super::field::{Beyond, Field, RIM};
@@ -16,8 +17,9 @@ use std::ops::Range;
 /// Added before a root is taken, in the square of the quantity's unit.
 const TINY: f64 = 1e-12;
 
-/// Planes of regional means, on the coarsest grid: those of Puu, Puv, Pvv, of the root of e, then (per step of the ladder) of the root of the change and
-/// of its inverse, then (per window) of the inverse root of the misfit.
+/// Planes of regional means, on the coarsest grid: those of Puu, Puv, Pvv, of the root of e, then (per step
+/// of the ladder) of the root of the change and of its inverse, then (per window) of the inverse root of the
+/// misfit.
 pub(super) struct Layout {
     pub windows: usize,
     /// From each window to the next; from the widest to nothing as well, where the field may be nothing.
@@ -50,7 +52,8 @@ enum Item<'a, T> {
     Data(usize),
     /// The fourth root of the residual energy.
     Energy(usize),
-    /// The fourth root, and its inverse, of the squared change from one window to the next, or to nothing; each with its distance of sites.
+    /// The fourth root, and its inverse, of the squared change from one window to the next, or to nothing;
+    /// each with its distance of sites.
     Change((&'a Field<T>, usize), Option<(&'a Field<T>, usize)>),
     /// The inverse fourth root of the misfit.
     Misfit(&'a Field<T>, usize),

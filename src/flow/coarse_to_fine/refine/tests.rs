@@ -200,7 +200,8 @@ fn nothing_comes_of_nothing_and_missing_data_stay_finite() {
     assert!((0..8).all(|k| (0..30).all(|y| got.line(k, y).iter().all(|v| v.is_finite()))));
 }
 
-/// Prints the time for a frame of 640x480: `cargo test --release --lib refine::tests::time -- --ignored --nocapture`.
+/// Prints the time for a frame of 640x480: `cargo test --release --lib refine::tests::time -- --ignored
+/// --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

@@ -85,7 +85,8 @@ fn first_colour(bytes: &[u8], policy: Grey) -> Result<AnyColourFrame> {
     Ok(Y4mSource::new("test.y4m", bytes)?.with_policy(policy).next_frame()?.unwrap())
 }
 
-/// One frame of 3 x 3 pixels, luma 40 to 48, and chroma samples that count up from 100 (blue) and from 150 (red).
+/// One frame of 3 x 3 pixels, luma 40 to 48, and chroma samples that count up from 100 (blue) and from 150
+/// (red).
 fn chroma_stream(layout: &str, count: u8, range: &str) -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W3 H3 {layout} {range}\nFRAME\n").into_bytes();
     bytes.extend(40..49);

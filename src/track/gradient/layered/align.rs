@@ -14,7 +14,8 @@ const STEPS: usize = 6;
 const SETTLED: f64 = 0.01;
 /// Least deviation of the residual, share of the range of the model.
 const LEAST_SHARE: f64 = 0.03;
-/// What turning a target changes of its picture, over what growing does, squared, below which it is round: that much is noise. A square has a third.
+/// What turning a target changes of its picture, over what growing does, squared, below which it is round:
+/// that much is noise. A square has a third.
 const ROUND: f64 = 0.1;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
 const CORRELATED: f64 = 4.0;

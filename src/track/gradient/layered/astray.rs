@@ -1,13 +1,16 @@
-//! A target that was found where it cannot have gone: in the first frames its speed is not known, and before a rough background gradient steps from rest may lead to the wrong side.
+//! A target that was found where it cannot have gone: in the first frames its speed is not known, and before
+//! a rough background gradient steps from rest may lead to the wrong side.
 //!
-//! All that changed since the first frame is then explained by one displacement in whole pixels ([`super::outset`]). Where the target was found elsewhere it is looked for there.
+//! All that changed since the first frame is then explained by one displacement in whole pixels
+//! ([`super::outset`]). Where the target was found elsewhere it is looked for there.
 
 use super::Layered;
 use super::align::Silence;
 use super::find::{DROP, Finding, LEVELS, PRIOR, WELL};
 use crate::types::Frame;
 
-/// Distance of what was found from the displacement that explains the changes, px, that whole pixels and a support that is still adapting make.
+/// Distance of what was found from the displacement that explains the changes, px, that whole pixels and a
+/// support that is still adapting make.
 const ASTRAY: f64 = 2.0;
 /// Deviation of that displacement, px.
 const TOLD: f64 = 1.0;

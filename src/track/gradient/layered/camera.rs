@@ -60,7 +60,9 @@ impl Seen {
     }
 }
 
-/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better. `before` is that of the frame before. Where the scene moves, but not as one, that of what is around the target.
+/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better.
+/// `before` is that of the frame before. Where the scene moves, but not as one, that of what is around the
+/// target.
 pub(super) fn camera_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64, before: [f64; 2]) -> [f64; 2] {
     let scene = scene_motion(previous, now, target, noise, before);
     if scene == [0.0; 2] && before == scene {
@@ -96,8 +98,9 @@ fn scene_motion(previous: &Seen, now: &Seen, target: TargetBox, noise: f64, befo
     motion
 }
 
-/// Scatter of what the still scene changed by since the frame before, grey levels: the deviation of differences from their median, robustly, where the scene moved by `motion` in the picture.
-/// Light that falls on all of it alike is no scatter.
+/// Scatter of what the still scene changed by since the frame before, grey levels: the deviation of
+/// differences from their median, robustly, where the scene moved by `motion` in the picture. Light that
+/// falls on all of it alike is no scatter.
 pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox, motion: [f64; 2]) -> f64 {
     let hidden = grown(target, (0.0, AROUND));
     let still = motion == [0.0; 2];
@@ -188,7 +191,8 @@ impl Samples {
         self.places.len()
     }
 
-    /// What the next frame shows at the moved samples, less what they were; NaN where that is not in the frame.
+    /// What the next frame shows at the moved samples, less what they were; NaN where that is not in the
+    /// frame.
     fn residuals(&self, next: &Frame<f64>, motion: [f64; 2]) -> Vec<f64> {
         let whole = motion.map(f64::floor);
         // All samples lie alike between the pixels.
@@ -217,7 +221,8 @@ impl Samples {
         self.capped(next, motion) < LESS * self.capped(next, [0.0; 2])
     }
 
-    /// What continues the motion before, unless something else explains the next frame clearly better: where two things move, the camera is what it was.
+    /// What continues the motion before, unless something else explains the next frame clearly better: where
+    /// two things move, the camera is what it was.
     fn better(&self, next: &Frame<f64>, going_on: Option<[f64; 2]>, other: Option<[f64; 2]>) -> Option<[f64; 2]> {
         let left = |motion: Option<[f64; 2]>| motion.map_or(f64::INFINITY, |m| self.capped(next, m));
         if left(other) < LESS * left(going_on) { other } else { going_on.or(other) }
@@ -264,7 +269,8 @@ impl Samples {
     }
 }
 
-/// Deviation of the residuals by their lower quartile: where half of the scene moves otherwise it is that of the other half, so that steps end in one motion and not between the two.
+/// Deviation of the residuals by their lower quartile: where half of the scene moves otherwise it is that of
+/// the other half, so that steps end in one motion and not between the two.
 fn deviation_of_the_better_half(residuals: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = residuals.iter().step_by(EVERY).map(|r| r.abs()).filter(|r| !r.is_nan()).collect();
     if sizes.is_empty() {
@@ -303,7 +309,8 @@ impl Sources {
 }
 
 impl Background {
-    /// The scene moved by so many px in the picture. What comes into view is taken as it is seen, but does not count as known.
+    /// The scene moved by so many px in the picture. What comes into view is taken as it is seen, but does
+    /// not count as known.
     pub(super) fn moved(&mut self, by: [f64; 2], frame: &Frame<f64>) {
         let back = by.map(|b| -b);
         let (width, height) = self.known.size();

@@ -1,4 +1,5 @@
-//! Finding the target in a frame: where the filter expects it, beside what covers or touches it, or all around.
+//! Finding the target in a frame: where the filter expects it, beside what covers or touches it, or all
+//! around.
 
 use super::align::{Aligned, Freedom, Silence, Task, align};
 use super::look::{Look, look, view};
@@ -51,7 +52,8 @@ pub(super) const DROP: f64 = 0.08;
 const WHOLE: f64 = 0.95;
 /// Loss of visibility that noise alone may make.
 const SLIGHT: f64 = 0.03;
-/// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a loss of visibility.
+/// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a
+/// loss of visibility.
 const STRIP: f64 = 1.25;
 /// Distance of two poses that a covered edge makes, px.
 const HELD_BACK: f64 = 0.5;
@@ -140,8 +142,10 @@ impl Layered {
         best.filter(|found| found.look.visibility >= least && found.look.contrast >= VISIBLE * self.noise)
     }
 
-    /// Whether what was found is only what is left of a target that was covered or not seen in the frame before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by much, or,
-    /// right after it was covered, by less but off its way. Such a target is not seen; its way would end at that edge.
+    /// Whether what was found is only what is left of a target that was covered or not seen in the frame
+    /// before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by
+    /// much, or, right after it was covered, by less but off its way. Such a target is not seen; its way
+    /// would end at that edge.
     fn is_a_rest(&self, found: &Finding) -> bool {
         let pose = &found.aligned.pose;
         let off = found.nis > DOUBT && found.look.leak < LEAK && self.became_smaller(pose);
@@ -155,7 +159,8 @@ impl Layered {
         pose.scale() < (1.0 - GROWN) * self.pose.scale()
     }
 
-    /// The target comes out from what hid part of it in the first frame, or goes behind it: its size is that of the first box.
+    /// The target comes out from what hid part of it in the first frame, or goes behind it: its size is that
+    /// of the first box.
     fn behind_the_front(&self, frame: &Frame<f64>) -> Option<Finding> {
         let how = (Freedom::Translation, Silence::Front, PRIOR, &LEVELS[1..]);
         let found = self.try_at(frame, &self.expected(false), how)?;
@@ -170,11 +175,13 @@ impl Layered {
         let how = (Freedom::Translation, Silence::Covered, [self.spread(), PRIOR[1]], levels);
         let found = self.try_at(frame, &self.expected(false), how)?;
         let dropped = |look: &Look, by: f64| look.visibility < self.usual - by;
-        // What is seen as well as ever in a place that nobody expected has made a turn; unless it became smaller at that, as what lies between the bars of a fence.
+        // What is seen as well as ever in a place that nobody expected has made a turn; unless it became
+        // smaller at that, as what lies between the bars of a fence.
         let turned = |plain: &Finding| {
             plain.nis > DOUBT && !dropped(&plain.look, SLIGHT) && !self.became_smaller(&plain.aligned.pose)
         };
-        // Nor has one that is where it is expected but for a strip along its side, and would be smaller or less seen elsewhere.
+        // Nor has one that is where it is expected but for a strip along its side, and would be smaller or
+        // less seen elsewhere.
         let begins =
             plain.is_some_and(|plain| plain.nis > DOUBT && !turned(&plain) && self.is_held_back(&found, &plain));
         // The last strip of a large target is not to be taken for background.
@@ -185,7 +192,8 @@ impl Layered {
         taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
     }
 
-    /// Something known begins to cover a large target, and its edge stands for the target's own: what is on the side towards which the target is off has no vote.
+    /// Something known begins to cover a large target, and its edge stands for the target's own: what is on
+    /// the side towards which the target is off has no vote.
     fn begun(&self, frame: &Frame<f64>, plain: &Finding) -> Option<Finding> {
         let (at, expected) = (self.position(&plain.aligned.pose), self.filter.position());
         let side = Silence::Towards([expected[0] - at[0], expected[1] - at[1]]);
@@ -195,13 +203,15 @@ impl Layered {
         taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
     }
 
-    /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is not told, but of a large target that was seen whole: of a small one a wrong box leaves as
-    /// much unseen as cover.
+    /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is
+    /// not told, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
+    /// as cover.
     fn is_known(&self) -> bool {
         self.age >= YOUNG && !self.is_adapting() || self.most_seen > WHOLE && self.is_large()
     }
 
-    /// Whether the support is still adapting to what the box holds: a target of which much was never seen had a box with much else in it.
+    /// Whether the support is still adapting to what the box holds: a target of which much was never seen had
+    /// a box with much else in it.
     pub(super) fn is_adapting(&self) -> bool {
         self.age < self.adapts_until
     }
@@ -211,14 +221,17 @@ impl Layered {
         STRIP / self.side() < DROP
     }
 
-    /// Whether a large target is not where it is expected. The filter takes turns for granted, and is no judge of fractions of a pixel.
+    /// Whether a large target is not where it is expected. The filter takes turns for granted, and is no
+    /// judge of fractions of a pixel.
     fn may_be_held_back(&self, plain: &Finding) -> bool {
         self.is_large() && self.off(plain) > HELD_BACK
     }
 
-    /// Whether a large target is rather `elsewhere`, nearer to where it is expected, than where it would be if all of it were seen, `plain`. The edge of what begins to cover a plain target
-    /// stands for its own, and holds it back or makes it shrink at the price of another: the area that is not explained stays the same. A target that has really turned leaves two strips
-    /// that are not, one on either side of the expected place, as long as the target is wide and as wide as it is off.
+    /// Whether a large target is rather `elsewhere`, nearer to where it is expected, than where it would be
+    /// if all of it were seen, `plain`. The edge of what begins to cover a plain target stands for its own,
+    /// and holds it back or makes it shrink at the price of another: the area that is not explained stays the
+    /// same. A target that has really turned leaves two strips that are not, one on either side of the
+    /// expected place, as long as the target is wide and as wide as it is off.
     fn is_held_back(&self, elsewhere: &Finding, plain: &Finding) -> bool {
         let [at, held] = [elsewhere, plain].map(|finding| self.position(&finding.aligned.pose));
         let apart = (at[0] - held[0]).hypot(at[1] - held[1]);
@@ -238,8 +251,10 @@ impl Layered {
         (at[0] - expected[0]).hypot(at[1] - expected[1])
     }
 
-    /// Whether something that looks like the target touches it: much of it beside the target, on one side. A moment after that was so, what pulls the target out of its way or makes it grow
-    /// is still the look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would differ the more the longer it lasts.
+    /// Whether something that looks like the target touches it: much of it beside the target, on one side. A
+    /// moment after that was so, what pulls the target out of its way or makes it grow is still the
+    /// look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would
+    /// differ the more the longer it lasts.
     fn is_touched(&self, found: &Finding) -> Option<&'static str> {
         if found.look.leak > TOUCH.0 && found.look.one_sided > TOUCH.1 {
             return Some(TOUCHED);

@@ -8,7 +8,8 @@ use crate::types::Frame;
 /// Share of the target behind it up to which it hides nothing any more.
 const PAST: f64 = 0.03;
 
-/// Something still in front of the target: pixels of the first box. Beyond the box it goes on as at the nearest of its pixels.
+/// Something still in front of the target: pixels of the first box. Beyond the box it goes on as at the
+/// nearest of its pixels.
 #[derive(Debug, Clone)]
 pub(super) struct Front {
     /// Whether it is there; the pixels of the box.

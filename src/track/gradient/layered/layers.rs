@@ -1,4 +1,5 @@
-//! The two layers of the picture: the target (its brightness and its support, in its own coordinates) and what is behind it.
+//! The two layers of the picture: the target (its brightness and its support, in its own coordinates) and
+//! what is behind it.
 //!
 //! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
 
@@ -39,7 +40,8 @@ pub(super) struct Target {
     pub n: Frame<f64>,
     /// As above.
     pub d: Frame<f64>,
-    /// How much of what is seen next of a point becomes its brightness, where that was hidden at first; 0 where it was seen.
+    /// How much of what is seen next of a point becomes its brightness, where that was hidden at first; 0
+    /// where it was seen.
     pub fresh: Option<Frame<f64>>,
     /// How far the points of the box differ from what is behind them, until that is told.
     pub margin: Option<Margin>,
@@ -168,7 +170,8 @@ impl Background {
         this
     }
 
-    /// Pixels in and around a box that are neither known nor `told` get a smooth continuation of those that are.
+    /// Pixels in and around a box that are neither known nor `told` get a smooth continuation of those that
+    /// are.
     pub fn guess(&mut self, hidden: &TargetBox, told: impl Fn(usize, usize) -> bool) {
         let reach = [hidden.width, hidden.height].map(|side| 0.5 * side + AROUND);
         let mut around = Patch::cut(&self.picture, bounds_about(hidden.centre(), reach, self.picture.size()));

@@ -13,7 +13,8 @@ use crate::types::Frame;
 const FORGETTING: f64 = 0.95;
 /// Weight of the first support, grey^2.
 pub(super) const PRIOR: f64 = 144.0;
-/// The same over the variance of the noise, where that is more: what noise alone says of the support stays small beside it.
+/// The same over the variance of the noise, where that is more: what noise alone says of the support stays
+/// small beside it.
 const PRIOR_IN_NOISE: f64 = 30.0;
 /// Rate of the template.
 const TEMPLATE_RATE: f64 = 0.08;
@@ -50,7 +51,8 @@ pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f
     continue_template(target);
 }
 
-/// Brightness of points that were hidden at first: the mean of what is seen of them, and not of what hides them, until they are known as well as others.
+/// Brightness of points that were hidden at first: the mean of what is seen of them, and not of what hides
+/// them, until they are known as well as others.
 pub(super) fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f64) {
     let Some(mut fresh) = target.fresh.take() else { return };
     let least = 4.0 * noise + 6.0;
@@ -148,7 +150,8 @@ impl Kernel<f64> for Behind<'_> {
     }
 }
 
-/// The noise of the frames, from how the still scene differs from one to the next; grey levels. `noise`: what it was before, if that is known.
+/// The noise of the frames, from how the still scene differs from one to the next; grey levels. `noise`: what
+/// it was before, if that is known.
 pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
     let every = (frame.data().len() / SAMPLES).max(1) | 1;
     let pairs = frame.data().iter().zip(previous.data()).step_by(every);

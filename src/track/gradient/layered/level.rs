@@ -1,4 +1,5 @@
-//! One level of the alignment: picture, background and target smoothed alike, and what the nodes of the target say there.
+//! One level of the alignment: picture, background and target smoothed alike, and what the nodes of the
+//! target say there.
 
 use super::align::{Silence, Task};
 use super::layers::{is_inside, wide};
@@ -110,7 +111,8 @@ impl<'a> Level<'a> {
         (range.1 - range.0).max(0.0)
     }
 
-    /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the target its support ends without the target ending.
+    /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the
+    /// target its support ends without the target ending.
     pub fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
         let Task { frame, target, silence, front, .. } = self.task;
         if silence == Silence::None {

@@ -31,8 +31,8 @@ impl Light {
     }
 }
 
-/// The light of the frame against that of the background, where both are known: a robust ratio where that explains the frame better, or else a jump of the level, which no light makes but some
-/// cameras do.
+/// The light of the frame against that of the background, where both are known: a robust ratio where that
+/// explains the frame better, or else a jump of the level, which no light makes but some cameras do.
 pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> Light {
     let hidden = grown(target, (0.0, AROUND));
     let pairs: Vec<[f64; 2]> = spread(frame.size(), hidden, LIGHT_SAMPLES)

@@ -1,18 +1,23 @@
-//! What of the first box is only background: points at its rim that never differ from what is behind them, wherever the target goes.
+//! What of the first box is only background: points at its rim that never differ from what is behind them,
+//! wherever the target goes.
 //!
-//! Before an even background nothing else tells a box that is too large: what lies between its rim and the target looks the same whether it is taken along or stays. Least squares leave the support there as
-//! the box has it; the simpler explanation is that it is not the target's. Points inside the target that happen to look like what is behind them are not at the rim, and stay.
+//! Before an even background nothing else tells a box that is too large: what lies between its rim and the
+//! target looks the same whether it is taken along or stays. Least squares leave the support there as the box
+//! has it; the simpler explanation is that it is not the target's. Points inside the target that happen to
+//! look like what is behind them are not at the rim, and stay.
 
 use super::layers::{Target, wide};
 use super::level::dilated;
 use super::look::View;
 use crate::types::Frame;
 
-/// Difference from what is behind over the noise, root mean square over the frames, up to which a point never differed: together with those around it, and alone beside such, where those around are the target's.
+/// Difference from what is behind over the noise, root mean square over the frames, up to which a point never
+/// differed: together with those around it, and alone beside such, where those around are the target's.
 const ALIKE: [f64; 2] = [2.0, 3.0];
 /// Fewest frames in which what is behind a point was known.
 const FRAMES: f64 = 3.0;
-/// Least part of the box that must differ: of a target that is hardly seen anything might be taken for background.
+/// Least part of the box that must differ: of a target that is hardly seen anything might be taken for
+/// background.
 const REST: f64 = 0.25;
 
 /// How far points differ from what is behind them.
@@ -74,7 +79,8 @@ impl Margin {
 }
 
 impl Target {
-    /// Takes points at the rim of the first box from the support that never differ from what is behind them, once that was known behind all of the box; `gain` is the brightness over that in the first frame.
+    /// Takes points at the rim of the first box from the support that never differ from what is behind them,
+    /// once that was known behind all of the box; `gain` is the brightness over that in the first frame.
     pub fn learn_margin(&mut self, view: &View, gain: f64, noise: f64) {
         let Some(mut margin) = self.margin.take() else { return };
         margin.add(view, gain);
@@ -102,7 +108,8 @@ mod tests {
     use crate::track::gradient::layered::learn::PRIOR;
     use crate::types::TargetBox;
 
-    /// The target of a box of 17 px about a square of 9 px with a hole, before an even background, and what is seen of both where only the background is known.
+    /// The target of a box of 17 px about a square of 9 px with a hole, before an even background, and what
+    /// is seen of both where only the background is known.
     fn even(bright: f64) -> (Target, View) {
         let shape = |x: usize, y: usize| {
             let ring = |low, high| (low..high).contains(&x) && (low..high).contains(&y);

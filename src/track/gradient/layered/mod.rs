@@ -1,7 +1,9 @@
-//! The layered tracker: the target and what is behind it as two layers, and one gradient step over the whole target from the filter's prediction.
+//! The layered tracker: the target and what is behind it as two layers, and one gradient step over the whole
+//! target from the filter's prediction.
 //!
-//! It keeps the idea of M. Chiba and S. Ozawa (the gradient equation, a prediction in place of iterations, a stopped background, a Gauss-Markov filter) and solves the equation once for the pose
-//! of the segmented target. Background, support and brightness of the target are learnt as it goes.
+//! It keeps the idea of M. Chiba and S. Ozawa (the gradient equation, a prediction in place of iterations, a
+//! stopped background, a Gauss-Markov filter) and solves the equation once for the pose of the segmented
+//! target. Background, support and brightness of the target are learnt as it goes.
 
 mod align;
 mod astray;
@@ -115,7 +117,8 @@ pub(super) struct Layered {
     faintness: f64,
 }
 
-/// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that shows nothing of it.
+/// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that
+/// shows nothing of it.
 pub(super) fn stilled(frame: &Frame<f64>, next: &Frame<f64>) -> Option<Frame<f64>> {
     let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
     let seen = [frame, next].map(|frame| Seen::new(frame.clone()));

@@ -1,6 +1,7 @@
 //! The motion of what is around the target, where the scene does not move as one.
 //!
-//! Two planes pass a camera at two speeds. What most of the picture does, or the mean of both, says nothing of the background that the target is before, whose texture would be taken for the target's.
+//! Two planes pass a camera at two speeds. What most of the picture does, or the mean of both, says nothing
+//! of the background that the target is before, whose texture would be taken for the target's.
 
 use super::camera::{AROUND, LESS, SAME, Samples};
 use super::layers::{grown, holds};
@@ -17,7 +18,8 @@ const EXPLAINED: (f64, f64) = (3.0, 1.0);
 /// Farthest another motion may be from it along both axes, px.
 const REACH: i32 = 3;
 
-/// `scene`, which is the motion of most of the picture, px, unless another one explains clearly better what is around the target. `before` is that of the frame before.
+/// `scene`, which is the motion of most of the picture, px, unless another one explains clearly better what
+/// is around the target. `before` is that of the frame before.
 pub(super) fn nearby(
     (previous, now): (&Frame<f64>, &Frame<f64>),
     target: TargetBox,

@@ -1,4 +1,5 @@
-//! Places of the target's nodes in the picture, and what is read there; column by column of a table, as lanes like it.
+//! Places of the target's nodes in the picture, and what is read there; column by column of a table, as lanes
+//! like it.
 
 use super::pose::Pose;
 use crate::image::cubic_at_all;

@@ -1,7 +1,8 @@
 //! A first box that holds only the middle of the target: what moves goes on beyond it on all sides.
 //!
-//! Such a box makes a template without edges, and a background that holds the rest of the target. In the first frames that move, what moves is therefore looked for without the box
-//! ([`detect_moving_target`]); where it is larger than the box on all sides, and what lies between moved with it, it is the target.
+//! Such a box makes a template without edges, and a background that holds the rest of the target. In the
+//! first frames that move, what moves is therefore looked for without the box ([`detect_moving_target`]);
+//! where it is larger than the box on all sides, and what lies between moved with it, it is the target.
 
 use super::layers::holds;
 use super::outset::{Changes, Outset};
@@ -20,7 +21,8 @@ const LINE: (f64, f64) = (0.2, 3.0);
 const STRAYS: f64 = 0.15;
 
 impl Outset {
-    /// What moved, where the box holds only the middle of it: its outline goes on beyond the box on all sides, and what is between moved with it.
+    /// What moved, where the box holds only the middle of it: its outline goes on beyond the box on all
+    /// sides, and what is between moved with it.
     pub fn outgrown(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
         if self.frames() > SOON {
             return None;

@@ -1,7 +1,10 @@
-//! What the first box held besides the target: something still before it. In the first frames that move, what moves is told from what does not.
+//! What the first box held besides the target: something still before it. In the first frames that move, what
+//! moves is told from what does not.
 //!
-//! A box that holds half a target and half of what hides it makes a template of both, and the still edge between them holds the target back. The first frame is therefore kept for a while, and
-//! that displacement since then is looked for that explains what changed: what lies in the displaced box shows the first box moved along, or the scene as it was.
+//! A box that holds half a target and half of what hides it makes a template of both, and the still edge
+//! between them holds the target back. The first frame is therefore kept for a while, and that displacement
+//! since then is looked for that explains what changed: what lies in the displaced box shows the first box
+//! moved along, or the scene as it was.
 
 use super::layers::{Target, holds};
 use super::patch::{Bounds, Patch, bounds_about};
@@ -21,7 +24,8 @@ const LEAST: isize = 2;
 const CHANGE: f64 = 3.0;
 /// Difference that all larger ones count as, grey levels.
 const CAP: f64 = 40.0;
-/// Of the displacements that explain the frames nearly as well as the best the smallest is taken: worse by this share, or by this share of a strip a pixel wide along the shorter side.
+/// Of the displacements that explain the frames nearly as well as the best the smallest is taken: worse by
+/// this share, or by this share of a strip a pixel wide along the shorter side.
 const NEARLY: [f64; 2] = [0.05, 0.25];
 /// Share of the change that may be left.
 const LEFT: f64 = 0.5;
@@ -139,7 +143,8 @@ impl Changes<'_> {
         (self.now.get(x, y) - self.outset.first.frame.get(x, y)).abs()
     }
 
-    /// Change from what was at one pixel to what is at another, but for what fractions of a pixel make, grey levels.
+    /// Change from what was at one pixel to what is at another, but for what fractions of a pixel make, grey
+    /// levels.
     pub fn along(&self, from: [usize; 2], to: [usize; 2]) -> f64 {
         beyond(self.outset.between.get(from[0], from[1]), self.now.get(to[0], to[1]))
     }
@@ -149,7 +154,8 @@ impl Changes<'_> {
         (change - self.bar).clamp(0.0, CAP)
     }
 
-    /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves, or not as a whole.
+    /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves,
+    /// or not as a whole.
     fn displacement(&self) -> Option<[isize; 2]> {
         let Outset { inside, frames, moved, .. } = self.outset;
         let (now, before) = (*frames as isize, *frames as isize - 1);
@@ -181,7 +187,8 @@ impl Changes<'_> {
         pixels.filter(|(_, inside)| !**inside).map(|((now, first), _)| self.excess((now - first).abs())).sum()
     }
 
-    /// Change at every pixel of the patch that noise does not make, grey levels, and that of it which is beside the box.
+    /// Change at every pixel of the patch that noise does not make, grey levels, and that of it which is
+    /// beside the box.
     fn rests(&self) -> Frame<[f64; 2]> {
         let (width, height) = self.now.size();
         Frame::from_fn(width, height, |x, y| {
@@ -190,7 +197,8 @@ impl Changes<'_> {
         })
     }
 
-    /// What is left of it, and of what changed in the box, where the box moved on; `voting` pixels of the box with the least and the greatest brightness around them.
+    /// What is left of it, and of what changed in the box, where the box moved on; `voting` pixels of the box
+    /// with the least and the greatest brightness around them.
     fn within(&self, d: [isize; 2], voting: &[([usize; 2], [f64; 2])], rests: &Frame<[f64; 2]>) -> f64 {
         let left = |&(from, between): &([usize; 2], [f64; 2])| {
             let Some([x, y]) = self.on(from, d) else { return 0.0 };
@@ -221,7 +229,8 @@ mod tests {
 
     const SIDE: usize = 20;
 
-    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before texture.
+    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before
+    /// texture.
     fn scene(moved: [usize; 2], hidden_to: usize, seed: u64) -> Frame<f64> {
         let rng = CounterRng::new(seed);
         Frame::from_fn(110, 80, |x, y| {

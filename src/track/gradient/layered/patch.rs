@@ -39,7 +39,8 @@ impl Patch {
         Self { frame: Frame::new(x1 - x0, y1 - y0, data).unwrap_or_default(), corner: [x0, y0] }
     }
 
-    /// The same, smoothed. Where samples are NaN, the mean of those that are not; NaN where there are none near.
+    /// The same, smoothed. Where samples are NaN, the mean of those that are not; NaN where there are none
+    /// near.
     pub fn smoothed(mut self, sigma: f64) -> Self {
         self.frame =
             if all_finite(&self.frame) { smooth(&self.frame, sigma) } else { smooth_known(&self.frame, sigma) };

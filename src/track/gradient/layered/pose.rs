@@ -41,7 +41,8 @@ impl Pose {
         (a * d - b * c).abs().sqrt()
     }
 
-    /// How much longer than at first it is along the picture's axes, turning apart: the diagonal of `S` in `A = S R`, `S` being the root of `A A'`.
+    /// How much longer than at first it is along the picture's axes, turning apart: the diagonal of `S` in `A
+    /// = S R`, `S` being the root of `A A'`.
     pub fn stretch(&self) -> [f64; 2] {
         let square = self.a.map(|row| row[0] * row[0] + row[1] * row[1]);
         let root = self.scale().powi(2);

@@ -1,7 +1,8 @@
 //! A first box that is too large, too wide or beside the target: what moves has another outline.
 //!
-//! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where it has clearly other sides than the box, what the box holds besides stayed where it was and
-//! does not look like the target, and what the box leaves out moved along, it is the target.
+//! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where
+//! it has clearly other sides than the box, what the box holds besides stayed where it was and does not look
+//! like the target, and what the box leaves out moved along, it is the target.
 
 use super::layers::{grown, holds};
 use super::outset::{Changes, Outset};
@@ -14,7 +15,8 @@ const SOON: usize = 8;
 const MOVED: [f64; 2] = [2.0, 7.0];
 /// The same as what the box holds tells it, which its other content may blur.
 const NEARLY: [f64; 2] = [1.0, 8.0];
-/// How far the middles must be apart: share of the box's side, and px. What moves is told in whole pixels, and its extent is up to 2 px too long, on either end: its middle is off by 1 px at most.
+/// How far the middles must be apart: share of the box's side, and px. What moves is told in whole pixels,
+/// and its extent is up to 2 px too long, on either end: its middle is off by 1 px at most.
 const APART: (f64, f64) = (0.1, 1.3);
 /// The same of the sides' difference.
 const LONGER: (f64, f64) = (0.15, 2.5);
@@ -26,7 +28,8 @@ pub(super) const TURNED: f64 = 0.05;
 const SIDES: [f64; 2] = [0.55, 1.6];
 /// Distance of the middles of the two, share of the box's sides.
 const ASIDE: f64 = 0.4;
-/// The same, and px, where the box holds all of what moves: of a target that something hides in part the box holds the hidden part, on one side.
+/// The same, and px, where the box holds all of what moves: of a target that something hides in part the box
+/// holds the hidden part, on one side.
 const CENTRED: (f64, f64) = (0.08, 0.75);
 /// Width of the rim around what moved in which it must stand out, px.
 const RIM: f64 = 2.0;
@@ -73,7 +76,8 @@ fn ends(bounds: &TargetBox) -> [[f64; 2]; 2] {
     [[bounds.x, bounds.x + bounds.width], [bounds.y, bounds.y + bounds.height]]
 }
 
-/// Whether what moves has clearly other sides than the box, or another middle, and may still be what the box is about.
+/// Whether what moves has clearly other sides than the box, or another middle, and may still be what the box
+/// is about.
 fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
     let (held, found) = (ends(bounds), ends(first));
     let (mut apart, mut longer, mut within, mut centred) = (0.0, false, true, true);
@@ -92,7 +96,8 @@ fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
 }
 
 impl Changes<'_> {
-    /// Whether what lies in only one of the box and the outline of what moves did as it should: in the box alone it stayed and does not look like the target, in the outline alone it moved along.
+    /// Whether what lies in only one of the box and the outline of what moves did as it should: in the box
+    /// alone it stayed and does not look like the target, in the outline alone it moved along.
     fn are_explained(&self, first: &TargetBox, found: &MovingTarget) -> bool {
         let corner = self.outset.first.corner;
         let d = found.displacement.map(|d| d as isize);
@@ -114,7 +119,8 @@ impl Changes<'_> {
             }
             if in_box && !holds(&outline, at.0, at.1) && !holds(&now, at.0, at.1) {
                 counts[0] += 1;
-                // What looks like the target is its own if it may have moved with it; of an even background both hold.
+                // What looks like the target is its own if it may have moved with it; of an even background
+                // both hold.
                 let along = self.on([x, y], d).is_none_or(|to| self.along([x, y], to) <= self.bar);
                 strays[0] += usize::from(self.at_rest([x, y]) > self.bar || like && along);
             } else if !in_box && holds(&core, at.0, at.1) {
@@ -150,7 +156,8 @@ mod tests {
     const SIDE: usize = 14;
     const NOISE: f64 = 1.5;
 
-    /// A square that was at (40, 30) at first, `moved` since, with something still beside it up to a column, before texture.
+    /// A square that was at (40, 30) at first, `moved` since, with something still beside it up to a column,
+    /// before texture.
     fn scene(moved: [usize; 2], hidden_to: usize, level: f64, seed: u64) -> Frame<f64> {
         let rng = CounterRng::new(seed);
         Frame::from_fn(96, 80, |x, y| {

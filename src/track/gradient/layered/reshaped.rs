@@ -1,18 +1,23 @@
-//! A target whose outline changes as no turning and no change of size makes it: one that breathes, bends or turns out of the plane.
+//! A target whose outline changes as no turning and no change of size makes it: one that breathes, bends or
+//! turns out of the plane.
 //!
-//! A similarity that follows such a target becomes smaller from frame to frame, for it gives up what goes beyond its outline on two sides for what is missing on the other two, or it stays at one of
-//! the edges. What looks like the target goes on beyond its outline then. Where an affine map from the expected pose explains nearly all of it, that is the pose; from there on similarities are tried again.
+//! A similarity that follows such a target becomes smaller from frame to frame, for it gives up what goes
+//! beyond its outline on two sides for what is missing on the other two, or it stays at one of the edges.
+//! What looks like the target goes on beyond its outline then. Where an affine map from the expected pose
+//! explains nearly all of it, that is the pose; from there on similarities are tried again.
 
 use super::align::{Freedom, Silence};
 use super::find::{DOUBT, DROP, Finding, LEAK, PRIOR, WELL};
 use super::{Layered, SURE};
 use crate::types::Frame;
 
-/// Part of the target's area in which its support is not what the picture tells, from which on its outline is doubted.
+/// Part of the target's area in which its support is not what the picture tells, from which on its outline is
+/// doubted.
 const OFF: f64 = 0.2;
 /// Part of the target's area beside it that looks like it, from which on it is taken for the target's own.
 const BEYOND: f64 = 0.03;
-/// How far that lies on one side, from which on it may be something else, and the map must be where the target is expected.
+/// How far that lies on one side, from which on it may be something else, and the map must be where the
+/// target is expected.
 const ASIDE: f64 = 0.5;
 /// What an affine map may leave of the area that is not explained, share.
 const BETTER: f64 = 0.8;

@@ -1,8 +1,9 @@
 //! A target that has long been covered, wherever it went: nothing covers it, it has another size.
 //!
-//! The size of a covered target is held, for what is seen of it says little of the rest. If the size was wrong when that began, or changes meanwhile, less and less of the target is where it is
-//! thought to be, and that looks like cover again: the two keep each other up. What really covers a target lets a part of its outline be seen; a target of another size fits all around,
-//! and leaves nothing of itself beside it.
+//! The size of a covered target is held, for what is seen of it says little of the rest. If the size was
+//! wrong when that began, or changes meanwhile, less and less of the target is where it is thought to be, and
+//! that looks like cover again: the two keep each other up. What really covers a target lets a part of its
+//! outline be seen; a target of another size fits all around, and leaves nothing of itself beside it.
 
 use super::Layered;
 use super::align::{Aligned, Silence};
@@ -17,7 +18,8 @@ use crate::types::{Frame, TargetBox};
 
 /// Frames in a row after which cover is doubted.
 const LONG: usize = 8;
-/// Part of the target's area that may look like it beside it, or be left out of what the size held would explain: of a target that is really covered there is more.
+/// Part of the target's area that may look like it beside it, or be left out of what the size held would
+/// explain: of a target that is really covered there is more.
 const FRINGE: f64 = 0.15;
 /// Sizes that are tried, over the one that is held, in this order.
 const SIZES: [f64; 5] = [0.9, 1.1, 0.8, 1.25, 1.0];
@@ -31,7 +33,8 @@ const UNSEEN: f64 = 6.0;
 pub(super) const RESIZED: &str = "what seemed to cover the target was a change of its size";
 
 impl Layered {
-    /// The target at another size than the one held, where it is seen well and explains the picture better than cover does. One size at a time, in turn, which bounds the time of a covered frame.
+    /// The target at another size than the one held, where it is seen well and explains the picture better
+    /// than cover does. One size at a time, in turn, which bounds the time of a covered frame.
     pub(super) fn resized(&self, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
         if self.covered < LONG || !(self.covered - LONG).is_multiple_of(EVERY) {
             return None;
@@ -49,7 +52,8 @@ impl Layered {
         taken.then_some(Finding { reason: RESIZED, ..found })
     }
 
-    /// What target and background together leave unexplained of a part of the picture, large differences counting alike; grey levels. Of a covered target any part may be hidden.
+    /// What target and background together leave unexplained of a part of the picture, large differences
+    /// counting alike; grey levels. Of a covered target any part may be hidden.
     fn unexplained(&self, frame: &Frame<f64>, found: &Finding, around: &TargetBox) -> f64 {
         let Aligned { pose, gain, .. } = found.aligned;
         let [[a, b], [c, d]] = pose.a;
@@ -79,8 +83,9 @@ impl Layered {
         sum / f64::max(count, 1.0)
     }
 
-    /// Area inside the outline that is held in which the target is seen, and which another size leaves out, over the area of the target at that size. Between the bars of a fence a small
-    /// target fits as well as a part of a large one, but there is more of that between the next bars.
+    /// Area inside the outline that is held in which the target is seen, and which another size leaves out,
+    /// over the area of the target at that size. Between the bars of a fence a small target fits as well as a
+    /// part of a large one, but there is more of that between the next bars.
     fn left_over(&self, frame: &Frame<f64>, held: &Finding, resized: &Finding) -> f64 {
         let Aligned { pose, gain, .. } = held.aligned;
         let other = resized.aligned.pose;

@@ -1,7 +1,9 @@
 //! A faint target at rest: where the picture is as it was, the target is where it was.
 //!
-//! Of a target that differs little from what is behind it every frame tells the place only roughly, and errors add up where template and background are learnt at a place that is a little wrong.
-//! Whether anything changed at all is told much better. What a slow target changes adds up as well, for pictures are compared with the last one in which it moved.
+//! Of a target that differs little from what is behind it every frame tells the place only roughly, and
+//! errors add up where template and background are learnt at a place that is a little wrong. Whether anything
+//! changed at all is told much better. What a slow target changes adds up as well, for pictures are compared
+//! with the last one in which it moved.
 
 use super::Layered;
 use super::align::Aligned;
@@ -28,7 +30,8 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// Whether the picture there is what it was, but for noise: the mean square of n independent differences scatters by the root of 2 / n of itself.
+    /// Whether the picture there is what it was, but for noise: the mean square of n independent differences
+    /// scatters by the root of 2 / n of itself.
     fn lasts(&self, frame: &Frame<f64>, noise: f64) -> bool {
         let now = Patch::cut(frame, self.cut).frame;
         let changes = now.data().iter().zip(self.was.data()).map(|(now, was)| (now - was).powi(2));
@@ -45,7 +48,8 @@ impl Layered {
         Rest { pose: self.pose, cut, was: Patch::cut(frame, cut).frame }
     }
 
-    /// What was found, or the target where it was, if that is faint and nothing there changed since it was last seen.
+    /// What was found, or the target where it was, if that is faint and nothing there changed since it was
+    /// last seen.
     pub(super) fn unless_at_rest(&self, found: Finding, frame: &Frame<f64>) -> (Finding, bool) {
         let rest = self.resting.as_ref().filter(|rest| self.missed == 0 && rest.lasts(frame, self.noise));
         let Some(Rest { pose, .. }) = rest else { return (found, false) };

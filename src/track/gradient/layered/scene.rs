@@ -1,4 +1,5 @@
-//! What a frame says of the still scene before the target is looked for: light, motion of the camera, and whether it is of that scene at all.
+//! What a frame says of the still scene before the target is looked for: light, motion of the camera, and
+//! whether it is of that scene at all.
 
 use super::camera::{self, AROUND, SCATTER_SAMPLES, Seen, spread};
 use super::find::{DOUBT, Finding};
@@ -9,7 +10,8 @@ use crate::track::gradient::local_flow::{MAD, median};
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
-/// Scatter of what changes in the still scene beyond which a frame is wild: so many times the noise, and grey levels.
+/// Scatter of what changes in the still scene beyond which a frame is wild: so many times the noise, and grey
+/// levels.
 const OUTLYING: (f64, f64) = (6.0, 8.0);
 /// Frames in a row that are passed over for that.
 const WILD_FOR: usize = 10;
@@ -18,8 +20,10 @@ const WILD_FOR: usize = 10;
 const GONE: f64 = 0.25;
 
 impl Layered {
-    /// Whether nothing of the scene is left in a frame before anything was measured: black, or another even picture. What noise there is, is learnt from the first pair, and would be all that
-    /// such a frame differs by, so that anything would look like the target. Even frames say nothing however many there are.
+    /// Whether nothing of the scene is left in a frame before anything was measured: black, or another even
+    /// picture. What noise there is, is learnt from the first pair, and would be all that such a frame
+    /// differs by, so that anything would look like the target. Even frames say nothing however many there
+    /// are.
     pub(super) fn is_blank(&self, frame: &Frame<f64>) -> bool {
         if self.age > 0 {
             return false;
@@ -42,8 +46,9 @@ impl Layered {
         }
     }
 
-    /// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt from it, and the next one is compared with the last that was not so; unless there
-    /// are so many of them that this is how the scene looks now.
+    /// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt
+    /// from it, and the next one is compared with the last that was not so; unless there are so many of them
+    /// that this is how the scene looks now.
     pub(super) fn is_wild(&mut self, frame: &Frame<f64>, bounds: TargetBox, motion: [f64; 2]) -> bool {
         if self.age == 0 {
             return false;
@@ -81,7 +86,8 @@ impl Layered {
         self.shift(motion);
     }
 
-    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the camera follows the target: where one of the two is doubtful, the other is tried.
+    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the
+    /// camera follows the target: where one of the two is doubtful, the other is tried.
     pub(super) fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
         let against = motion.map(|m| -m);
         if motion != [0.0; 2] && self.with_camera {

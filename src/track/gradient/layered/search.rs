@@ -14,8 +14,9 @@ const LEAST_SHARE: f64 = 0.4;
 /// Most points that are compared at each place.
 const POINTS: usize = 400;
 
-/// The pose within `reach` px whose picture is most like the target and least like the background:
-/// least `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are given up as soon as they cannot be the best.
+/// The pose within `reach` px whose picture is most like the target and least like the background: least
+/// `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are given up as soon as they cannot be
+/// the best.
 pub(super) fn search(
     frame: &Frame<f64>,
     target: &Target,
@@ -49,7 +50,8 @@ pub(super) fn search(
     best.map(|(_, pose)| pose)
 }
 
-/// The figure that is least at the target; `None` where too little of it would be in the picture, or where it cannot be less than `least`.
+/// The figure that is least at the target; `None` where too little of it would be in the picture, or where it
+/// cannot be less than `least`.
 fn cost(
     frame: &Frame<f64>,
     background: &Background,

@@ -9,7 +9,8 @@ use std::collections::BinaryHeap;
 
 /// Change over what noise makes that is beyond doubt.
 const CLEAR: f64 = 2.0;
-/// Pairs of pixels on either side of the still edge, over the shorter side of the box times the displacement but for a pixel.
+/// Pairs of pixels on either side of the still edge, over the shorter side of the box times the displacement
+/// but for a pixel.
 const EDGE: f64 = 0.4;
 /// Fewest of them.
 const FEWEST: usize = 12;
@@ -21,7 +22,8 @@ const WIDTH: (f64, f64) = (0.25, 2.0);
 const ALIKE: (f64, f64) = (3.0, 6.0);
 /// Share of the box that may be hidden.
 const HIDDEN: [f64; 2] = [0.05, 0.9];
-/// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half a side apart, those of a target that changes its shape are near each other.
+/// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half
+/// a side apart, those of a target that changes its shape are near each other.
 const APART: f64 = 0.3;
 /// Share of either part that may not do as it should.
 const STRAY: f64 = 0.02;
@@ -32,8 +34,10 @@ const FAR: f64 = 1e6;
 
 /// Pixels of the box that something still hides the target at; `None` without evidence for such a thing.
 ///
-/// Wherever the target slides along a still edge, what was there in the first frame is neither followed by it nor changed. What is on the target's side of that edge looks like what is known to move, on the
-/// other side it does not. A margin that is behind the target differs: there the target leaves what does not look like it.
+/// Wherever the target slides along a still edge, what was there in the first frame is neither followed by it
+/// nor changed. What is on the target's side of that edge looks like what is known to move, on the other side
+/// it does not. A margin that is behind the target differs: there the target leaves what does not look like
+/// it.
 pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let evidence = Evidence::of(changes, moved);
     let look = TargetLook::of(changes, &evidence.moving)?;
@@ -57,7 +61,8 @@ pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<b
     (cut && is_so(changes, &hidden, moved)).then_some(hidden)
 }
 
-/// Whether the two parts do as they should: what hides the target is as it was, and the target is as it was, moved along, but where it is hidden now.
+/// Whether the two parts do as they should: what hides the target is as it was, and the target is as it was,
+/// moved along, but where it is hidden now.
 fn is_so(changes: &Changes<'_>, hidden: &Frame<bool>, moved: [isize; 2]) -> bool {
     let (mut strays, mut counts) = ([0.0; 2], [0.0; 2]);
     let clear = CLEAR * changes.bar;
@@ -100,7 +105,8 @@ impl Parts {
 struct Evidence {
     /// Pixels of the first box that were followed by the displacement, and not by rest.
     moving: Vec<[usize; 2]>,
-    /// Pixels of it with those that they would be at now, where the displacement does not hold and nothing changed at the first or at the second.
+    /// Pixels of it with those that they would be at now, where the displacement does not hold and nothing
+    /// changed at the first or at the second.
     edge: Vec<([usize; 2], [usize; 2])>,
 }
 
@@ -122,7 +128,8 @@ impl Evidence {
     }
 }
 
-/// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel, and targets turn and grow.
+/// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel,
+/// and targets turn and grow.
 fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
     let first = &changes.outset.first.frame;
     let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
@@ -186,7 +193,8 @@ fn behind(changes: &Changes<'_>) -> f64 {
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
-/// Every pixel of the box belongs to the nearer of what moves and of what is still, by ways that avoid steps of brightness.
+/// Every pixel of the box belongs to the nearer of what moves and of what is still, by ways that avoid steps
+/// of brightness.
 fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) -> Frame<bool> {
     let first = &changes.outset.first.frame;
     let (width, height) = first.size();

@@ -13,7 +13,8 @@ pub(super) struct Slanted {
 }
 
 impl Slanted {
-    /// About a place of the picture; the sides in px of the target, with a margin all around: a share of the side, and px of the picture.
+    /// About a place of the picture; the sides in px of the target, with a margin all around: a share of the
+    /// side, and px of the picture.
     pub fn about(middle: [f64; 2], pose: &Pose, sides: [f64; 2], (share, more): (f64, f64)) -> Self {
         let [[a, b], [c, d]] = pose.a;
         let determinant = a * d - b * c;

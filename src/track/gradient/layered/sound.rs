@@ -1,7 +1,9 @@
-//! A target that vanishes soon after it was seen less or became smaller: something had begun to cover it, and what was measured meanwhile was the rest of it.
+//! A target that vanishes soon after it was seen less or became smaller: something had begun to cover it, and
+//! what was measured meanwhile was the rest of it.
 //!
-//! The edge of what covers a target stands for the target's own; a similarity that follows it shrinks and stays behind, and a filter that believed it leads the search away from where the target comes out
-//! again. The last state before that is therefore kept, and what vanishes goes on from there.
+//! The edge of what covers a target stands for the target's own; a similarity that follows it shrinks and
+//! stays behind, and a filter that believed it leads the search away from where the target comes out again.
+//! The last state before that is therefore kept, and what vanishes goes on from there.
 
 use super::Layered;
 use super::find::{DROP, Finding};
@@ -28,7 +30,8 @@ pub(super) struct Sound {
 }
 
 impl Layered {
-    /// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank by what cover makes of it.
+    /// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank by what cover
+    /// makes of it.
     pub(super) fn remember(&mut self, found: &Finding, smaller: bool) {
         let whole = !found.occluded && !smaller && found.look.visibility >= self.usual - DROP;
         if whole {
@@ -45,7 +48,8 @@ impl Layered {
         }
     }
 
-    /// At the first frame in which the target is not seen any more: goes on from before it began to vanish, where that was not noticed. What leaves the picture is not covered: what was measured of it is right.
+    /// At the first frame in which the target is not seen any more: goes on from before it began to vanish,
+    /// where that was not noticed. What leaves the picture is not covered: what was measured of it is right.
     pub(super) fn recall(&mut self) {
         let TargetBox { x, y, width, height } = self.reached(&self.pose);
         let (columns, rows) = self.previous.frame.size();

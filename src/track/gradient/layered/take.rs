@@ -12,13 +12,15 @@ use crate::types::Frame;
 const JUMPED: f64 = 100.0;
 /// Frames after a look-alike touched for which it is reckoned with.
 const WARY: usize = 8;
-/// Least information about the rotation, of all there could be, from which on it is told; else the angle is held. Round targets are known by their outline: this bounds what errors of that may turn.
+/// Least information about the rotation, of all there could be, from which on it is told; else the angle is
+/// held. Round targets are known by their outline: this bounds what errors of that may turn.
 const TOLD: f64 = 0.75;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Frames after an interruption in which what is not seen of the target may be hidden still.
 const RETURNING: usize = 3;
-/// How far a target must have gone while it is young, over its shorter side, for what its box holds besides to have stayed behind; slower ones wait for that in vain.
+/// How far a target must have gone while it is young, over its shorter side, for what its box holds besides
+/// to have stayed behind; slower ones wait for that in vain.
 const FAR: f64 = 0.4;
 /// Rate of the filtered change of size and angle.
 const RATE: f64 = 0.3;

@@ -8,7 +8,8 @@ use crate::types::{TargetBox, TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.
 const LOST_AFTER: usize = 15;
-/// Around the box, the scene may be hidden: share of its sides, and px. Limbs and what else is not in the support must not be learnt as background, for the target would look like that a moment later.
+/// Around the box, the scene may be hidden: share of its sides, and px. Limbs and what else is not in the
+/// support must not be learnt as background, for the target would look like that a moment later.
 const HIDES: (f64, f64) = (0.1, 4.0);
 
 impl Layered {
@@ -79,7 +80,8 @@ impl Layered {
     /// What the filter says, and the box there.
     fn tell_motion(&self, state: &mut TrackState) {
         let (speed, motion) = (self.filter.speed(), state.camera_motion);
-        // The filter's velocity is relative to the scene, or to the picture for a target that the camera follows.
+        // The filter's velocity is relative to the scene, or to the picture for a target that the camera
+        // follows.
         (state.velocity, state.scene_velocity) = if self.with_camera {
             (speed, [0, 1].map(|k| speed[k] - motion[k]))
         } else {

@@ -1,4 +1,5 @@
-//! Beginning anew where something still hid part of the target in the first frame: that part is the target's all the same, but is not known yet, and what hides it is known.
+//! Beginning anew where something still hid part of the target in the first frame: that part is the target's
+//! all the same, but is not known yet, and what hides it is known.
 
 use super::find::{ADAPTED, YOUNG};
 use super::front::Front;
@@ -38,7 +39,8 @@ impl Layered {
         }
     }
 
-    /// The box of what moves, unless the target turned, which changes the outline as well. Its size says nothing: a box beside the target makes that seem to change.
+    /// The box of what moves, unless the target turned, which changes the outline as well. Its size says
+    /// nothing: a box beside the target makes that seem to change.
     fn refitted(&self, outset: &Outset, frame: &Frame<f64>) -> Option<MovingTarget> {
         if self.turned.abs() < TURNED { outset.refitted(frame, self.noise) } else { None }
     }
@@ -83,7 +85,8 @@ impl Layered {
         (self.resting, self.sound, self.adapts_until) = (None, None, ADAPTED);
     }
 
-    /// As long as the first box is not told from what it held besides, what is said of the way since then may be wrong by as much as the displacement of all that moved differs from it.
+    /// As long as the first box is not told from what it held besides, what is said of the way since then may
+    /// be wrong by as much as the displacement of all that moved differs from it.
     pub(super) fn look_at_the_whole_way(&mut self) {
         let told = self.outset.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
         let Some((moved, first)) = told else { return self.doubt = [0.0; 2] };

@@ -151,7 +151,8 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     for _ in 0..2 {
         all.carry(2, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
-    // Where it is a little more, it is a part still; where it is far more, and the whole is expected there, it is that.
+    // Where it is a little more, it is a part still; where it is far more, and the whole is expected there,
+    // it is that.
     for (pixels, place, id) in [(17, 22.0, 2), (90, 22.0, 0), (90, 32.0, 2)] {
         let mut all = all.clone();
         all.name_all(Moment::at(6), &[part([place, 10.0, 30.0], pixels)], 1.0, Some(&limits));
@@ -266,7 +267,8 @@ fn what_is_covered_little_by_little_comes_to_light_on_the_other_side_as_itself()
     let moved = |all: &mut Identities, component| {
         all.carry(component, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits))
     };
-    // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole being at 20.
+    // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole
+    // being at 20.
     for (time, x, pixels) in [(1, 12.0, 100), (2, 13.5, 85), (3, 14.0, 70), (4, 13.5, 35)] {
         moved(&mut all, 0);
         all.name_all(Moment::at(time), &[Sighting { pixels, ..at(0, [x, 10.0, 30.0]) }], LEAST, Some(&limits));

@@ -60,7 +60,8 @@ impl<'a> Task<'a> {
         Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
     }
 
-    /// A step of the map's first `N` unknowns, two for a translation and six for an affine map, from residuals of some deviation; its length, px.
+    /// A step of the map's first `N` unknowns, two for a translation and six for an affine map, from
+    /// residuals of some deviation; its length, px.
     pub(super) fn step<const N: usize>(
         &self,
         voters: &[Voter],
@@ -122,7 +123,8 @@ impl<'a> Task<'a> {
         map.iter().all(|value| value.is_finite()).then(|| truncated_mean(&residuals))
     }
 
-    /// Pixels that vote at a level, evenly drawn, those beside the border or anything that is not finite left out.
+    /// Pixels that vote at a level, evenly drawn, those beside the border or anything that is not finite left
+    /// out.
     pub(super) fn voters(&self, level: usize) -> Vec<Voter> {
         let frame = &self.before.0[level];
         let (width, height) = frame.size();
@@ -144,7 +146,8 @@ impl<'a> Task<'a> {
         voters
     }
 
-    /// Brightness after the motion less that before, NaN outside; the deviation, robustly. `None` unless at least half of the pixels are inside.
+    /// Brightness after the motion less that before, NaN outside; the deviation, robustly. `None` unless at
+    /// least half of the pixels are inside.
     pub(super) fn residuals(
         &self,
         voters: &[Voter],

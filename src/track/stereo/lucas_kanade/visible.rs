@@ -1,9 +1,11 @@
-//! Motion of what is still visible of a cluster: where more than half of it is being covered, a deviation taken from its own residuals makes all of it look sound.
+//! Motion of what is still visible of a cluster: where more than half of it is being covered, a deviation
+//! taken from its own residuals makes all of it look sound.
 
 use super::task::{Task, Voter};
 use super::{AFFINE_PIXELS, FINE, FINE_STEPS, PlaneMotion, SETTLED, SmoothedLevels};
 
-/// Deviations over the noise, one after another: from what lets an expectation be a pixel wrong to what is left at the end.
+/// Deviations over the noise, one after another: from what lets an expectation be a pixel wrong to what is
+/// left at the end.
 const NARROWING: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Steps with a translation at each.
 const STEPS_EACH: usize = 2;
@@ -12,8 +14,10 @@ const AGREEING: f64 = 3.0;
 /// Least share of a cluster's pixels that agree with its motion; some do with any.
 const LEAST_AGREEING: f64 = 0.15;
 
-/// Of a motion that was found and those found from what is `expected` of the translation (px), the one with which most of the pixels agree, that is, leave no more than
-/// the noise explains. `noise` is the deviation of what the picture's motions leave in general, grey levels. `None` where hardly more pixels agree than do by chance.
+/// Of a motion that was found and those found from what is `expected` of the translation (px), the one with
+/// which most of the pixels agree, that is, leave no more than the noise explains. `noise` is the deviation
+/// of what the picture's motions leave in general, grey levels. `None` where hardly more pixels agree than do
+/// by chance.
 pub(in super::super) fn visible_motion(
     before: &SmoothedLevels,
     after: &SmoothedLevels,
@@ -42,7 +46,8 @@ impl Task<'_> {
         [u, v, u_x, v_x, u_y, v_y]
     }
 
-    /// From a translation, at the finest level, with deviations that end at the noise: what differs by more counts the less the better the motion is known.
+    /// From a translation, at the finest level, with deviations that end at the noise: what differs by more
+    /// counts the less the better the motion is known.
     fn narrowed(&self, voters: &[Voter], start: &[f64; 2], noise: f64) -> Option<[f64; 6]> {
         let after = &self.after.0[FINE];
         let mut map = [start[0], start[1], 0.0, 0.0, 0.0, 0.0];

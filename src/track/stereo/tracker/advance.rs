@@ -96,7 +96,8 @@ impl StereoTracker {
         };
         let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
-        // Of what is being hidden little meets its moved self, but what is left of it lies there; of what comes to light it is the other way round.
+        // Of what is being hidden little meets its moved self, but what is left of it lies there; of what
+        // comes to light it is the other way round.
         let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
         let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
         // Who began as a seed where it was going to be anyway goes on.

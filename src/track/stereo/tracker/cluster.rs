@@ -62,7 +62,10 @@ impl StereoTracker {
             let fitted = without(&start, &strays)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
-        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one; components that explain little are better used there. What was seeded so may turn out to be a piece of something once it is fitted, and then nothing is seeded in its stead: it would be that piece again.
+        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one;
+        // components that explain little are better used there. What was seeded so may turn out to be a piece
+        // of something once it is fitted, and then nothing is seeded in its stead: it would be that piece
+        // again.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
         let mut left_out = vec![];
         for seeding in [true, false] {

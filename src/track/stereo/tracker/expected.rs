@@ -11,8 +11,10 @@ use super::StereoTracker;
 use crate::mixture::Points;
 
 impl StereoTracker {
-    /// What the motion of each component over the gap may be: its last one, or that of the component which explains it best after itself. A cluster that has just been seeded has few pixels, often along one edge,
-    /// which agree with many motions; what it probably belongs to is the better guess than a template of a few cells.
+    /// What the motion of each component over the gap may be: its last one, or that of the component which
+    /// explains it best after itself. A cluster that has just been seeded has few pixels, often along one
+    /// edge, which agree with many motions; what it probably belongs to is the better guess than a template
+    /// of a few cells.
     fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Guess> {
         let gap = self.moment.gap;
         let known: Vec<(usize, [f64; 3])> = (0..components)
@@ -29,7 +31,8 @@ impl StereoTracker {
             .collect()
     }
 
-    /// The motion of that component, of those whose motion is known, which explains the middle of component `k` best after itself.
+    /// The motion of that component, of those whose motion is known, which explains the middle of component
+    /// `k` best after itself.
     fn beside(&self, k: usize, known: &[(usize, [f64; 3])]) -> Option<[f64; 3]> {
         let posterior = self.posterior.as_ref()?;
         let others: Vec<(usize, [f64; 3])> = known.iter().copied().filter(|(other, _)| *other != k).collect();
@@ -45,7 +48,8 @@ impl StereoTracker {
         Some(others[nearest as usize].1)
     }
 
-    /// How each cluster of the last step moves for its overlaps: as measured, and where nothing could be, as it did last or not at all, whichever leads to more of its own component. That it could not be measured
+    /// How each cluster of the last step moves for its overlaps: as measured, and where nothing could be, as
+    /// it did last or not at all, whichever leads to more of its own component. That it could not be measured
     /// does not say that it is gone.
     pub(super) fn moves(
         &self,
@@ -81,7 +85,8 @@ impl StereoTracker {
         })
     }
 
-    /// Every cluster stays where it is. What is known of its way is kept: after a frame that was repeated it goes on as before.
+    /// Every cluster stays where it is. What is known of its way is kept: after a frame that was repeated it
+    /// goes on as before.
     pub(super) fn stay(&self) -> Vec<Option<(FineMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
         let still = |k: usize| {

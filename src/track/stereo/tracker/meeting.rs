@@ -13,7 +13,8 @@ use super::cluster::Clustered;
 type Overlaps = (Vec<Row>, Vec<Row>);
 
 impl StereoTracker {
-    /// What clustering gave, its components called after those that they continue, which of them began as seeds (who took over what was there before is no newcomer), and the overlaps of both steps.
+    /// What clustering gave, its components called after those that they continue, which of them began as
+    /// seeds (who took over what was there before is no newcomer), and the overlaps of both steps.
     pub(super) fn succeeding(
         &self,
         before: &Clusters,
@@ -37,7 +38,8 @@ impl StereoTracker {
     }
 }
 
-/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where that leads back to nothing of its own, that of the cluster which covers it most.
+/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where that
+/// leads back to nothing of its own, that of the cluster which covers it most.
 fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]) -> Overlaps {
     let nobody = vec![0.0; before.components()];
     let forward: Vec<Row> = (0..before.components())

@@ -33,7 +33,8 @@ impl Arrival {
     pub const UNKNOWN: Self = Self { motion: None, affine: None, residual: None, coasting: false };
 }
 impl StereoTracker {
-    /// Tracks of the paper's mode: a cluster goes on the track of another if each is the other's strongest arc, and that is strong enough.
+    /// Tracks of the paper's mode: a cluster goes on the track of another if each is the other's strongest
+    /// arc, and that is strong enough.
     pub(super) fn name_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
         let components = clusters.components();
         let before = std::mem::take(&mut self.identities.live);
@@ -66,7 +67,8 @@ impl StereoTracker {
         self.identities.name_all(self.moment, &seen, self.options.reseed_below, limits);
     }
 
-    /// Puts the clusters into the graph and the tracks, and tells of them: how each came and where the middle of its pixels is, px.
+    /// Puts the clusters into the graph and the tracks, and tells of them: how each came and where the middle
+    /// of its pixels is, px.
     pub(super) fn record(
         &mut self,
         clusters: &Clusters,
@@ -148,7 +150,8 @@ impl StereoTracker {
         (Some(camera.depth(mean[2])).filter(|depth| depth.is_finite()), speed.filter(finite))
     }
 
-    /// Puts arcs between the last step and this one into the graph, and tells the last one's clusters where they went.
+    /// Puts arcs between the last step and this one into the graph, and tells the last one's clusters where
+    /// they went.
     pub(super) fn connect(&mut self, departures: &[Option<Departure>], arcs: Vec<Arc>) -> Result<()> {
         if let Some(before) = self.time.checked_sub(1) {
             for (k, &departure) in departures.iter().enumerate() {
@@ -173,7 +176,8 @@ fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], [f64; 3])) 
     pixels.map(sighting).collect()
 }
 
-/// Medians of a cluster's pixels along x, y and in depth, and of how far they are from these, cells and layers.
+/// Medians of a cluster's pixels along x, y and in depth, and of how far they are from these, cells and
+/// layers.
 fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     let places: Vec<[f64; 3]> =
         clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
@@ -183,13 +187,15 @@ fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     (middle, std::array::from_fn(off))
 }
 
-/// Mean of a component along x and y, px, and the median disparity of its pixels: the mean of what was counted in whole layers is off by up to half of one, all pixels of a flat thing alike.
+/// Mean of a component along x and y, px, and the median disparity of its pixels: the mean of what was
+/// counted in whole layers is off by up to half of one, all pixels of a flat thing alike.
 fn mean(clusters: &Clusters, posterior: &Posterior, k: usize) -> [f64; 3] {
     let [x, y, d] = clusters.lattice().pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
     [x, y, clusters.disparity(k).unwrap_or(d)]
 }
 
-/// Covariance `W_k^-1 / nu_k` of a component in px and disparity, and what counting in cells hides: that of places spread evenly over a cell.
+/// Covariance `W_k^-1 / nu_k` of a component in px and disparity, and what counting in cells hides: that of
+/// places spread evenly over a cell.
 fn covariance(posterior: &Posterior, k: usize, cell: [f64; 3]) -> [[f64; 3]; 3] {
     let matrix = &posterior.scale_inverses[9 * k..9 * k + 9];
     let nu = posterior.degrees_of_freedom[k];

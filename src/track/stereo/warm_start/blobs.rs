@@ -10,7 +10,8 @@ use std::borrow::Borrow;
 /// Voxels no farther apart, along x, y and disparity, are of one blob.
 const SEED_REACH: [i32; D] = [2, 2, 1];
 
-/// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean logarithm of the density, with their shares.
+/// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean
+/// logarithm of the density, with their shares.
 pub(super) fn gain_of_parting<B: Borrow<Blob>>(parts: &[B]) -> f64 {
     if parts.len() < 2 {
         return 0.0;
@@ -25,7 +26,8 @@ pub(super) fn gain_of_parting<B: Borrow<Blob>>(parts: &[B]) -> f64 {
     apart / whole.pixels - log_density(1.0, &whole.covariance())
 }
 
-/// Logarithm of the density at one standard deviation along every axis of a component with a share of the pixels.
+/// Logarithm of the density at one standard deviation along every axis of a component with a share of the
+/// pixels.
 pub(super) fn log_density(share: f64, covariance: &Matrix3<f64>) -> f64 {
     share.ln() - 0.5 * (D as f64 + (std::f64::consts::TAU.powi(D as i32) * covariance.determinant()).ln())
 }
@@ -83,7 +85,8 @@ impl Blob {
         })
     }
 
-    /// Whether its density at one standard deviation is one that explains, among `all` pixels: wrong matches are spread too thinly.
+    /// Whether its density at one standard deviation is one that explains, among `all` pixels: wrong matches
+    /// are spread too thinly.
     pub fn explains_itself(&self, all: f64, explained: f64) -> bool {
         log_density(self.pixels / all, &self.covariance()) >= explained
     }

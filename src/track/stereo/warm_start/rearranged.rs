@@ -7,15 +7,19 @@ use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use std::collections::BTreeSet;
 
-/// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better components.
+/// Least gain of a component's pixels in logarithm of the density, each, for which its parts are better
+/// components.
 const WORTH_PARTING: f64 = 1.0;
-/// Most that each pixel of the smaller of two components that touch may lose, logarithm of the density, for them to be pieces of one surface: of what is spread evenly, pieces are no better than the whole.
+/// Most that each pixel of the smaller of two components that touch may lose, logarithm of the density, for
+/// them to be pieces of one surface: of what is spread evenly, pieces are no better than the whole.
 const PIECES: f64 = 0.1;
 
-/// Makes one component of the pieces of a surface, and several of one that holds small things far from one another: rounds find out of neither. The things that gain most come first. Tells whether there was anything to do;
-/// where components are not to be seeded anew (`reseed_below` 0), there is not.
+/// Makes one component of the pieces of a surface, and several of one that holds small things far from one
+/// another: rounds find out of neither. The things that gain most come first. Tells whether there was
+/// anything to do; where components are not to be seeded anew (`reseed_below` 0), there is not.
 ///
-/// Left as they are, two pieces may become one at some later step, with either's name; and they leave no component for what is small, or comes to light.
+/// Left as they are, two pieces may become one at some later step, with either's name; and they leave no
+/// component for what is small, or comes to light.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -115,7 +119,8 @@ impl Pool {
         self.changed.insert(k);
     }
 
-    /// Gives the parts of component `k` one each, the largest its own, as far as there are components to be had for less than is gained; what gets none stays with the largest.
+    /// Gives the parts of component `k` one each, the largest its own, as far as there are components to be
+    /// had for less than is gained; what gets none stays with the largest.
     fn part(&mut self, k: usize, Parts { blobs, gain }: Parts) {
         let mut left = gain * blobs.iter().map(|part| part.pixels).sum::<f64>();
         let mut blobs = blobs.into_iter();
@@ -156,7 +161,8 @@ impl Pool {
         pieces.is_some()
     }
 
-    /// The two, of those that may be, whose pixels lose the least as one, in units of `unit`, and how much, logarithm of the density.
+    /// The two, of those that may be, whose pixels lose the least as one, in units of `unit`, and how much,
+    /// logarithm of the density.
     fn cheapest(
         &self,
         may: impl Fn(usize, usize) -> bool,

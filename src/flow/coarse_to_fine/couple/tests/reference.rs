@@ -105,7 +105,8 @@ pub(super) fn energy<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Coup
     sum
 }
 
-/// Random texture under a window of a few pixels whose motion is `truth` at each site; nothing where `truth` says nothing.
+/// Random texture under a window of a few pixels whose motion is `truth` at each site; nothing where `truth`
+/// says nothing.
 pub(super) fn made<T: SimdReal>(
     width: usize,
     height: usize,

@@ -92,7 +92,8 @@ impl Case {
             let mut sum = 0.0;
             for sy in &rows {
                 for sx in &columns {
-                    // Motion of constant bend lies midway between what the models of two sites say and the mean of their values: slopes count half.
+                    // Motion of constant bend lies midway between what the models of two sites say and the
+                    // mean of their values: slopes count half.
                     let lever = |p: usize, site: usize, n: usize| (p as f64 - 2.0 * site as f64) / n as f64;
                     let (dx, dy) = (lever(x, *sx, columns.len()), lever(y, *sy, rows.len()));
                     let at = |k: usize| self.motion[k][sy * sw + sx];

@@ -28,7 +28,8 @@ fn beyond(z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> f64 {
     }
 }
 
-/// Weighted least squares by a value and two slopes (per px) in a Gaussian window about (x, y), and the misfit's variance.
+/// Weighted least squares by a value and two slopes (per px) in a Gaussian window about (x, y), and the
+/// misfit's variance.
 fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize) -> [f64; 4] {
     let radius = (3.0 * sigma + 0.5) as isize;
     let (mut sum, mut mean, mut square, mut along, mut across, mut spread) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -91,7 +92,8 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
                 for (got, want) in got.iter().zip(filtered(&scale.first.taps, &z, x as isize, y as isize)) {
                     assert!((got - want).abs() < 1e-12, "{} {x} {y}", scale.sigma);
                 }
-                // As good as a least-squares fit in the same window: slopes differ by how the Gaussian is cut off.
+                // As good as a least-squares fit in the same window: slopes differ by how the Gaussian is cut
+                // off.
                 let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
                 assert!((got[0] - want[0]).abs() < 1e-12);
                 assert!((got[1] - want[1]).abs() < 0.01 && (got[2] - want[2]).abs() < 0.01, "{got:?} {want:?}");
