@@ -1,9 +1,15 @@
-//! The one direction of imports: a module imports only from lower levels, never from a sibling.
+//! The one direction of imports: a module imports only from lower levels, never from a sibling, and the files
+//! of a room form no circles.
 //!
-//! Reads every `crate::` path in `src/`; the table is that of `ARCHITECTURE.md`.
+//! Reads every path of a `use` or of an expression in `src/` and `benchmarks/`; the table of levels is that
+//! of `ARCHITECTURE.md`. A parent module and its children may name each other.
 
+mod source;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+
+use source::{files, name_of, root};
 
 /// Folder (or file) under `src/` and its level.
 const LEVELS: &[(&str, u8)] = &[
@@ -37,55 +43,7 @@ fn level(room: &str) -> Option<u8> {
     LEVELS.iter().find(|(name, _)| *name == room).map(|(_, level)| *level)
 }
 
-fn rust_files(folder: &Path, into: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            rust_files(&path, into);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            into.push(path);
-        }
-    }
-}
-
-/// The rooms named by `crate::room` or inside `crate::{...}` in a source text, comments left out.
-fn imported_rooms(text: &str) -> Vec<String> {
-    let code: String = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
-    let mut rooms = Vec::new();
-    for (at, _) in code.match_indices("crate::") {
-        let rest = &code[at + "crate::".len()..];
-        if let Some(group) = rest.strip_prefix('{') {
-            let mut depth = 1;
-            let mut word = String::new();
-            let mut path_head = true;
-            for c in group.chars() {
-                match c {
-                    '{' => depth += 1,
-                    '}' => depth -= 1,
-                    ',' if depth == 1 => path_head = true,
-                    _ => {}
-                }
-                if c.is_alphanumeric() || c == '_' {
-                    word.push(c);
-                } else {
-                    if !word.is_empty() && path_head {
-                        rooms.push(word.clone());
-                        path_head = c == ',';
-                    }
-                    word.clear();
-                }
-                if depth == 0 {
-                    break;
-                }
-            }
-        } else {
-            rooms.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect());
-        }
-    }
-    rooms
-}
-
-fn allowed(from: &str, to: &str) -> bool {
+fn is_allowed(from: &str, to: &str) -> bool {
     let (Some(a), Some(b)) = (level(from), level(to)) else { return true };
     if from == to || b < a {
         return true;
@@ -95,15 +53,208 @@ fn allowed(from: &str, to: &str) -> bool {
     (a == 0 && b == 0 && place(to) < place(from)) || (from == "python" && to == "cli")
 }
 
+/// Source text without comments, strings' contents kept.
+fn without_comments(text: &str) -> String {
+    text.lines().map(|line| line.split("//").next().unwrap()).collect::<Vec<_>>().join("\n")
+}
+
+/// Source text up to its unit tests.
+fn without_tests(text: &str) -> &str {
+    let test = text.find("#[cfg(test)]\nmod ").unwrap_or(text.len());
+    &text[..test]
+}
+
+/// Every path that begins with `crate`, `super` or `self`, or (after `use` or `pub use`) with any name;
+/// groups in braces are taken apart.
+fn paths(code: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    for start in ["crate::", "super::", "self::"] {
+        for (at, _) in code.match_indices(start) {
+            let before = code[..at].chars().next_back();
+            // `super::super::x` is read from its first `super`.
+            if before.is_some_and(|c| is_word(c) || c == ':') {
+                continue;
+            }
+            expand(&code[at..], &mut Vec::new(), &mut found);
+        }
+    }
+    for (at, word) in code.match_indices("use ") {
+        if code[..at].chars().next_back().is_none_or(|c| c.is_whitespace()) {
+            let rest = &code[at + word.len()..];
+            if !["crate::", "super::", "self::"].iter().any(|start| rest.starts_with(start)) {
+                expand(rest, &mut Vec::new(), &mut found);
+            }
+        }
+    }
+    found
+}
+
+/// Reads one path tree such as `a::{b, c::d}` at the beginning of `text`; returns the bytes read.
+fn expand(text: &str, prefix: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> usize {
+    let depth = prefix.len();
+    let mut at = 0;
+    loop {
+        let rest = &text[at..];
+        let word: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        at += word.len();
+        if !word.is_empty() {
+            prefix.push(word);
+        }
+        if text[at..].starts_with("::") {
+            at += 2;
+            if text[at..].starts_with('{') {
+                at += 1;
+                loop {
+                    at += text[at..].len() - text[at..].trim_start_matches([' ', '\n', ',']).len();
+                    if text[at..].starts_with('}') || at >= text.len() {
+                        at += 1;
+                        break;
+                    }
+                    let read = expand(&text[at..], prefix, found);
+                    if read == 0 {
+                        break;
+                    }
+                    at += read;
+                    // A renaming (`as name`) does not matter here.
+                    let skipped = text[at..].find([',', '}']).unwrap_or(0);
+                    at += skipped;
+                }
+                break;
+            }
+        } else {
+            found.push(prefix.clone());
+            break;
+        }
+    }
+    prefix.truncate(depth);
+    at
+}
+
+/// The modules of the crate: path (`["flow", "model"]`) and text of its file, unit tests and comments left
+/// out.
+struct Modules(BTreeMap<Vec<String>, (String, String)>);
+
+impl Modules {
+    fn read() -> Self {
+        let src = root().join("src");
+        let mut modules = BTreeMap::new();
+        for file in files(&src, "rs") {
+            let inside = file.strip_prefix(&src).unwrap().with_extension("");
+            let mut path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+            if path[0] == "lib" || path[0] == "bin" || path.iter().any(|part| part == "tests") {
+                continue;
+            }
+            if path.last().is_some_and(|last| last == "mod") {
+                path.pop();
+            }
+            let text = fs::read_to_string(&file).unwrap();
+            modules.insert(path, (name_of(&file), without_comments(without_tests(&text))));
+        }
+        Self(modules)
+    }
+
+    /// The module that a path written in module `from` leads to, through re-exports.
+    fn resolve(&self, from: &[String], path: &[String], depth: usize) -> Option<Vec<String>> {
+        let mut at: Vec<String> = from.to_vec();
+        let mut rest = path;
+        match path.first().map(String::as_str) {
+            Some("crate") => {
+                at.clear();
+                rest = &rest[1..];
+            }
+            Some("self") => rest = &rest[1..],
+            Some("super") => {
+                while rest.first().is_some_and(|part| part == "super") {
+                    at.pop();
+                    rest = &rest[1..];
+                }
+            }
+            // A child of this module, or a crate.
+            Some(first) => {
+                let child: Vec<String> = from.iter().cloned().chain([first.to_string()]).collect();
+                if !self.0.contains_key(&child) {
+                    return None;
+                }
+            }
+            None => return None,
+        }
+        while let Some(part) = rest.first() {
+            let child: Vec<String> = at.iter().cloned().chain([part.clone()]).collect();
+            if !self.0.contains_key(&child) {
+                break;
+            }
+            at = child;
+            rest = &rest[1..];
+        }
+        let item = rest.first();
+        let text = &self.0.get(&at)?.1;
+        if let Some(item) = item.filter(|_| depth < 8) {
+            // An item that this module only hands on.
+            for (position, _) in text.match_indices("pub") {
+                let statement = text[position..].split(';').next().unwrap();
+                let Some((_, used)) = statement.split_once("use ") else { continue };
+                if statement.contains(['=', '#']) {
+                    continue;
+                }
+                let mut handed = Vec::new();
+                expand(used, &mut Vec::new(), &mut handed);
+                if let Some(origin) = handed.iter().find(|h| h.last() == Some(item)) {
+                    return self.resolve(&at, origin, depth + 1).or(Some(at));
+                }
+            }
+        }
+        Some(at)
+    }
+
+    /// For each module the others of its room that it names, its parents and children left out.
+    fn edges(&self) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
+        let mut edges = BTreeMap::new();
+        for (from, (_, text)) in &self.0 {
+            let named: BTreeSet<Vec<String>> = paths(text)
+                .iter()
+                .filter_map(|path| self.resolve(from, path, 0))
+                .filter(|to| to.first() == from.first() && !to.starts_with(from) && !from.starts_with(to))
+                .collect();
+            edges.insert(from.clone(), named);
+        }
+        edges
+    }
+}
+
+/// Groups of more than one node that reach each other.
+fn circles<T: Ord + Clone>(edges: &BTreeMap<T, BTreeSet<T>>) -> Vec<Vec<T>> {
+    let reach: BTreeMap<&T, BTreeSet<&T>> = edges
+        .keys()
+        .map(|start| {
+            let (mut seen, mut open) = (BTreeSet::new(), vec![start]);
+            while let Some(node) = open.pop() {
+                for next in edges.get(node).into_iter().flatten() {
+                    if seen.insert(next) {
+                        open.push(next);
+                    }
+                }
+            }
+            (start, seen)
+        })
+        .collect();
+    let mut found: BTreeSet<Vec<T>> = BTreeSet::new();
+    for (node, reached) in &reach {
+        if reached.contains(*node) {
+            let group = reached.iter().filter(|other| reach.get(**other).is_some_and(|r| r.contains(*node)));
+            found.insert(group.map(|other| (**other).clone()).collect());
+        }
+    }
+    found.into_iter().collect()
+}
+
 #[test]
 fn imports_go_one_way() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&src, &mut files);
+    let src = root().join("src");
     let mut wrong = Vec::new();
-    for file in &files {
+    for file in files(&src, "rs") {
         let inside = file.strip_prefix(&src).unwrap();
-        let room = inside.components().next().unwrap().as_os_str().to_string_lossy().replace(".rs", "");
+        let room = inside.iter().next().unwrap().to_string_lossy().replace(".rs", "");
         if room == "lib" || room == "bin" {
             continue;
         }
@@ -111,9 +262,12 @@ fn imports_go_one_way() {
             level(&room).is_some(),
             "{room}: a room without a level; add it to the table here and in ARCHITECTURE.md"
         );
-        for to in imported_rooms(&fs::read_to_string(file).unwrap()) {
-            if !allowed(&room, &to) {
-                wrong.push(format!("{} imports {to}", inside.display()));
+        for path in paths(&without_comments(&fs::read_to_string(&file).unwrap())) {
+            if let [start, to, ..] = &path[..]
+                && start == "crate"
+                && !is_allowed(&room, to)
+            {
+                wrong.push(format!("{} imports {to}", name_of(&file)));
             }
         }
     }
@@ -121,26 +275,96 @@ fn imports_go_one_way() {
 }
 
 #[test]
+fn files_of_a_room_form_no_circles() {
+    let modules = Modules::read();
+    let edges = modules.edges();
+    let mut text = String::new();
+    for circle in circles(&edges) {
+        text += &format!("{} files:\n", circle.len());
+        for from in &circle {
+            let to: Vec<String> = edges[from].iter().filter(|to| circle.contains(to)).map(|to| to.join("/")).collect();
+            text += &format!("  {} -> {}\n", from.join("/"), to.join(", "));
+        }
+    }
+    assert!(text.is_empty(), "files that import each other in a circle:\n{text}");
+}
+
+#[test]
+fn benchmarks_form_no_circles() {
+    let folder = root().join("benchmarks");
+    let mut modules: BTreeMap<String, String> = BTreeMap::new();
+    for file in files(&folder, "py") {
+        let inside = file.strip_prefix(&folder).unwrap().with_extension("");
+        let path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        modules.insert(path.join("."), fs::read_to_string(&file).unwrap());
+    }
+    let mut edges: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (name, text) in &modules {
+        let package = name.rsplit_once('.').map_or("", |(package, _)| package);
+        let mut named = BTreeSet::new();
+        let mut take = |path: &str| {
+            let absolute = path.strip_prefix("benchmarks.").unwrap_or(path);
+            let inner = if package.is_empty() { absolute.to_string() } else { format!("{package}.{absolute}") };
+            for candidate in [absolute, inner.as_str()] {
+                if candidate != name && modules.contains_key(candidate) {
+                    named.insert(candidate.to_string());
+                }
+            }
+        };
+        for line in text.lines().map(str::trim_start) {
+            let words: Vec<&str> = line.split([' ', ',']).filter(|word| !word.is_empty()).collect();
+            match words[..] {
+                ["import", ..] => words[1..].iter().for_each(|word| take(word)),
+                ["from", module, "import", ..] => {
+                    let module = module.trim_start_matches('.');
+                    take(module);
+                    words[3..].iter().for_each(|word| take(&format!("{module}.{word}")));
+                    words[3..]
+                        .iter()
+                        .filter(|_| module.is_empty() || module == "benchmarks")
+                        .for_each(|word| take(word));
+                }
+                _ => {}
+            }
+        }
+        edges.insert(name.clone(), named);
+    }
+    let found: Vec<String> = circles(&edges).iter().map(|circle| circle.join(", ")).collect();
+    assert!(found.is_empty(), "benchmarks that import each other in a circle:\n{}", found.join("\n"));
+}
+
+#[test]
 fn binding_and_argument_parser_stay_in_their_rooms() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&src, &mut files);
-    for file in files {
-        let inside = file.strip_prefix(&src).unwrap().to_path_buf();
+    let src = root().join("src");
+    for file in files(&src, "rs") {
+        let inside = file.strip_prefix(&src).unwrap();
         let text = fs::read_to_string(&file).unwrap();
-        let outside = !["cli", "python"].iter().any(|room| inside.starts_with(room));
+        let is_outside = !["cli", "python"].iter().any(|room| inside.starts_with(room));
         for word in ["pyo3::", "clap::", "indicatif::"] {
-            assert!(!(outside && text.contains(word)), "{} uses {word}", inside.display());
+            assert!(!(is_outside && text.contains(word)), "{} uses {word}", inside.display());
         }
     }
 }
 
 #[test]
-fn the_reader_of_imports_sees_wrong_arrows() {
-    assert_eq!(
-        imported_rooms("use crate::flow::x;\nuse crate::{io, synth::{a, b}, types};"),
-        ["flow", "io", "synth", "types"]
-    );
-    assert!(!allowed("image", "flow") && !allowed("io", "synth") && !allowed("error", "types"));
-    assert!(allowed("flow", "jet") && allowed("types", "error") && allowed("jet", "jet"));
+fn the_reader_of_paths_sees_groups_and_wrong_arrows() {
+    let found = paths("use crate::flow::x;\nuse crate::{io, synth::{a, b}, types};\nlet y = super::z::w();");
+    let joined: Vec<String> = found.iter().map(|path| path.join("/")).collect();
+    assert_eq!(joined, ["crate/flow/x", "crate/io", "crate/synth/a", "crate/synth/b", "crate/types", "super/z/w"]);
+    assert!(!is_allowed("image", "flow") && !is_allowed("io", "synth") && !is_allowed("error", "types"));
+    assert!(is_allowed("flow", "jet") && is_allowed("types", "error") && is_allowed("jet", "jet"));
+}
+
+#[test]
+fn circles_are_found_and_chains_are_not() {
+    let graph = |edges: &[(&'static str, &'static str)]| {
+        let mut map: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for (from, to) in edges {
+            map.entry(from).or_default().insert(to);
+            map.entry(to).or_default();
+        }
+        map
+    };
+    assert!(circles(&graph(&[("a", "b"), ("b", "c"), ("a", "c")])).is_empty());
+    assert_eq!(circles(&graph(&[("a", "b"), ("b", "c"), ("c", "b")])), [["b", "c"]]);
 }

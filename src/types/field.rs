@@ -44,8 +44,8 @@ pub struct FlowField<T> {
     /// `P (P + 1) / 2` planes: the upper triangle of the covariance, row by row (0,0), (0,1), ... (1,1) ...
     pub covariance: Option<Vec<T>>,
     /// The part of `covariance` that repeats itself from one time to the next (biases, misfit) and does not
-    /// average out; planes in the same order. Only where the method tells it apart and `EstimatorOptions::systematic`
-    /// asks for it.
+    /// average out; planes in the same order. Only where the method tells it apart and
+    /// `EstimatorOptions::systematic` asks for it.
     pub systematic: Option<Vec<T>>,
     /// Status of each site.
     pub status: Vec<Status>,
