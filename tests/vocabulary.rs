@@ -9,30 +9,8 @@ use std::path::Path;
 use source::{files, name_of, root};
 
 /// Words of the house's old idiom. Each has a plain term in the glossary.
-const IDIOMS: &[&str] = &[
-    "told",
-    "tell",
-    "tells",
-    "telling",
-    "obey",
-    "obeys",
-    "obeyed",
-    "obeying",
-    "stray",
-    "strays",
-    "thing",
-    "things",
-    "otherwise",
-    "whatever",
-    "hardly",
-    "besides",
-    "altogether",
-    "heeded",
-    "heeds",
-    "wary",
-    "asked",
-    "asks",
-];
+const IDIOMS: &str = "told tell tells telling obey obeys obeyed obeying stray strays thing things otherwise something \
+    whatever hardly besides altogether heeded heeds wary asked asks anew mend mends mended";
 
 /// Idioms of several words.
 const PHRASES: &[&str] = &["as far as", "such as it is", "made scene", "drawn scene"];
@@ -46,107 +24,35 @@ const MAX_COMMENT_LINE: usize = 110;
 /// Names that the glossary replaces, by the folder (below `src/`) in which they may not name a file, a
 /// function, a type or an option; with the empty folder, nowhere. Words with an ordinary meaning elsewhere
 /// are listed only for their room.
-const REPLACED: &[(&str, &[&str])] = &[
-    (
-        "",
-        &[
-            "astray", "told", "telling", "asked", "sites", "spare", "thing", "things", "film", "stray", "strays",
-            "obey", "obeys",
-        ],
-    ),
+const REPLACED: &[(&str, &str)] = &[
+    ("", "astray told telling asked sites spare thing things film stray strays obey obeys"),
     (
         "motion3d",
-        &[
-            "two",
-            "otherwise",
-            "alike",
-            "whole",
-            "hanging",
-            "regions",
-            "gate",
-            "narrowing",
-            "coherence",
-            "rival",
-            "rivals",
-            "valley",
-            "plausible",
-            "departure",
-            "special",
-            "twin",
-            "signs",
-            "behind",
-            "turned",
-            "displaced",
-            "intake",
-            "belief",
-            "known",
-            "common",
-            "together",
-            "selected",
-            "excess",
-            "widen",
-            "effort",
-            "shared",
-            "turning",
-            "flow_scale",
-            "flow_offset",
-            "estimate_sideways",
-            "sideways",
-            "sigma",
-            "seed",
-        ],
+        "two otherwise alike whole hanging regions gate narrowing coherence rival rivals valley plausible \
+         departure special twin signs behind turned displaced intake belief known common together \
+         selected excess widen effort shared turning flow_scale flow_offset estimate_sideways sideways \
+         sigma seed",
     ),
     (
         "flow",
-        &[
-            "common",
-            "couple",
-            "bonds",
-            "visit",
-            "wave",
-            "loosen",
-            "led",
-            "seen",
-            "spread",
-            "further",
-            "evidence",
-            "range",
-            "bending",
-            "inherited",
-            "sound",
-            "hidden",
-        ],
+        "common couple bonds visit wave loosen led seen spread further evidence range bending inherited \
+         sound hidden",
     ),
     (
         "track",
-        &[
-            "outset",
-            "sound",
-            "rest",
-            "take",
-            "tell",
-            "look",
-            "front",
-            "slanted",
-            "silence",
-            "freedom",
-            "swung",
-            "wary",
-            "usual",
-            "rearranged",
-            "los",
-            "fov",
-            "eps",
-            "check",
-            "seed",
-        ],
+        "outset sound rest take tell look front slanted silence freedom swung wary usual rearranged los \
+         fov eps check seed",
     ),
-    ("cli", &["los", "fov", "eps", "shared", "turning", "sideways", "seed"]),
+    ("cli", "los fov eps shared turning sideways seed"),
 ];
 
 /// Options of the Python interface that the glossary replaces.
-const REPLACED_OPTIONS: &[&str] =
-    &["shared", "turning", "flow_scale", "flow_offset", "los", "fov", "eps", "check", "seed"];
+const REPLACED_OPTIONS: &str = "shared turning flow_scale flow_offset los fov eps check seed";
+
+/// Whether a list of words separated by spaces has the word.
+fn is_in(list: &str, word: &str) -> bool {
+    list.split_whitespace().any(|listed| listed == word)
+}
 
 /// The comments of a Rust file, a line each; code blocks of documentation are left out.
 fn rust_comments(text: &str) -> Vec<&str> {
@@ -191,7 +97,7 @@ fn words(lines: &[&str]) -> Vec<String> {
 /// Idioms among words, each with how often it occurs.
 fn idioms(words: &[String]) -> BTreeMap<String, usize> {
     let mut found = BTreeMap::new();
-    for word in words.iter().filter(|word| IDIOMS.contains(&word.as_str())) {
+    for word in words.iter().filter(|word| is_in(IDIOMS, word)) {
         *found.entry(word.clone()).or_default() += 1;
     }
     for phrase in PHRASES {
@@ -293,7 +199,7 @@ fn names_are_those_of_the_field() {
         names.extend(inside.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()));
         for (folder, replaced) in REPLACED {
             if folder.is_empty() || inside.starts_with(folder) {
-                for name in names.iter().filter(|name| replaced.contains(&name.to_lowercase().as_str())) {
+                for name in names.iter().filter(|name| is_in(replaced, &name.to_lowercase())) {
                     wrong.push(format!("{}: {name}", name_of(&file)));
                 }
             }
@@ -312,7 +218,7 @@ fn options_are_those_of_the_field() {
             let code = line.trim_start().trim_start_matches("def ");
             for part in code.split(['(', ',']).map(str::trim) {
                 if let Some((name, _)) = part.split_once(": ")
-                    && REPLACED_OPTIONS.contains(&name)
+                    && is_in(REPLACED_OPTIONS, name)
                 {
                     wrong.push(format!("{}:{}: {name}", name_of(&file), row + 1));
                 }
@@ -333,4 +239,19 @@ fn the_readers_find_what_they_look_for() {
     assert_eq!((found["told"], found["as far as"]), (2, 1));
     assert_eq!(room(Path::new("flow/windowed/run.rs")), "flow/windowed");
     assert_eq!(room(Path::new("io/source/glob.rs")), "io");
+}
+
+#[test]
+fn constants_name_what_they_bound() {
+    let mut wrong = Vec::new();
+    for file in files(&root().join("src"), "rs") {
+        for line in fs::read_to_string(&file).unwrap().lines() {
+            let Some((_, rest)) = line.split_once("const ") else { continue };
+            let name: String = rest.chars().take_while(|c| c.is_ascii_uppercase() || *c == '_').collect();
+            if !line.trim_start().starts_with("//") && name.split('_').any(|word| is_in("LEAST MOST ENOUGH", word)) {
+                wrong.push(format!("{}: {name}", name_of(&file)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "constants: expected MIN, MAX, a threshold or a tolerance, got\n{}", wrong.join("\n"));
 }
