@@ -1,12 +1,12 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
-use super::covariance::{Matrix5, determined, direction_deviation};
-use super::intake::Intake;
 use super::kernels::{equations, information};
-use super::motion::{Motion, tangents};
-use super::observations::Observations;
-use super::options::{Flow, Noise, Placement};
-use super::result::nested;
+use super::model::motion::{Motion, tangents};
+use super::model::observations::Observations;
+use super::model::options::{Flow, Noise, Placement};
+use super::model::result::nested;
+use super::model::whitening::Intake;
+use super::solver::covariance::{Matrix5, determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
 use nalgebra::{Matrix2x3, SMatrix, Vector2};
@@ -31,7 +31,7 @@ pub struct MotionBound {
 }
 
 impl MotionBound {
-    pub(super) fn of(tangent: &Matrix2x3<f64>, bound: &Matrix5, likelihood: &Matrix5, ideal: &Matrix5) -> Self {
+    pub(crate) fn of(tangent: &Matrix2x3<f64>, bound: &Matrix5, likelihood: &Matrix5, ideal: &Matrix5) -> Self {
         Self {
             bound: nested(bound),
             likelihood: nested(likelihood),
@@ -97,13 +97,13 @@ fn of_known_depths(
     Ok(MotionBound::of(&tangent, &bound, &likelihood, &ideal))
 }
 
-pub(super) fn not_determined() -> Error {
+pub(crate) fn not_determined() -> Error {
     Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
 }
 
 /// What to say where fewer than `least` points are usable, of which so many have a finite place: the others
 /// lack a finite covariance.
-pub(super) fn too_few(least: usize, finite: usize) -> Error {
+pub(crate) fn too_few(least: usize, finite: usize) -> Error {
     if finite < least {
         Error::argument("points", format!("at least {least} points that are finite"), finite)
     } else {
@@ -111,7 +111,7 @@ pub(super) fn too_few(least: usize, finite: usize) -> Error {
     }
 }
 
-pub(super) fn check_truth(noise: &Noise<'_>, motion: &Motion) -> Result<()> {
+pub(crate) fn check_truth(noise: &Noise<'_>, motion: &Motion) -> Result<()> {
     if matches!(noise, Noise::Unknown) {
         return Err(Error::argument("sigma", "the noise of the flow, as sigma or cov", "none"));
     }

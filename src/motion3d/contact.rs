@@ -1,14 +1,14 @@
 //! Time to contact: how fast points come nearer, with what is known of that.
 
-use super::camera::Intrinsics;
-use super::common::CommonEffect;
-use super::covariance::Matrix5;
+use super::diagnostics::systematic_errors::CommonEffect;
 use super::field::measured;
-use super::intake::{plane_row, turned_row};
-use super::motion::Motion;
-use super::observations::Row;
-use super::options::Placement;
-use super::turned::{HalfTurn, HalfWay};
+use super::model::camera::Intrinsics;
+use super::model::derotation::{HalfTurn, HalfWay};
+use super::model::motion::Motion;
+use super::model::observations::Row;
+use super::model::options::Placement;
+use super::model::whitening::{plane_row, turned_row};
+use super::solver::covariance::Matrix5;
 use crate::error::Result;
 use crate::math::Real;
 use crate::parallel::Threads;
@@ -31,7 +31,7 @@ pub struct UncertainMotion {
 }
 
 /// Rates of approach `nu u_z` under a motion.
-pub(super) struct Rates {
+pub(crate) struct Rates {
     u: Vector3<f64>,
     w: Vector3<f64>,
     tangent: Matrix2x3<f64>,
@@ -43,7 +43,7 @@ pub(super) struct Rates {
 /// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance
 /// 1.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Slopes {
+pub(crate) struct Slopes {
     motion: SMatrix<f64, 5, 1>,
     flow: RowVector2<f64>,
 }
@@ -191,10 +191,10 @@ fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Ha
 
 #[cfg(test)]
 mod tests {
-    use super::super::result::{UNKNOWN, axes};
-    use super::super::tests::scenes::{Scene, smooth};
-    use super::super::{MotionOptions, Noise, estimate_motion};
     use super::*;
+    use crate::motion3d::model::result::{UNKNOWN, axes};
+    use crate::motion3d::tests::scenes::{Scene, smooth};
+    use crate::motion3d::{MotionOptions, Noise, estimate_motion};
     use crate::types::{FieldLayout, MOTION_NAMES, SamplingGrid};
 
     /// The same depth everywhere, seen by a camera of 100 px, with deviations of 0.05 px.
@@ -259,7 +259,7 @@ mod tests {
     fn slopes_are_those_of_the_rate() {
         let scene = Scene::oblique(20, 0.1, 5);
         let observations = scene.observations();
-        let tangent = super::super::motion::tangents(&scene.motion.u());
+        let tangent = crate::motion3d::model::motion::tangents(&scene.motion.u());
         let known = UncertainMotion {
             motion: scene.motion,
             tangent: axes(&tangent),

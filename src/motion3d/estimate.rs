@@ -1,17 +1,18 @@
 //! The whole way from flow to motion.
 
-use super::displaced::{beforehand, decides};
-use super::intake::Intake;
-use super::known::Known;
-use super::observations::{Observations, ROUNDING};
-use super::options::{Flow, MotionOptions, Noise};
-use super::report::rotation_report;
-use super::result::{MotionEstimate, Status};
-use super::robust::{self, Consensus};
-use super::selected::{doubted, with_all_inliers};
-use super::solve::Task;
-use super::special::{turning, turning_in_unknown_noise};
-use super::turned::HalfTurn;
+use super::diagnostics::degenerate::{turning, turning_in_unknown_noise};
+use super::diagnostics::inliers::{doubted, with_all_inliers};
+use super::diagnostics::report::rotation_report;
+use super::diagnostics::rotation_prior::Known;
+use super::fit::Task;
+use super::model::derotation::HalfTurn;
+use super::model::observations::{Observations, ROUNDING};
+use super::model::options::{Flow, MotionOptions, Noise};
+use super::model::result::{MotionEstimate, Status};
+use super::model::whitening::Intake;
+use super::robust;
+use super::robust::Consensus;
+use super::solver::finite_rotation::{beforehand, decides};
 use crate::error::Result;
 use crate::math::random::CounterRng;
 
@@ -41,7 +42,7 @@ pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptio
 }
 
 /// Points in units of their noise, and that in the flow's unit.
-pub(super) struct Scaled {
+pub(crate) struct Scaled {
     pub observations: Observations,
     pub sigma: f64,
     /// Whether `sigma` has to be estimated.

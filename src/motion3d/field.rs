@@ -1,6 +1,6 @@
 //! Points of a flow field that share no window.
 
-use super::common::CommonErrors;
+use super::diagnostics::systematic_errors::CommonErrors;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, SamplingGrid, Status};
@@ -150,7 +150,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
 }
 
 /// Whether a field says in px, and how surely, what moves.
-pub(super) fn measured<T>(field: &FlowField<T>) -> Result<()> {
+pub(crate) fn measured<T>(field: &FlowField<T>) -> Result<()> {
     if field.covariance.is_none() {
         return Err(Error::argument("field", "one with a covariance", "one without"));
     }
@@ -172,7 +172,7 @@ fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
 }
 
 /// Whether a pixel lies in the region, which is everything where there is none.
-pub(super) fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
+pub(crate) fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
     region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
 }
 

@@ -1,10 +1,10 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
-use super::camera::Intrinsics;
-use super::common::CommonErrors;
+use super::diagnostics::correlated_noise::area;
+use super::diagnostics::systematic_errors::CommonErrors;
 use super::field::{measured, within};
+use super::model::camera::Intrinsics;
 use super::patches::AffinePatches;
-use super::together::area;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::parallel::Threads;

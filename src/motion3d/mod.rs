@@ -33,62 +33,34 @@
 //! # }
 //! ```
 
-mod belief;
 mod bound;
-mod camera;
-mod common;
 mod contact;
-mod covariance;
-mod departure;
-mod displaced;
-mod efficient;
+mod diagnostics;
 mod estimate;
 mod field;
 mod field_patches;
-mod grid;
-mod intake;
+mod fit;
 mod kernels;
-mod known;
-mod less_turned;
-mod likelihood;
-mod motion;
-mod neighbours;
-mod observations;
-mod options;
+mod lateral;
+mod model;
 mod patches;
-mod plane_flow;
-mod plausible;
-mod refine;
-mod regression;
-mod report;
-mod result;
 mod robust;
-mod selected;
-mod sideways;
-mod signs;
-mod smoothing;
-mod solve;
-mod special;
+mod solver;
 #[cfg(test)]
 mod tests;
-mod together;
-mod trial;
-mod turned;
-mod valley;
-mod verdict;
 
 #[cfg(feature = "python")]
 pub(crate) use bound::check_motion;
 pub use bound::{MotionBound, motion_bound};
-pub use camera::Intrinsics;
-pub use common::{CommonEffect, CommonErrors};
 pub use contact::{ContactMap, UncertainMotion, contact_map};
+pub use diagnostics::systematic_errors::{CommonEffect, CommonErrors};
 pub use estimate::estimate_motion;
 pub use field::{FieldOptions, FieldPoints, field_points};
 pub use field_patches::{FieldPatches, field_patches};
-pub use motion::{Motion, Projection};
-pub use options::{Flow, Method, MotionOptions, Noise, Placement, RotationPrior};
+pub use lateral::{SidewaysBound, SidewaysEstimate, SidewaysWeights, estimate_sideways, sideways_bound};
+pub use model::camera::Intrinsics;
+pub use model::motion::{Motion, Projection};
+pub use model::options::{Flow, Method, MotionOptions, Noise, Placement, RotationPrior};
+pub use model::result::{Alternative, Likelihood, MotionEstimate, Status, focus_of_expansion};
 pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};
-pub use result::{Alternative, Likelihood, MotionEstimate, Status, focus_of_expansion};
-pub use sideways::{SidewaysBound, SidewaysEstimate, SidewaysWeights, estimate_sideways, sideways_bound};
-pub use smoothing::Smoother;
+pub use solver::smoothing::Smoother;

@@ -1,8 +1,8 @@
 //! Windows of fields whose flow is known.
 
-use super::super::{Intrinsics, Motion, MotionOptions, Placement, Status as Told, estimate_patch_motion};
 use super::*;
 use crate::math::random::CounterRng;
+use crate::motion3d::{Intrinsics, Motion, MotionOptions, Placement, Status as Told, estimate_patch_motion};
 use crate::types::FieldLayout;
 use nalgebra::SMatrix;
 
@@ -173,7 +173,7 @@ fn drive(motion: &Motion, seed: u64) -> FlowField<f64> {
 }
 
 /// Squared distance of the truth in units of the covariance.
-fn squared(found: &super::super::MotionEstimate, truth: &Motion) -> f64 {
+fn squared(found: &crate::motion3d::MotionEstimate, truth: &Motion) -> f64 {
     let off: Vec<f64> = (0..3).map(|i| truth.translation[i] - found.motion.translation[i]).collect();
     let along = |axis: usize| (0..3).map(|i| found.tangent[axis][i] * off[i]).sum::<f64>();
     let turn = |i: usize| truth.rotation[i] - found.motion.rotation[i];

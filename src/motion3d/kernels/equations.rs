@@ -1,15 +1,15 @@
 //! Sums of one Gauss-Newton step.
 
-use super::super::motion::Motion;
-use super::super::observations::Observations;
 use super::{Everywhere, Planes, UPPER, add_to_rotation, both_axes, dot, over_chunks, see, total, turn};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix2x3, SMatrix};
 use std::ops::AddAssign;
 
 /// The sums of one Gauss-Newton step at a motion.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Equations {
+pub(crate) struct Equations {
     /// `H = sum D(nu^)^t D(nu^)`.
     pub h: SMatrix<f64, 5, 5>,
     /// `sum D(nu^)^t e`.
@@ -85,7 +85,7 @@ impl Kernel<f64> for EquationSums<'_> {
 
 /// The equations at a motion, `theta = (psi, w)` with `psi` along the rows of `tangent`; with `cut`, Tukey's
 /// weights that end there, in units of noise.
-pub(in super::super) fn equations(
+pub(crate) fn equations(
     observations: &Observations,
     motion: &Motion,
     tangent: &Matrix2x3<f64>,

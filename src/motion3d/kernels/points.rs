@@ -1,8 +1,8 @@
 //! What single passes over the points tell: the best rotation for a direction, depths, how many obey.
 
-use super::super::motion::Motion;
-use super::super::observations::{CHUNK, Observations};
 use super::{Everywhere, Planes, over_chunks, see, total};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::{CHUNK, Observations};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -40,10 +40,7 @@ impl Kernel<f64> for RotationSums<'_> {
 
 /// The best rotation for the translation `direction` and its `J`; `None` where the points do not determine
 /// it.
-pub(in super::super) fn best_rotation(
-    observations: &Observations,
-    direction: &Vector3<f64>,
-) -> Option<(Vector3<f64>, f64)> {
+pub(crate) fn best_rotation(observations: &Observations, direction: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let sums = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
         dispatch(observations.level, RotationSums { planes, direction, floor: observations.floor })
@@ -64,7 +61,7 @@ pub(in super::super) fn best_rotation(
 
 /// Depths of the points at a motion; as long as the planes, zeros at the end included.
 #[derive(Debug, Clone, Default)]
-pub(in super::super) struct Depths {
+pub(crate) struct Depths {
     /// `nu^ = m / s`, 0 at the epipole.
     pub nu: Vec<f64>,
     /// `s^2`, the inverse variance of `nu^`; 0 at the epipole.
@@ -97,7 +94,7 @@ impl Kernel<f64> for DepthPlanes<'_> {
 }
 
 /// Depths and residuals of all points at a motion.
-pub(in super::super) fn depths(observations: &Observations, motion: &Motion) -> Depths {
+pub(crate) fn depths(observations: &Observations, motion: &Motion) -> Depths {
     let stride = observations.stride;
     let mut out = Depths { nu: vec![0.0; stride], s2: vec![0.0; stride], e: vec![0.0; stride] };
     let work = |chunk: usize, out: [&mut [f64]; 3]| {
@@ -146,7 +143,7 @@ impl Kernel<f64> for ConsensusSum<'_> {
 ///
 /// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or
 /// overtakes it, obeys the same lines, as no stray does.
-pub(in super::super) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
+pub(crate) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
     let [cost] = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
         dispatch(observations.level, ConsensusSum { planes, motion, floor: observations.floor, cut2: cut * cut })

@@ -1,17 +1,17 @@
 //! What is told about a motion of patches.
 
-use super::super::common::CommonErrors;
-use super::super::contact::Rates;
-use super::super::covariance::{Matrix5, direction_deviation, plugged_in};
-use super::super::motion::{Motion, tangents};
-use super::super::report::turned;
-use super::super::result::{Alternative, MotionEstimate, Status, axes, nested};
-use super::super::special::RotationOnly;
 use super::system::System;
+use crate::motion3d::contact::Rates;
+use crate::motion3d::diagnostics::degenerate::RotationOnly;
+use crate::motion3d::diagnostics::report::turned;
+use crate::motion3d::diagnostics::systematic_errors::CommonErrors;
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::result::{Alternative, MotionEstimate, Status, axes, nested};
+use crate::motion3d::solver::covariance::{Matrix5, direction_deviation, plugged_in};
 use nalgebra::{Matrix2, Vector3};
 
 /// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
-pub(super) fn tell(
+pub(crate) fn tell(
     out: &mut MotionEstimate,
     system: &System,
     motion: &Motion,
@@ -58,7 +58,7 @@ pub(super) fn tell(
 /// What is told about a camera that only turns, or stands still.
 ///
 /// `to_plane` maps flow to the plane at distance 1.
-pub(super) fn turning_report(
+pub(crate) fn turning_report(
     system: &System,
     n: usize,
     rotation: &RotationOnly,

@@ -1,10 +1,10 @@
 //! The equations of whitened patches.
 
-use super::super::common::Moved;
-use super::super::covariance::{Matrix5, inverse};
-use super::super::motion::{AffineRows, Motion, tangents};
-use super::super::special::by_chance;
-use super::super::turned::HalfTurn;
+use crate::motion3d::diagnostics::degenerate::by_chance;
+use crate::motion3d::diagnostics::systematic_errors::Moved;
+use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::motion::{AffineRows, Motion, tangents};
+use crate::motion3d::solver::covariance::{Matrix5, inverse};
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, RowVector2, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
@@ -18,7 +18,7 @@ const STEP: f64 = 1e-10;
 
 /// One patch: `f = A(u) lambda + R w + noise` with unit covariance, `A` linear in `u`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Patch {
+pub(crate) struct Patch {
     point: [f64; 2],
     rows: AffineRows,
     /// `V'` of the rotation that was taken out of displacements, else the identity.
@@ -30,7 +30,7 @@ pub(super) struct Patch {
 
 /// A patch seen with one motion.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SeenPatch {
+pub(crate) struct SeenPatch {
     /// `lambda^ = (nu, nu_x, nu_y)` by least squares, and its covariance.
     pub surface: Vector3<f64>,
     pub covariance: Matrix3<f64>,
@@ -44,14 +44,14 @@ pub(super) struct SeenPatch {
 
 /// Usable patches and where they come from.
 #[derive(Debug, Clone)]
-pub(super) struct System {
+pub(crate) struct System {
     pub patches: Vec<Patch>,
     pub source: Vec<u32>,
 }
 
 /// The sums of one step, as those of points.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PatchEquations {
+pub(crate) struct PatchEquations {
     pub h: Matrix5,
     pub gradient: SMatrix<f64, 5, 1>,
     pub p: Matrix5,

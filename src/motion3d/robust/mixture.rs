@@ -1,19 +1,19 @@
 //! The last steps towards the motion among points of which some are strays.
 //!
-//! With the probability `g(e)` of each point that it is an inlier ([`strays`](super::strays)), the estimating
+//! With the probability `g(e)` of each point that it is an inlier ([`strays`](super::outlier_posterior)), the estimating
 //! equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its
 //! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
 //! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the
 //! same, as it is for every likelihood. Least squares on a fixed set of points take strays for inliers that
 //! tell of the motion.
 
-use super::super::covariance::{Matrix5, direction_spread, inverse};
-use super::super::kernels::depths;
-use super::super::motion::{Motion, tangents};
-use super::super::observations::{CHUNK, Observations};
-use super::gate::{Gate, Judged};
-use super::strays::{Strays, normal};
+use super::depth_consistency::{Gate, Judged};
+use super::outlier_posterior::{Strays, normal};
 use super::{Consensus, INLIER, LEAST, obeying};
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::{CHUNK, Observations};
+use crate::motion3d::solver::covariance::{Matrix5, direction_spread, inverse};
 use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2};
 use rayon::prelude::*;
 
@@ -36,7 +36,7 @@ type Vector5 = SMatrix<f64, 5, 1>;
 
 /// A motion with its covariance in the axes `tangent`.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Told {
+pub(crate) struct Told {
     pub motion: Motion,
     pub tangent: Matrix2x3<f64>,
     pub covariance: Matrix5,
@@ -151,7 +151,7 @@ impl Among<'_> {
 /// From the motion of the inner inliers, with the depths `smooth` of these in its weights (`None`: their
 /// own), to the root of the equation with probabilities, if it `moves`; the covariance grows as the
 /// information shrinks. `None` where nothing is known of strays.
-pub(in super::super) fn among_strays(
+pub(crate) fn among_strays(
     all: &Observations,
     known: &Consensus,
     from: &Told,
@@ -174,7 +174,7 @@ pub(in super::super) fn among_strays(
 ///
 /// Strays with depths of their own, which are large, weigh most in least squares; drawn to their neighbours'
 /// they weigh as inliers do.
-pub(super) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Option<(Motion, f64)> {
+pub(crate) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Option<(Motion, f64)> {
     let mut motion = start;
     for round in 0..=ROUNDS {
         let inliers = obeying(all, &motion);
@@ -207,7 +207,7 @@ fn plain(all: &Observations, known: &Consensus, at: &Told, smooth: Option<&[f64]
         own = depths(&inner, &at.motion).nu;
         &own
     };
-    let information = super::super::kernels::information(&inner, &at.motion, &at.tangent, nu, 0.0);
+    let information = crate::motion3d::kernels::information(&inner, &at.motion, &at.tangent, nu, 0.0);
     information.iter().all(|value| value.is_finite()).then_some(information)
 }
 

@@ -1,9 +1,9 @@
 //! For every direction the best rotation of many small samples, by a truncated cost.
 
-use super::super::grid::{evaluate, sample};
-use super::super::motion::Motion;
-use super::super::observations::Observations;
 use crate::math::random::CounterRng;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::solver::starts::{evaluate, sample};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix3, Vector3};
 
@@ -65,7 +65,7 @@ fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
 ///
 /// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of
 /// its own, at least `least`, else the share `spacing` of its flow.
-pub(super) fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
+pub(crate) fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
     let chosen = sample(observations.n, SEARCHED, rng.stream(0));
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
     let draws = rng.stream(1);

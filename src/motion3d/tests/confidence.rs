@@ -1,7 +1,7 @@
 //! What is not known must not be told as `ok`: valleys, opposite motions, samples of many points.
 
-use super::super::*;
 use super::scenes::{Scene, W, mahalanobis, oblique, smooth};
+use crate::motion3d::*;
 
 /// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with
 /// the truth outside of the ellipsoid that holds 0.999.

@@ -1,8 +1,8 @@
 //! Every scene that does not determine a motion, by its status.
 
-use super::super::*;
 use super::scenes::{Scene, W};
 use crate::math::random::CounterRng;
+use crate::motion3d::*;
 use nalgebra::Vector3;
 
 fn options() -> MotionOptions {

@@ -1,8 +1,8 @@
 //! Estimates against the truth and against what their covariances promise.
 
-use super::super::*;
 use super::scenes::{Held, Scene, W, oblique, smooth};
 use crate::math::random::CounterRng;
+use crate::motion3d::*;
 use crate::parallel::Threads;
 use nalgebra::Vector3;
 

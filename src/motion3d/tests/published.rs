@@ -1,7 +1,7 @@
 //! Values that the theory gives without chance.
 
-use super::super::*;
 use super::scenes::{oblique, smooth};
+use crate::motion3d::*;
 
 fn near(got: f64, want: f64, name: &str) {
     assert!((got - want).abs() < 6e-4 * want.abs(), "{name}: {got} is not {want}");
@@ -73,13 +73,14 @@ fn one_unknown_has_its_closed_forms() {
     // out.
     let at = vec![[0.0; 2]; 101];
     let flow = Flow::Plane { points: &at, flow: &at, camera: None };
-    let observations = super::super::intake::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
+    let observations =
+        crate::motion3d::model::whitening::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
-    let tangent = super::super::motion::tangents(&motion.u());
+    let tangent = crate::motion3d::model::motion::tangents(&motion.u());
     let mut nu = depths.clone();
     nu.resize(observations.stride, 0.0);
-    let m = super::super::kernels::information(&observations, &motion, &tangent, &nu, 0.0);
-    let p = super::super::kernels::equations(&observations, &motion, &tangent, None).p;
+    let m = crate::motion3d::kernels::information(&observations, &motion, &tangent, &nu, 0.0);
+    let p = crate::motion3d::kernels::equations(&observations, &motion, &tangent, None).p;
     // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
     let axis = usize::from(tangent[(1, 1)].abs() > 0.5);
     let (m, p) = (m[(axis, axis)], p[(axis, axis)]);

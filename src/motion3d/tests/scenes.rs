@@ -1,32 +1,32 @@
 //! Random scenes with exact truth, and how estimates lie to it.
 
-use super::super::intake::Intake;
-use super::super::observations::Observations;
-use super::super::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
 use crate::math::random::CounterRng;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
 use nalgebra::{SMatrix, Vector3};
 
 /// Rotation rate of the published scenes.
-pub(in super::super) const W: [f64; 3] = [0.02, -0.03, 0.01];
+pub(crate) const W: [f64; 3] = [0.02, -0.03, 0.01];
 
 /// The published oblique motion.
-pub(in super::super) fn oblique() -> Motion {
+pub(crate) fn oblique() -> Motion {
     Motion::new([0.6, 0.2, 0.75], W)
 }
 
 /// Inverse depths of the published scenes, at places `(x, y) / h`: a curved wall.
-pub(in super::super) fn smooth(x: f64, y: f64) -> f64 {
+pub(crate) fn smooth(x: f64, y: f64) -> f64 {
     1.0 + 0.35 * (2.0 * x + 1.0).sin() * (1.5 * y).cos() + 0.15 * y
 }
 
 /// Of ground under a far wall.
-pub(in super::super) fn ground(y: f64) -> f64 {
+pub(crate) fn ground(y: f64) -> f64 {
     0.3 + 1.2 * y.max(0.0)
 }
 
 /// Points on the plane at distance 1 with their flow.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Scene {
+pub(crate) struct Scene {
     pub motion: Motion,
     pub points: Vec<[f64; 2]>,
     pub inverse_depth: Vec<f64>,
@@ -74,7 +74,7 @@ impl Scene {
 }
 
 /// Squared Mahalanobis distance of the truth from an estimate.
-pub(in super::super) fn mahalanobis(found: &MotionEstimate, truth: &Motion) -> f64 {
+pub(crate) fn mahalanobis(found: &MotionEstimate, truth: &Motion) -> f64 {
     let to = Vector3::from(truth.translation);
     let along = |a: usize| Vector3::from(found.tangent[a]).dot(&to);
     let w = Vector3::from(truth.rotation) - Vector3::from(found.motion.rotation);
@@ -84,11 +84,11 @@ pub(in super::super) fn mahalanobis(found: &MotionEstimate, truth: &Motion) -> f
 }
 
 /// 95 % of chi squared with five degrees of freedom.
-pub(in super::super) const ELLIPSOID: f64 = 11.070;
+pub(crate) const ELLIPSOID: f64 = 11.070;
 
 /// How many 95 % ellipsoids hold the truth.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in super::super) struct Held {
+pub(crate) struct Held {
     pub of: u32,
     pub inside: u32,
 }

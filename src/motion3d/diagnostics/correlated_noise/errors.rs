@@ -1,0 +1,208 @@
+//! What residuals tell of errors: how large they are and how far they go together.
+//!
+//! A field's correlation length is that of its windows. What a scene does to flow (edges in depth, a texture
+//! that smoothing reaches across) goes together farther, and differs from field to field.
+
+use super::{REACH, Vector5, Weighted, correlation, slopes};
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::options::Flow;
+use crate::motion3d::solver::covariance::Matrix5;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Residuals nearer than this many correlation lengths are compared: three times the usual distance of
+/// points.
+const NEAR: f64 = 6.0;
+
+/// Fewer points than this do not tell how far errors go together: by chance their residuals correlate as
+/// much.
+const FEWEST: usize = 30;
+
+/// By how much the correlation length may be longer than told, and the steps in which that is looked for.
+const LONGEST: f64 = 4.0;
+const STEP: f64 = 1.15;
+
+/// Points that sums over pairs are made from; of more, every so manieth stands for its neighbours.
+const ENOUGH: usize = 2000;
+
+/// The least share of the errors' variance that is left in residuals, for it to be told by them.
+const LEFT: f64 = 0.1;
+
+/// What is known of the errors of the points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Errors {
+    /// By how much the correlation length is longer than told.
+    pub stretch: f64,
+    /// Their variance in units of the noise that is told, not below that of a point's own.
+    pub variance: f64,
+}
+
+impl Errors {
+    /// `inverse`: that of the equations' information; `own`: the deviation of a point's own error.
+    ///
+    /// Fitting a motion takes what looks like one out of the residuals: of errors with the correlations `R`
+    /// they have the covariance `(I - H) R (I - H)^t`, `H = W A^-1 W^t`. The shortest stretch is taken for
+    /// which that makes residuals of neighbours as alike as they are.
+    pub fn told_by_residuals(points: &Neighbourhood, inverse: &Matrix5, own: f64) -> Self {
+        let squares: f64 = points.all.iter().map(|point| point.residual.powi(2)).sum();
+        let near = points.near();
+        let alike = near.alike / squares;
+        let mut stretch = 1.0;
+        let mut expected = points.expected(&near, inverse, stretch);
+        while points.all.len() >= FEWEST && expected.alike < alike && stretch * STEP <= LONGEST {
+            let next = points.expected(&near, inverse, stretch * STEP);
+            // Longer ones look like a motion, and are told by no residual.
+            if next.alike <= expected.alike {
+                break;
+            }
+            (stretch, expected) = (stretch * STEP, next);
+        }
+        Self { stretch, variance: (squares / expected.squares).max(own * own) }
+    }
+}
+
+/// A point as others see it.
+struct Point {
+    /// Where it was given, in correlation lengths.
+    place: Vector3<f64>,
+    /// `W`.
+    row: Vector5,
+    residual: f64,
+}
+
+/// Points from top to bottom, so that only a band of them is near one.
+pub(crate) struct Neighbourhood {
+    all: Vec<Point>,
+}
+
+/// Sums over near pairs.
+struct Near {
+    /// Rows of the neighbours of each point, added up.
+    rows: Vec<Vector5>,
+    /// Products of residuals.
+    alike: f64,
+}
+
+/// What residuals are expected to be: their squares, in units of the errors', and products of near ones in
+/// units of that.
+struct Expected {
+    squares: f64,
+    alike: f64,
+}
+
+impl Neighbourhood {
+    pub fn new(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f64) -> Self {
+        let residuals = depths(inliers, at.motion).e;
+        let point = |k: usize| Point {
+            place: flow.place(inliers.source[k] as usize) / length,
+            row: slopes(inliers, at.motion, at.tangent, at.nu[k], k),
+            residual: residuals[k],
+        };
+        Self::of((0..inliers.n).map(point).collect())
+    }
+
+    /// The same of one component of the flow that a rotation alone leaves.
+    pub fn of_rotation(inliers: &Observations, w: &Vector3<f64>, axis: usize, flow: &Flow<'_>, length: f64) -> Self {
+        let point = |k: usize| {
+            let row = inliers.row(k);
+            let turn = row.r.row(axis);
+            Point {
+                place: flow.place(inliers.source[k] as usize) / length,
+                row: Vector5::new(0.0, 0.0, turn[0], turn[1], turn[2]),
+                residual: row.f[axis] - (turn * w)[0],
+            }
+        };
+        Self::of((0..inliers.n).map(point).collect())
+    }
+
+    fn of(mut all: Vec<Point>) -> Self {
+        all.sort_by(|a, b| a.place.y.total_cmp(&b.place.y));
+        Self { all }
+    }
+
+    /// `sum W^t W`.
+    pub fn squares(&self) -> Matrix5 {
+        self.all.iter().map(|point| point.row * point.row.transpose()).sum()
+    }
+
+    /// `sum rho(d_kl) W_k^t W_l` over different points.
+    pub fn different(&self, stretch: f64) -> Matrix5 {
+        let of_point = |k: usize| {
+            let product = self.all[k].row * self.correlated(k, stretch).0.transpose();
+            0.5 * (product + product.transpose())
+        };
+        let (parts, each) = self.parts(of_point);
+        parts.iter().sum::<Matrix5>() * each
+    }
+
+    /// The other points within a distance of point `k`, and their distances.
+    fn around(&self, k: usize, reach: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let here = self.all[k].place;
+        let first = self.all.partition_point(|point| point.place.y <= here.y - reach);
+        let band = self.all.iter().enumerate().skip(first);
+        let band = band.take_while(move |(_, point)| point.place.y - here.y < reach);
+        let near = band.filter(move |(l, point)| *l != k && (point.place.x - here.x).abs() < reach);
+        near.map(move |(l, point)| (l, (point.place - here).norm()))
+    }
+
+    /// Rows of the other points times their correlations with point `k`, and the correlations of the near
+    /// ones added up.
+    fn correlated(&self, k: usize, stretch: f64) -> (Vector5, f64) {
+        let (mut rows, mut near) = (Vector5::zeros(), 0.0);
+        for (l, distance) in self.around(k, REACH * stretch) {
+            let rho = correlation(distance / stretch);
+            rows += self.all[l].row * rho;
+            if distance < NEAR {
+                near += rho;
+            }
+        }
+        (rows, near)
+    }
+
+    fn near(&self) -> Near {
+        let of_point = |k: usize| {
+            self.around(k, NEAR).filter(|(_, distance)| *distance < NEAR).fold(
+                (Vector5::zeros(), 0.0),
+                |(rows, alike), (l, _)| {
+                    let other = &self.all[l];
+                    (rows + other.row, alike + self.all[k].residual * other.residual)
+                },
+            )
+        };
+        let of_points: Vec<(Vector5, f64)> = (0..self.all.len()).into_par_iter().map(of_point).collect();
+        let alike = of_points.iter().map(|(_, alike)| alike).sum();
+        Near { rows: of_points.into_iter().map(|(rows, _)| rows).collect(), alike }
+    }
+
+    /// With `U = R W`, `B = W^t U` and the rows `N` of neighbours added up, the products of near residuals
+    /// are `sum R - 2 tr A^-1 U^t N + tr A^-1 B A^-1 W^t N`, and the squares the same with `N = W`.
+    fn expected(&self, near: &Near, inverse: &Matrix5, stretch: f64) -> Expected {
+        let of_point = |k: usize| {
+            let (rows, correlations) = self.correlated(k, stretch);
+            let own = &self.all[k].row;
+            let whole = rows + own;
+            (whole * own.transpose(), whole * near.rows[k].transpose(), correlations)
+        };
+        let (parts, each) = self.parts(of_point);
+        let b: Matrix5 = parts.iter().map(|(own, _, _)| own).sum::<Matrix5>() * each;
+        let n: Matrix5 = parts.iter().map(|(_, near, _)| near).sum::<Matrix5>() * each;
+        let correlations = parts.iter().map(|(_, _, correlations)| correlations).sum::<f64>() * each;
+        let products: Matrix5 = self.all.iter().zip(&near.rows).map(|(point, near)| point.row * near.transpose()).sum();
+        let middle = inverse * b * inverse;
+        let count = self.all.len() as f64;
+        let squares = count - 2.0 * (inverse * b).trace() + (middle * self.squares()).trace();
+        let squares = squares.max(LEFT * count);
+        let alike = correlations - 2.0 * (inverse * n).trace() + (middle * products).trace();
+        Expected { squares, alike: alike / squares }
+    }
+
+    /// What is added up over all points, or over those that stand for them, and how many each of these stands
+    /// for; in one order, whoever computes it.
+    fn parts<S: Send>(&self, of_point: impl Fn(usize) -> S + Sync + Send) -> (Vec<S>, f64) {
+        let step = self.all.len().div_ceil(ENOUGH).max(1);
+        let chosen: Vec<usize> = (step / 2..self.all.len()).step_by(step).collect();
+        let each = self.all.len() as f64 / chosen.len().max(1) as f64;
+        (chosen.into_par_iter().map(of_point).collect(), each)
+    }
+}

@@ -1,0 +1,179 @@
+//! The flow of one plane, whatever the motion.
+//!
+//! Points of a plane `nu = n . eta` move by `(u n^t + [w]x) eta` relative to the camera: their flow is `f = G
+//! A eta` with a matrix `A` that is known up to a multiple of the unit matrix, eight numbers (H.
+//! Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 . eta)`, `a_3` being the last row of
+//! `A`: a homography.
+//!
+//! Whether the flow is a plane's is asked of the flow itself: depths at an estimated motion depart from a
+//! plane's by what the motion is off, and by more than their own noise where that is small along the epipolar
+//! lines.
+
+use crate::motion3d::model::observations::{Observations, Row};
+use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
+
+/// Numbers of a plane's flow.
+const NUMBERS: usize = 8;
+
+/// Steps towards a homography; the flow of a plane is linear in its numbers.
+const STEPS: usize = 5;
+
+/// Least eigenvalue of the scaled normal equations that is not rounding.
+const DETERMINED: f64 = 1e-12;
+
+/// The likeliest flow of a plane.
+pub(crate) struct PlaneFlow {
+    /// What it leaves of every point's flow, in units of noise.
+    pub rest: Vec<Vector2<f64>>,
+    /// Its square.
+    pub chi2: f64,
+    /// Measurements less the numbers that they determine.
+    pub free: f64,
+}
+
+/// A point as a plane's flow has it.
+struct Point {
+    g: SMatrix<f64, 2, 3>,
+    eta: Vector3<f64>,
+    flow: Vector2<f64>,
+}
+
+impl Point {
+    /// Without the rotation that was taken out, between both ends where there are two.
+    fn new(points: &Observations, k: usize, back: Option<&Matrix3<f64>>) -> Option<Self> {
+        let (row, [x, y, z]): (Row, _) = (points.row(k), points.position[k]);
+        if points.spherical {
+            return Some(Self { g: row.g, eta: Vector3::new(x, y, z), flow: row.f });
+        }
+        let (Some(back), Some(turn)) = (back, &points.turn) else {
+            return Some(Self { g: row.g, eta: Vector3::new(x, y, 1.0), flow: row.f });
+        };
+        let (g, flow) = (row.g * back, row.f - row.r * turn.rotation);
+        // The first columns of G are the unit matrix: what is left of them is the whitening.
+        let left = g.fixed_columns::<2>(0).try_inverse()? * flow;
+        Some(Self { g, eta: Vector3::new(x - 0.5 * left.x, y - 0.5 * left.y, 1.0), flow })
+    }
+
+    /// What the flow of the plane `a` is here, and its slopes by the eight numbers.
+    fn flow_of(&self, a: &Matrix3<f64>, ends: bool) -> (Vector2<f64>, SMatrix<f64, 2, NUMBERS>) {
+        let nearer = if ends { 1.0 / (1.0 + (a.row(2) * self.eta).x) } else { 1.0 };
+        let flow = self.g * (a * self.eta) * nearer;
+        let g = if ends { (self.g - flow * RowVector3::new(0.0, 0.0, 1.0)) * nearer } else { self.g };
+        (flow, SMatrix::from_fn(|i, j| g[(i, j / 3)] * self.eta[j % 3]))
+    }
+}
+
+impl PlaneFlow {
+    /// `None` of fewer points than four, or where no plane has such a flow.
+    pub fn fit(points: &Observations) -> Option<Self> {
+        let back = match &points.turn {
+            Some(turn) => Some(turn.mean.try_inverse()?),
+            None => None,
+        };
+        let ends = points.turn.is_some();
+        let counts = |k: &usize| points.row(*k).g.norm_squared() > 0.0;
+        let used: Option<Vec<Point>> =
+            (0..points.n).filter(counts).map(|k| Point::new(points, k, back.as_ref())).collect();
+        let used = used?;
+        if 2 * used.len() < NUMBERS {
+            return None;
+        }
+        let (mut a, mut rank) = (Matrix3::zeros(), 0);
+        for _ in 0..if ends { STEPS } else { 1 } {
+            let (change, determined) = step(&used, &a, ends);
+            a += change;
+            rank = determined;
+        }
+        let mut rest = vec![Vector2::zeros(); points.n];
+        for (k, point) in (0..points.n).filter(counts).zip(&used) {
+            rest[k] = point.flow - point.flow_of(&a, ends).0;
+        }
+        let chi2: f64 = rest.iter().map(Vector2::norm_squared).sum();
+        let free = (2 * used.len() - rank) as f64;
+        (chi2.is_finite() && free > 0.0).then_some(Self { rest, chi2, free })
+    }
+}
+
+/// One step of least squares, and how many numbers the points determine.
+fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize) {
+    let mut normal = SMatrix::<f64, NUMBERS, NUMBERS>::zeros();
+    let mut right = SVector::<f64, NUMBERS>::zeros();
+    for point in points {
+        let (flow, slopes) = point.flow_of(a, ends);
+        normal += slopes.transpose() * slopes;
+        right += slopes.transpose() * (point.flow - flow);
+    }
+    // In units of each number's own information; points on a line or at few places do not tell of all.
+    let scale = normal.diagonal().map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let scaled = SMatrix::<f64, NUMBERS, NUMBERS>::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::<f64, nalgebra::Const<NUMBERS>>::new(scaled);
+    let (mut change, mut rank) = (SVector::<f64, NUMBERS>::zeros(), 0);
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > DETERMINED {
+            change += vector * (vector.dot(&right.component_mul(&scale)) / value);
+            rank += 1;
+        }
+    }
+    let change = change.component_mul(&scale);
+    (Matrix3::from_fn(|i, j| if i == 2 && j == 2 { 0.0 } else { change[3 * i + j] }), rank)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::model::derotation::HalfTurn;
+    use crate::motion3d::model::motion::Motion;
+    use crate::motion3d::model::options::{Flow, Noise, Placement};
+    use crate::motion3d::model::whitening::Intake;
+    use crate::motion3d::tests::scenes::{Scene, W};
+
+    const SLANT: [f64; 3] = [0.9, 0.3, -0.2];
+
+    fn along(x: f64, y: f64) -> f64 {
+        SLANT[0] + SLANT[1] * x + SLANT[2] * y
+    }
+
+    #[test]
+    fn eight_numbers_are_the_flow_of_a_plane_and_not_of_a_bend() {
+        let motion = Motion::new([0.6, 0.2, 0.75], W);
+        for bend in [0.0, 0.1] {
+            let scene = Scene::new(motion, 400, 0.6, 1e-3, 3, |x, y, _| along(x, y) + bend * x * x);
+            let fit = PlaneFlow::fit(&scene.observations()).unwrap();
+            assert_eq!(fit.free, 792.0);
+            assert_eq!((0.85..1.15).contains(&(fit.chi2 / fit.free)), bend == 0.0, "{bend}: {}", fit.chi2);
+        }
+    }
+
+    /// Without noise, over a whole frame, whichever rotation was taken out.
+    #[test]
+    fn a_homography_is_the_displacement_of_a_plane() {
+        let motion = Motion::new([0.6, 0.2, 0.75], [0.1, -0.05, 0.2]);
+        let turn = HalfTurn::new(&motion.w());
+        let points: Vec<[f64; 2]> =
+            (0..100).map(|k| [f64::from(k % 10) * 0.1 - 0.45, f64::from(k / 10) * 0.1 - 0.45]).collect();
+        let seen = |&[x, y]: &[f64; 2]| {
+            let before = Vector3::new(x, y, 1.0) / (0.1 * along(x, y));
+            let after = nalgebra::Rotation3::new(motion.w()) * before + Vector3::from(motion.displacement());
+            [after.x / after.z - x, after.y / after.z - y]
+        };
+        let flow: Vec<[f64; 2]> = points.iter().map(seen).collect();
+        let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
+        let intake = Intake::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
+        let start = intake.whitened();
+        for taken in [turn, HalfTurn::of(&motion), HalfTurn::new(&Vector3::new(0.0, 0.1, -0.1))] {
+            let fit = PlaneFlow::fit(&intake.turned(&start, taken)).unwrap();
+            assert!(fit.chi2 < 1e-12 && fit.free == 192.0, "{}", fit.chi2);
+        }
+    }
+
+    /// On a line fewer numbers than eight are determined, and what is left has so many more freedoms.
+    #[test]
+    fn points_on_a_line_determine_fewer_numbers() {
+        let motion = Motion::new([0.6, 0.2, 0.75], W);
+        let mut scene = Scene::new(motion, 50, 0.6, 1e-3, 3, |x, y, _| along(x, y));
+        scene.points.iter_mut().for_each(|point| point[1] = 0.0);
+        scene.flow = scene.points.iter().map(|&point| motion.plane_flow(point, along(point[0], 0.0))).collect();
+        let fit = PlaneFlow::fit(&scene.observations()).unwrap();
+        assert!(fit.free > 92.0 && fit.chi2 < 1e-6, "{} {}", fit.free, fit.chi2);
+    }
+}

@@ -1,0 +1,116 @@
+//! What is known beforehand of the rotation, and whether the flow contradicts it.
+//!
+//! A rotation `w0` of information `L` beside flow whose information about `(psi, w)` is `D` leads to `w`,
+//! from which both pull with the same force `g = L (w0 - w)`. The flow alone would lead to a motion that is
+//! away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right,
+//! `d` has the covariance `L^-1 + C_ww` with that of the flow alone.
+
+use super::degenerate::by_chance;
+use crate::motion3d::kernels::{add_to_rotation, equations};
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::options::RotationPrior;
+use crate::motion3d::model::result::Alternative;
+use crate::motion3d::solver::covariance::{Matrix5, inverse};
+use crate::motion3d::solver::refine::{Effort, refine};
+use nalgebra::{Matrix3, SVector, Vector3};
+
+/// A rotation known beforehand, with the inverse of its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub rotation: Vector3<f64>,
+    pub information: Matrix3<f64>,
+}
+
+impl Known {
+    /// `None` unless everything is finite and the covariance positive definite.
+    pub fn new(prior: &RotationPrior) -> Option<Self> {
+        let covariance = Matrix3::from_fn(|i, j| 0.5 * (prior.covariance[i][j] + prior.covariance[j][i]));
+        let known = Self { rotation: prior.rotation.into(), information: covariance.cholesky()?.inverse() };
+        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
+    }
+
+    /// `(w0 - w)` times the information, and the square of the difference in its units.
+    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let off = self.rotation - w;
+        let pull = self.information * off;
+        (pull, off.dot(&pull))
+    }
+}
+
+/// What a motion's covariance is made of: `own`, in which errors that the information takes for independent
+/// may go together, times `wider`, and what all flow has in `common`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Grown {
+    pub own: Matrix5,
+    pub wider: f64,
+    pub common: Matrix5,
+}
+
+impl Grown {
+    /// Together.
+    pub fn covariance(&self) -> Matrix5 {
+        self.own * self.wider + self.common
+    }
+}
+
+/// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains
+/// it, or where the flow alone does not determine a motion.
+///
+/// `information`: of the flow and of the known rotation together.
+pub(crate) fn contradiction(
+    known: &Known,
+    w: &Vector3<f64>,
+    information: &Matrix5,
+    told: &Grown,
+) -> Option<SVector<f64, 5>> {
+    let mut of_flow = *information;
+    add_to_rotation(&mut of_flow, &known.information, -1.0);
+    let alone = inverse(&of_flow)?;
+    let force = known.pull(w).0;
+    let before = known.information.cholesky()?.inverse();
+    let apart = (before + alone.fixed_view::<3, 3>(2, 2)) * force;
+    // What errors do to the motion they do to that of the flow alone, which nothing holds back, the more.
+    let freed = alone * information;
+    let own = freed * told.own * freed.transpose() + alone - freed * alone;
+    // Of both only the flow's noise may be larger than it is told.
+    let spread = own * told.wider + freed * told.common * freed.transpose();
+    let expected = before + spread.fixed_view::<3, 3>(2, 2);
+    let expected = 0.5 * (expected + expected.transpose());
+    let square = apart.dot(&expected.cholesky()?.solve(&apart));
+    (!by_chance(square, 3.0)).then(|| alone.fixed_columns::<3>(2) * force)
+}
+
+/// The motion that the flow tells by itself, the nearest one to `motion`, and how much less likely it is with
+/// the known rotation.
+pub(crate) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternative {
+    let mut alone = inliers.clone();
+    alone.prior = None;
+    let found = refine(&alone, *motion, None, Effort::of(inliers.n)).motion;
+    let cost = |motion: &Motion| equations(inliers, motion, &tangents(&motion.u()), None).cost;
+    Alternative { motion: found, excess: cost(&found) - cost(motion) }
+}
+
+/// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to
+/// be added to that, and what the flow tells by itself.
+pub(crate) fn rotation_contradiction(
+    known: &Known,
+    w: &Vector3<f64>,
+    plain: &Matrix3<f64>,
+    own: &Matrix3<f64>,
+    common: &Matrix3<f64>,
+) -> Option<(Matrix3<f64>, Alternative)> {
+    // With a direction that nothing depends on.
+    let whole = |rotation: &Matrix3<f64>, direction: f64| {
+        let mut matrix = Matrix5::identity() * direction;
+        matrix.fixed_view_mut::<3, 3>(2, 2).copy_from(rotation);
+        matrix
+    };
+    let information = whole(&plain.cholesky()?.inverse(), 1.0);
+    let told = Grown { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
+    let apart = contradiction(known, w, &information, &told)?.fixed_rows::<3>(2).into_owned();
+    let (alone, (force, before)) = (w - apart, known.pull(w));
+    let excess = known.pull(&alone).1 - before - force.dot(&apart);
+    let motion = Motion { translation: [f64::NAN; 3], rotation: alone.into() };
+    Some((apart * apart.transpose(), Alternative { motion, excess }))
+}

@@ -1,0 +1,217 @@
+//! How far a motion can be trusted.
+
+use super::cheirality::opposite;
+use super::confidence_region::{Farther, plausible_beyond};
+use super::degenerate::twin;
+use super::report::Solution;
+use super::smaller_rotation::plausible_less_turned;
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::equations;
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::result::{Alternative, Status};
+use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::robust::Rival;
+use crate::motion3d::solver::covariance::direction_deviation;
+use crate::motion3d::solver::likelihood::SAME;
+use crate::motion3d::solver::starts::SEARCHED;
+use nalgebra::{SMatrix, SymmetricEigen};
+
+/// Below so many points several motions may explain them exactly.
+const FEW: usize = 12;
+
+/// Standard deviation of the direction, degrees, beyond which it is not known.
+pub(crate) const WIDE: f64 = 20.0;
+
+/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are
+/// [`SPACING`] degrees apart, half of that from one of them.
+pub(crate) const FAR: f64 = 4.0;
+pub(crate) const SPACING: f64 = 4.0;
+
+/// The same in the estimate's own deviations, for directions that the smoothed weights do not exclude.
+const CONSISTENT: f64 = 3.0;
+
+/// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger
+/// still, it is the valley that is looked for.
+const MOST: f64 = 1.5;
+
+/// Most points that are asked again where few leave a doubt.
+const ASKED_AGAIN: usize = 16_000;
+
+/// The angle, degrees, beyond which few points are not asked.
+const BLIND: f64 = 20.0;
+
+/// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
+const EXCLUDED: f64 = 25.0;
+
+/// Least eigenvalue of the information, relative to what points all over the screen would give, that is not
+/// rounding.
+const DETERMINED: f64 = 1e-12;
+
+/// What else speaks for or against a motion.
+pub(crate) struct Evidence<'a> {
+    /// Maximum likelihood's motion, and its depths behind the camera in squared deviations.
+    pub likelihood: (Motion, f64),
+    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
+    pub deviation: f64,
+    /// Whether the depths are mostly noise.
+    pub low: bool,
+    /// Whether the covariance tells the shape of what is not known.
+    pub told: bool,
+    /// Whether the noise is what the motion leaves.
+    pub unknown: bool,
+    /// Motions that other points obey.
+    pub rivals: &'a [Rival],
+    /// Another solution that is about as likely.
+    pub undecided: Option<Alternative>,
+}
+
+/// Finds what else could be true: the status, and the other motions among the alternatives.
+pub(crate) fn judge(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &mut Solution,
+    evidence: &Evidence<'_>,
+    rng: CounterRng,
+) {
+    let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
+    // Where even that is not finite, no other motion is distinct.
+    let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
+    let planar = planar(intake, inliers, solution, evidence, distinct);
+    let turned = opposite(inliers, &solution.motion, rng.stream(0));
+    if let Some((motion, excess)) = turned {
+        solution.alternatives.insert(0, Alternative { motion, excess });
+    }
+    if let Some(other) = evidence.undecided {
+        solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
+        solution.alternatives.insert(0, other);
+    }
+    let others = evidence.rivals.iter().filter(|rival| rival.others);
+    let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
+    for (place, rival) in others.clone().enumerate() {
+        solution.alternatives.retain(|known| known.motion.angle_to(&rival.motion).to_degrees() > same);
+        let place = place.min(solution.alternatives.len());
+        solution.alternatives.insert(place, Alternative { motion: rival.motion, excess: rival.excess });
+    }
+    once(&mut solution.alternatives);
+    let motions = [solution.motion, evidence.likelihood.0];
+    solution.status = if inliers.n < FEW {
+        Status::FewPoints
+    } else if inliers.unseen() > 0 {
+        // Turned by so much that points are behind the camera: such a motion was not told by all of them.
+        Status::IllConditioned
+    } else if !determined(inliers, &solution.motion) {
+        solution.covariance = None;
+        Status::IllConditioned
+    } else if planar || others.count() > 0 {
+        Status::Ambiguous
+    } else if !evidence.told
+        || deviation.is_nan()
+        || deviation > WIDE
+        || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
+        || otherwise_turned(intake, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
+    {
+        Status::IllConditioned
+    } else if turned.is_some() || evidence.undecided.is_some() {
+        Status::Ambiguous
+    } else if evidence.low {
+        Status::LowSnr
+    } else {
+        Status::Ok
+    };
+}
+
+/// Keeps each motion the first time that it comes.
+fn once(alternatives: &mut Vec<Alternative>) {
+    let mut kept: Vec<Alternative> = Vec::with_capacity(alternatives.len());
+    alternatives.retain(|other| {
+        let new = kept.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > SAME);
+        kept.extend(new.then_some(*other));
+        new
+    });
+}
+
+/// Whether the points are one plane that has another motion, too; that is then the first alternative.
+fn planar(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &mut Solution,
+    evidence: &Evidence<'_>,
+    distinct: f64,
+) -> bool {
+    let Some(twin) = twin(intake, inliers, &solution.motion, distinct, evidence.unknown) else { return false };
+    let excess = twin.behind - evidence.likelihood.1;
+    if excess >= EXCLUDED {
+        return false;
+    }
+    // Found again with the rotation of the first taken out it is the same to some digits only.
+    let same = distinct.max(SAME.to_radians());
+    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > same);
+    solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
+    true
+}
+
+/// Whether directions explain the flow as well as the estimate that are farther than the covariance has it:
+/// in a valley that bends or widens, that of its lowest point tells too little.
+///
+/// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked
+/// at; of the points that the search sees they are that much larger. Where few of many points leave a doubt,
+/// [`ASKED_AGAIN`] of them are asked: with noisy depths the deviation of the few grows faster than by the
+/// root of their number.
+fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
+    let beyond = |most: usize| {
+        let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
+        plausible_beyond(inliers, motions, farther(own, likelihood, fewer), most, rng)
+    };
+    if inliers.n <= SEARCHED {
+        return beyond(SEARCHED);
+    }
+    // Where the deviation of few is too large for anything to lie beyond it, these tell nothing.
+    let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
+    (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
+}
+
+/// The same for motions that turn quite otherwise.
+fn otherwise_turned(
+    intake: &Intake<'_>,
+    inliers: &Observations,
+    solution: &Solution,
+    (own, likelihood): (f64, f64),
+    rng: CounterRng,
+) -> bool {
+    let fewer = (inliers.n as f64 / inliers.n.min(ASKED_AGAIN) as f64).sqrt();
+    let farther = farther(own, likelihood, fewer);
+    plausible_less_turned(intake, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
+}
+
+/// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
+fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
+    Farther {
+        residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
+        chance: CONSISTENT * own * fewer + SPACING,
+    }
+}
+
+/// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the
+/// epipole, do not, whatever their noise seems to add.
+pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
+    let tangent = tangents(&motion.u());
+    let h = equations(observations, motion, &tangent, None).h;
+    let (mut depth, mut turn) = (0.0, 0.0);
+    for k in 0..observations.n {
+        let row = observations.row(k);
+        let t = row.g * motion.u();
+        let s2 = t.norm_squared();
+        if s2 > observations.floor {
+            let nu = t.dot(&(row.f - row.r * motion.w())) / s2;
+            depth += nu * nu * row.g.norm_squared();
+        }
+        turn += row.r.norm_squared();
+    }
+    let scale = |i: usize| if i < 2 { depth } else { turn };
+    if !(depth > 0.0 && turn > 0.0 && depth.is_finite() && turn.is_finite()) {
+        return false;
+    }
+    let relative = SMatrix::<f64, 5, 5>::from_fn(|i, j| h[(i, j)] / (scale(i) * scale(j)).sqrt());
+    SymmetricEigen::new(relative).eigenvalues.min() > DETERMINED
+}

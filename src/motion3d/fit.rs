@@ -1,0 +1,315 @@
+//! From the points that obey one motion to what is told about it.
+
+use super::diagnostics::degenerate::{by_chance, turning, turning_in_unknown_noise};
+use super::diagnostics::inliers::of_estimated_noise;
+use super::diagnostics::nonlinearity::beyond_theory;
+use super::diagnostics::report::{Solution, report, rotation_report};
+use super::diagnostics::rotation_prior::of_flow_alone;
+use super::diagnostics::status::{Evidence, judge};
+use super::estimate::Scaled;
+use super::model::motion::Motion;
+use super::model::observations::Observations;
+use super::model::options::{Method, MotionOptions};
+use super::model::result::{Alternative, MotionEstimate, Status};
+use super::model::whitening::Intake;
+use super::robust::{Consensus, Rival, larger};
+use super::solver::covariance::{Plugged, direction_deviation, plugged};
+use super::solver::efficient::{Efficient, WeightDepths, unsolved};
+use super::solver::finite_rotation::{matters, settle, shift};
+use super::solver::likelihood::{Candidate, choose, different, minima};
+use super::solver::minima::{DISTINCT, Trial, close, smoothed};
+use super::solver::profile_likelihood::Valley;
+use super::solver::refine::{Effort, Minimum, refine};
+use super::solver::smoothing::DepthSmoother;
+use crate::math::random::CounterRng;
+use rayon::prelude::*;
+
+/// Number of points from which on [`Method::Auto`] smooths depths.
+const SMOOTHED: usize = 30;
+
+/// Times that a minimum is chosen anew once its own rotation is taken out of displacements.
+const CHOICES: usize = 4;
+
+/// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by
+/// which a motion is another one than that whose rotation is taken out.
+const AGAIN: usize = 2;
+const ASTRAY: f64 = 1.0;
+
+/// The points that obey one motion, and what is asked of them.
+pub(crate) struct Task<'a, 'b> {
+    pub intake: &'a Intake<'b>,
+    pub options: &'a MotionOptions,
+    /// What a robust search found.
+    pub known: Option<&'a Consensus>,
+    pub rng: CounterRng,
+}
+
+/// A motion with what speaks for and against it.
+struct Solved {
+    solution: Solution,
+    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
+    deviation: f64,
+    low: bool,
+    /// Whether the covariance tells the shape of what is not known.
+    told: bool,
+    undecided: Option<Alternative>,
+}
+
+impl Task<'_, '_> {
+    /// Estimates on the `inliers` of all points.
+    pub fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
+        let flow = self.intake.flow;
+        let mut found = self.begin(&inliers, scaled.unknown);
+        let Some(&first) = found.first() else {
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
+        };
+        settle(self.intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
+        let cost = found[0].equations.cost - inliers.pulled(&found[0].motion.w());
+        if let Some(told) = self.without_translation(scaled, &mut inliers, cost) {
+            return told;
+        }
+        if scaled.unknown {
+            let sigma = (cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
+            rescaled(scaled, &mut inliers, sigma);
+            found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::of(inliers.n))).collect();
+        }
+        let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
+        let mut solved = self.solved(&inliers, &candidates, made);
+        for round in 0..=AGAIN {
+            if shift(self.intake, &inliers, &solved.solution.motion) <= ASTRAY {
+                break;
+            }
+            // Of what has another rotation taken out nothing is told.
+            if round == AGAIN {
+                solved.told = false;
+                break;
+            }
+            (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
+        }
+        self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
+        solved.undecided = solved.undecided.or_else(|| contested(&candidates, &solved.solution));
+        if solved.solution.contradicted(&inliers) {
+            solved.undecided = Some(of_flow_alone(&inliers, &solved.solution.motion));
+        }
+        solved.solution.alternatives = close(&candidates, inliers.n)[1..]
+            .iter()
+            .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
+            .collect();
+        let rivals: &[Rival] = self.known.map_or(&[], |known| &known.rivals);
+        let Solved { mut solution, deviation, low, told, undecided } = solved;
+        let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
+        let unknown = scaled.unknown;
+        let evidence = Evidence { likelihood, deviation, low, told, unknown, rivals, undecided };
+        judge(self.intake, &inliers, &mut solution, &evidence, self.rng.stream(4));
+        report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
+    }
+
+    /// The minima of the likelihood.
+    fn begin(&self, inliers: &Observations, unknown: bool) -> Vec<Minimum> {
+        match (&self.options.initial, self.known) {
+            (Some(initial), _) => {
+                let initial = Motion::new(initial.translation, initial.rotation);
+                vec![refine(inliers, initial, None, Effort::FULL)]
+            }
+            (None, None) => minima(inliers, unknown, self.rng.stream(2)),
+            (None, Some(known)) => again(inliers, known),
+        }
+    }
+
+    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves
+    /// of the flow. (Of all points in known noise that was asked before any motion was looked for.)
+    fn without_translation(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        cost: f64,
+    ) -> Option<MotionEstimate> {
+        let rotation = if !scaled.may_turn {
+            return None;
+        } else if scaled.unknown {
+            let rotation = turning_in_unknown_noise(inliers, cost)?;
+            let left = rotation.chi2 - inliers.pulled(&rotation.rotation);
+            let sigma = (left / (2 * inliers.n - 3) as f64).sqrt();
+            rotation.in_units(rescaled(scaled, inliers, sigma))
+        } else if self.options.robust {
+            turning(inliers)?
+        } else {
+            return None;
+        };
+        Some(rotation_report(self.intake.flow, &scaled.observations, inliers, &rotation, scaled.sigma, self.options))
+    }
+
+    /// The minima in the order of preference; the first has its own rotation taken out of the points.
+    fn chosen(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        mut found: Vec<Minimum>,
+    ) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        let (mut candidates, mut made) = self.preferred(inliers, &found);
+        for _ in 0..CHOICES {
+            let lead = candidates[0].minimum;
+            if !matters(self.intake, inliers, &lead.motion) {
+                return (candidates, made);
+            }
+            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+            (candidates, made) = self.preferred(inliers, &found);
+        }
+        // Each of two is preferred with the rotation of the other taken out: that whose own is out now is
+        // told.
+        if let Some(own) = candidates.iter().position(|other| !matters(self.intake, inliers, other.motion())) {
+            candidates[..=own].rotate_right(1);
+        }
+        (candidates, made)
+    }
+
+    /// Solves once more with the rotation taken out of the minimum that smoothed weights preferred to the
+    /// first of the `candidates`.
+    fn solved_there(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        candidates: &[Candidate],
+        preferred: &Motion,
+    ) -> (Vec<Candidate>, Solved) {
+        let mut found: Vec<Minimum> = candidates.iter().map(|candidate| candidate.minimum).collect();
+        let away = |minimum: &&Minimum| minimum.motion.angle_to(preferred);
+        if let Some(lead) = found.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied() {
+            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+        }
+        let (candidates, made) = self.chosen(scaled, inliers, found);
+        let solved = self.solved(inliers, &candidates, made);
+        (candidates, solved)
+    }
+
+    fn preferred(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        if self.options.initial.is_some() {
+            let given =
+                |minimum: &Minimum| Candidate { cost: minimum.equations.cost, fair: f64::INFINITY, minimum: *minimum };
+            return (found.iter().map(given).collect(), None);
+        }
+        choose(inliers, found, || self.smoother(inliers))
+    }
+
+    fn smoother(&self, inliers: &Observations) -> DepthSmoother {
+        DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
+    }
+
+    /// Maximum likelihood's motion or that of the smoothed weights, which are asked as well where maximum
+    /// likelihood's theory does not hold.
+    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solved {
+        let chosen = candidates[0];
+        let wanted = match self.options.method {
+            Method::Auto => inliers.n >= SMOOTHED,
+            Method::Efficient => true,
+            Method::MaximumLikelihood => false,
+        };
+        let plugged = plugged(&chosen.minimum.equations);
+        let low = plugged.is_none();
+        let several = close(candidates, inliers.n).len() > 1;
+        let Minimum { motion, tangent, .. } = &chosen.minimum;
+        let valley = Valley { observations: inliers, motion, tangent };
+        let beyond = |plugged: &Plugged| {
+            beyond_theory(inliers, &chosen.minimum, plugged) || valley.bent(&plugged.likelihood) > 0
+        };
+        let astray = plugged.as_ref().is_some_and(beyond);
+        let trial = if wanted || low || several || astray {
+            smoothed(inliers, self.options, candidates, made, || self.smoother(inliers))
+        } else {
+            None
+        };
+        let (improved, mut undecided) = trial.map_or((None, None), |Trial { best, undecided }| (Some(best), undecided));
+        if let Some(best) = improved.as_ref().filter(|_| !wanted) {
+            undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
+        }
+        let mut improved = improved.filter(|_| wanted || low || astray);
+        // Of maximum likelihood alone nothing is told beyond its theory.
+        let mut told = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
+        if let Some(best) = &mut improved {
+            (best.covariance, told) = best.lengthened(inliers, || self.smoother(inliers));
+        }
+        // From where they lead nowhere the minimum is a spurious one.
+        told &= improved.is_some() || !wanted;
+        let unknown = low && improved.is_none();
+        let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
+        if unknown {
+            let mut smoother = self.smoother(inliers);
+            let at = unsolved(inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
+            solution.covariance = at.map(|at| at.covariance);
+        }
+        let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+        Solved { solution, deviation, low, told, undecided }
+    }
+
+    /// Takes into account what a linear theory of independent points of known noise that all obey leaves out.
+    /// `cost`: what maximum likelihood leaves.
+    fn widen(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
+        if let Some(known) = self.known {
+            solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
+        }
+        let common = solution.in_common(inliers, self.intake.flow, &self.options.common);
+        let length = self.options.correlation_length.filter(|length| *length > 0.0);
+        solution.go_together(inliers, self.intake.flow, length);
+        let wider = match (scaled.unknown, self.known) {
+            (true, known) => of_estimated_noise(inliers.n, known.is_some()),
+            // The residuals tell how large errors are that go together.
+            (false, _) if length.is_some() => 1.0,
+            (false, None) => misfit(inliers, cost),
+            // What strays leave among residuals that are cut off is accounted for.
+            (false, Some(_)) => larger(&scaled.observations, &solution.motion),
+        };
+        solution.widen(wider, common);
+    }
+}
+
+/// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with
+/// its own; or one that is where depths behind the camera count only as far as noise does not explain them:
+/// of depths that are hardly any, half are behind it.
+fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternative> {
+    let first = &candidates[0];
+    let preferred = candidates.get(1).filter(|other| other.cost < first.cost);
+    let deviation = DISTINCT * solution.covariance.as_ref().map_or(0.0, direction_deviation);
+    let apart = |other: &&Candidate| other.motion().angle_to(&solution.motion).to_degrees() > deviation;
+    let fairer = || candidates.iter().filter(|other| other.fair < first.fair).filter(apart);
+    let other = preferred.or_else(|| fairer().min_by(|a, b| a.fair.total_cmp(&b.fair)))?;
+    Some(Alternative { motion: *other.motion(), excess: other.cost - first.cost })
+}
+
+/// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it:
+/// whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was
+/// missed), the motion is off by as much (R. Birge 1932).
+fn misfit(inliers: &Observations, cost: f64) -> f64 {
+    let free = inliers.n.saturating_sub(5) as f64 / inliers.shared;
+    if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
+}
+
+/// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may
+/// be true.
+fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
+    let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+    let deviation = deviation.max(direction_deviation(&best.covariance));
+    let apart = best.motion.angle_to(chosen.motion()).to_degrees() > DISTINCT * deviation;
+    apart.then_some(Alternative { motion: best.motion, excess: 0.0 })
+}
+
+/// The minimum that a robust search led to, and those that other minima for the same points lead to.
+///
+/// Among many strays that motion is the likeliest as it is.
+fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    if known.many {
+        return vec![refine(inliers, known.motion, None, Effort::NONE)];
+    }
+    let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
+    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
+    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::of(inliers.n))).collect())
+}
+
+/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied
+/// with.
+fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
+    let before = scaled.sigma;
+    scaled.take(sigma);
+    let factor = before / scaled.sigma;
+    inliers.rescale(factor);
+    factor
+}

@@ -1,0 +1,276 @@
+//! The estimating equation with given depths in its weights.
+
+use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
+use crate::motion3d::diagnostics::rotation_prior::Known;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::simd::{Kernel, Lanes, dispatch};
+use nalgebra::{Matrix2x3, SMatrix};
+use std::ops::AddAssign;
+
+/// `sum W^t W` for given depths in the weights, as the upper triangle.
+struct WeightSums<'a> {
+    planes: Planes<'a>,
+    nu: &'a [f64],
+    motion: &'a Motion,
+    tangent: &'a Matrix2x3<f64>,
+    floor: f64,
+    /// `kappa^2`, the largest variance of the direction: weights are damped within that of the epipole.
+    spread: f64,
+}
+
+/// `1 / (s^2 + g kappa^2)` with `g = |G|^2 / 2`, and nothing at the epipole: what damped weights have for `1
+/// / s^2`.
+#[inline(always)]
+fn damped<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, s2: V, floor: V, half_spread: V) -> V {
+    let mut size = V::zero();
+    for p in 0..6 {
+        let g: V = at(planes, p, i);
+        size = g.mul_add(g, size);
+    }
+    V::select(floor.lt(s2), V::constant(1.0) / size.mul_add(half_spread, s2), V::zero())
+}
+
+impl WeightSums<'_> {
+    /// `s D(nu)` and what else the points' equations need.
+    #[inline(always)]
+    fn row<V: Lanes<Scalar = f64>>(
+        planes: &Planes<'_>,
+        nu: &[f64],
+        i: usize,
+        motion: &Everywhere<V>,
+        axes: &[[V; 3]; 2],
+        floor: V,
+    ) -> (Seen<V>, [V; 5]) {
+        let seen = see(planes, i, motion, floor);
+        let nu = V::load(&nu[i..]);
+        let a = turn(&seen.t, dot(planes, 0, i, &axes[0]), dot(planes, 3, i, &axes[0]));
+        let b = turn(&seen.t, dot(planes, 0, i, &axes[1]), dot(planes, 3, i, &axes[1]));
+        let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
+        (seen, d)
+    }
+}
+
+impl Kernel<f64> for WeightSums<'_> {
+    type Output = [f64; 15];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 15] {
+        let motion = Everywhere::<V>::new(self.motion);
+        let axes = both_axes(self.tangent);
+        let (floor, half_spread) = (V::splat(self.floor), V::splat(0.5 * self.spread));
+        let mut sums = [V::zero(); 15];
+        for i in (0..self.planes[0].len()).step_by(V::LANES) {
+            let (seen, d) = Self::row(&self.planes, self.nu, i, &motion, &axes, floor);
+            // Each of both weights is damped: `s^2 / (s^2 + g kappa^2)`.
+            let inverse = damped(&self.planes, i, seen.s2, floor, half_spread);
+            let both = inverse * inverse * seen.s2;
+            let mut k = 0;
+            for row in 0..5 {
+                let weighted = d[row] * both;
+                for column in row..5 {
+                    sums[k] = weighted.mul_add(d[column], sums[k]);
+                    k += 1;
+                }
+            }
+        }
+        sums.map(total)
+    }
+}
+
+/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights, which are
+/// damped within `kappa^2 = spread` of the epipole.
+pub(crate) fn information(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+    spread: f64,
+) -> SMatrix<f64, 5, 5> {
+    let sums = over_chunks(observations, |range| {
+        let planes = observations.slices(&range);
+        let nu = &nu[range];
+        dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread })
+    });
+    let mut h = SMatrix::<f64, 5, 5>::zeros();
+    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
+        h[(i, j)] = *value;
+        h[(j, i)] = *value;
+    }
+    if let Some(known) = &observations.prior {
+        add_to_rotation(&mut h, &known.information, 1.0);
+    }
+    h
+}
+
+/// `sum W^t D` of weights with given depths and the rows' true depths, of which those of the points' own flow
+/// are an estimate.
+struct SlopeSums<'a> {
+    weights: WeightSums<'a>,
+    /// How much of each point's own depth is in that of its weight.
+    share: &'a [f64],
+}
+
+const SLOPES: usize = 21;
+
+impl Kernel<f64> for SlopeSums<'_> {
+    type Output = [f64; SLOPES];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; SLOPES] {
+        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.weights;
+        let motion = Everywhere::<V>::new(motion);
+        let axes = both_axes(tangent);
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
+        let mut sums = [V::zero(); SLOPES];
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let (seen, [pulled, pushed, ..]) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
+            let a = turn(&seen.t, dot(&planes, 0, i, &axes[0]), dot(&planes, 3, i, &axes[0]));
+            let b = turn(&seen.t, dot(&planes, 0, i, &axes[1]), dot(&planes, 3, i, &axes[1]));
+            // The noise of the own depth is in both factors, as far as it is in the weight.
+            let own = seen.along * seen.inverse;
+            let both = V::load(&nu[i..]).mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
+            let weight = damped(&planes, i, seen.s2, floor, half_spread);
+            let psi = both * weight;
+            sums[0] = (psi * a).mul_add(a, sums[0]);
+            sums[1] = (psi * a).mul_add(b, sums[1]);
+            sums[2] = (psi * b).mul_add(b, sums[2]);
+            let (own_a, own_b) = (own * a * weight, own * b * weight);
+            let (weight_a, weight_b) = (pulled * weight, pushed * weight);
+            let mut k = 15;
+            for row in 0..3 {
+                let q = seen.q[row];
+                sums[3 + row] = weight_a.mul_add(q, sums[3 + row]);
+                sums[6 + row] = weight_b.mul_add(q, sums[6 + row]);
+                sums[9 + row] = own_a.mul_add(q, sums[9 + row]);
+                sums[12 + row] = own_b.mul_add(q, sums[12 + row]);
+                let weighted = q * weight;
+                for column in row..3 {
+                    sums[k] = weighted.mul_add(seen.q[column], sums[k]);
+                    k += 1;
+                }
+            }
+        }
+        sums.map(total)
+    }
+}
+
+/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without
+/// bias: true depths are taken from the points' own flow, of which `share` is in `nu`. Weights are damped
+/// within `kappa^2 = spread` of the epipole.
+pub(crate) fn slope(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+    share: &[f64],
+    spread: f64,
+) -> SMatrix<f64, 5, 5> {
+    let sums = over_chunks(observations, |range| {
+        let planes = observations.slices(&range);
+        let nu = &nu[range.clone()];
+        let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
+        dispatch(observations.level, SlopeSums { weights, share: &share[range] })
+    });
+    let mut slope = SMatrix::<f64, 5, 5>::zeros();
+    (slope[(0, 0)], slope[(0, 1)], slope[(1, 0)], slope[(1, 1)]) = (sums[0], sums[1], sums[1], sums[2]);
+    let mut k = 15;
+    for i in 0..3 {
+        (slope[(0, 2 + i)], slope[(1, 2 + i)]) = (sums[3 + i], sums[6 + i]);
+        (slope[(2 + i, 0)], slope[(2 + i, 1)]) = (sums[9 + i], sums[12 + i]);
+        for j in i..3 {
+            (slope[(2 + i, 2 + j)], slope[(2 + j, 2 + i)]) = (sums[k], sums[k]);
+            k += 1;
+        }
+    }
+    if let Some(known) = &observations.prior {
+        add_to_rotation(&mut slope, &known.information, 1.0);
+    }
+    slope
+}
+
+/// `sum V^t h` of the bilinear residual `s e = sum_i u_i (h_i0 + sum_j h_ij w_j)`.
+struct BilinearSums<'a>(WeightSums<'a>);
+
+const BILINEAR_SUMS: usize = 60;
+
+impl Kernel<f64> for BilinearSums<'_> {
+    type Output = [f64; BILINEAR_SUMS];
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; BILINEAR_SUMS] {
+        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.0;
+        let motion = Everywhere::<V>::new(motion);
+        let axes = both_axes(tangent);
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
+        let mut sums = [[V::zero(); 12]; 5];
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let (seen, d) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
+            // V = W s / (s^2 + g kappa^2), and nothing at the epipole.
+            let scale = damped(&planes, i, seen.s2, floor, half_spread);
+            for c in 0..3 {
+                let column: [V; 2] = [at(&planes, c, i), at(&planes, 3 + c, i)];
+                let mut h = [turn(&column, at(&planes, 12, i), at(&planes, 13, i)) * scale; 4];
+                for j in 0..3 {
+                    h[1 + j] = -turn(&column, at(&planes, 6 + j, i), at(&planes, 9 + j, i)) * scale;
+                }
+                for row in 0..5 {
+                    for j in 0..4 {
+                        sums[row][4 * c + j] = h[j].mul_add(d[row], sums[row][4 * c + j]);
+                    }
+                }
+            }
+        }
+        let mut out = [0.0; BILINEAR_SUMS];
+        for (to, lanes) in out.iter_mut().zip(sums.into_iter().flatten()) {
+            *to = total(lanes);
+        }
+        out
+    }
+}
+
+/// The frozen estimating equation `sum V^t (s e)(u, w)`: five values, each bilinear in `u` and `(1, w)`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bilinear {
+    sums: [f64; BILINEAR_SUMS],
+    prior: Option<Known>,
+}
+
+impl Bilinear {
+    /// With `D(nu)` at a motion as weights, damped within `kappa^2 = spread` of the epipole.
+    pub fn new(
+        observations: &Observations,
+        motion: &Motion,
+        tangent: &Matrix2x3<f64>,
+        nu: &[f64],
+        spread: f64,
+    ) -> Self {
+        let sums = over_chunks(observations, |range| {
+            let planes = observations.slices(&range);
+            let nu = &nu[range];
+            let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
+            dispatch(observations.level, BilinearSums(weights))
+        });
+        Self { sums, prior: observations.prior }
+    }
+
+    /// Its value at a motion, and its slopes along `tangent` and `w`.
+    pub fn at(&self, motion: &Motion, tangent: &Matrix2x3<f64>) -> (SMatrix<f64, 5, 1>, SMatrix<f64, 5, 5>) {
+        let (u, w) = (motion.translation, motion.rotation);
+        let (mut value, mut slope) = (SMatrix::<f64, 5, 1>::zeros(), SMatrix::<f64, 5, 5>::zeros());
+        for row in 0..5 {
+            let h = |i: usize, j: usize| self.sums[12 * row + 4 * i + j];
+            for i in 0..3 {
+                let along = h(i, 0) + (0..3).map(|j| h(i, 1 + j) * w[j]).sum::<f64>();
+                value[row] += u[i] * along;
+                slope[(row, 0)] += tangent[(0, i)] * along;
+                slope[(row, 1)] += tangent[(1, i)] * along;
+                for j in 0..3 {
+                    slope[(row, 2 + j)] += u[i] * h(i, 1 + j);
+                }
+            }
+        }
+        if let Some(known) = &self.prior {
+            value.fixed_rows_mut::<3>(2).add_assign(&known.pull(&motion.w()).0);
+            add_to_rotation(&mut slope, &known.information, -1.0);
+        }
+        (value, slope)
+    }
+}

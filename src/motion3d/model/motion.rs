@@ -1,0 +1,277 @@
+//! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
+
+use super::camera::Intrinsics;
+use super::derotation::HalfTurn;
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
+
+/// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Direction `u` of the translation, of length 1 (NaN where there is none).
+    pub translation: [f64; 3],
+    /// Rotation rate `w`, rad/frame.
+    pub rotation: [f64; 3],
+}
+
+/// A screen: where points lie and how their flow is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Projection {
+    /// The plane at distance 1: `eta = (x, y, 1)`, `nu = 1 / Z`.
+    #[default]
+    Plane,
+    /// The unit sphere: `eta` is the bearing, `nu = 1 / range`.
+    Sphere,
+}
+
+/// The two rows of `G` and of `R` at one point: `f = nu G u + R w`, in screen axes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rows {
+    pub g: Matrix2x3<f64>,
+    pub r: Matrix2x3<f64>,
+}
+
+pub(crate) fn cross_matrix(a: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+/// Two unit vectors `e1`, `e2` with `e1 x e2 = direction` (of length 1), as rows; the same for the same
+/// direction.
+pub(crate) fn tangents(direction: &Vector3<f64>) -> Matrix2x3<f64> {
+    // The axis least along the direction keeps the cross product well away from zero.
+    let axis = direction.iamin();
+    let first = Vector3::ith(axis, 1.0).cross(direction).normalize();
+    let second = direction.cross(&first);
+    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
+}
+
+impl Rows {
+    /// On the plane at distance 1, axes x and y.
+    pub fn plane([x, y]: [f64; 2]) -> Self {
+        Self {
+            g: Matrix2x3::new(1.0, 0.0, -x, 0.0, 1.0, -y),
+            r: Matrix2x3::new(-x * y, 1.0 + x * x, -y, -(1.0 + y * y), x * y, x),
+        }
+    }
+
+    /// On the sphere at the bearing `eta`, axes `e1`, `e2` of [`tangents`]: `G = E (I - eta eta^t) = E`, `R =
+    /// -G [eta]x`.
+    pub fn sphere(eta: &Vector3<f64>) -> Self {
+        let g = tangents(eta);
+        Self { g, r: -g * cross_matrix(eta) }
+    }
+}
+
+impl Motion {
+    /// A motion along `direction` (of any length above 0; only its direction counts) with the rotation rate
+    /// `w`, rad/frame.
+    pub fn new(direction: [f64; 3], rotation: [f64; 3]) -> Self {
+        Self { translation: Vector3::from(direction).normalize().into(), rotation }
+    }
+
+    pub(crate) fn of(u: &Vector3<f64>, w: &Vector3<f64>) -> Self {
+        Self { translation: (*u).into(), rotation: (*w).into() }
+    }
+    pub(crate) fn u(&self) -> Vector3<f64> {
+        self.translation.into()
+    }
+    pub(crate) fn w(&self) -> Vector3<f64> {
+        self.rotation.into()
+    }
+
+    /// The same flow with all depths of the other sign.
+    pub(crate) fn reversed(&self) -> Self {
+        Self { translation: self.translation.map(|value| -value), rotation: self.rotation }
+    }
+
+    /// The same with a translation of length 1.
+    pub(crate) fn normalized(&self) -> Self {
+        Self::new(self.translation, self.rotation)
+    }
+
+    /// This motion after a small step `(psi, w)` in the tangent axes of its translation.
+    pub(crate) fn stepped(&self, tangent: &Matrix2x3<f64>, step: &SMatrix<f64, 5, 1>) -> Self {
+        let u = self.u() + tangent.transpose() * Vector2::new(step[0], step[1]);
+        Self::of(&u.normalize(), &(self.w() + Vector3::new(step[2], step[3], step[4])))
+    }
+
+    /// Angle between the translation directions, rad, 0 to pi.
+    pub fn angle_to(&self, other: &Self) -> f64 {
+        let (a, b) = (self.u(), other.u());
+        a.cross(&b).norm().atan2(a.dot(&b))
+    }
+
+    /// Flow `(u, v)` at `(x, y)` of the plane at distance 1 of a point with the inverse depth `nu`: equation
+    /// (1).
+    pub fn plane_flow(&self, point: [f64; 2], inverse_depth: f64) -> [f64; 2] {
+        let rows = Rows::plane(point);
+        (rows.g * self.u() * inverse_depth + rows.r * self.w()).into()
+    }
+
+    /// Flow at a place of the picture, px with a camera, else as [`Motion::plane_flow`].
+    pub fn picture_flow(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
+        let Some(camera) = camera else { return self.plane_flow(point, inverse_depth) };
+        let flow = self.plane_flow(camera.to_plane(point), inverse_depth);
+        (camera.unscale() * Vector2::from(flow)).into()
+    }
+
+    /// Displacement over the whole frame of a place of the first view, px with a camera, else on the plane at
+    /// distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the
+    /// point is behind the camera.
+    pub fn picture_displacement(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
+        let turn = HalfTurn::new(&self.w());
+        let Some(camera) = camera else { return turn.displacement(&self.u(), point, inverse_depth).into() };
+        (camera.unscale() * turn.displacement(&self.u(), camera.to_plane(point), inverse_depth)).into()
+    }
+
+    /// Flow of a unit bearing on the sphere, a 3-vector perpendicular to it: equation (1).
+    pub fn sphere_flow(&self, bearing: [f64; 3], inverse_range: f64) -> [f64; 3] {
+        let eta = Vector3::from(bearing);
+        let pull = (self.u().cross(&eta)) * inverse_range + self.w().cross(&eta).cross(&eta);
+        eta.cross(&pull).into()
+    }
+
+    /// Affine flow `(u, v, u_x, v_x, u_y, v_y)` at `(x, y)` of the plane at distance 1 of a surface with
+    /// inverse depth and slopes `(nu, nu_x, nu_y)` there.
+    pub fn affine_flow(&self, point: [f64; 2], surface: [f64; 3]) -> [f64; 6] {
+        let rows = AffineRows::new(point);
+        let m = rows.depth(&self.u()) * Vector3::from(surface) + rows.rotation * self.w();
+        m.into()
+    }
+
+    /// The rotation matrix of the whole frame, `exp([w]x)`, row by row.
+    pub fn rotation_matrix(&self) -> [[f64; 3]; 3] {
+        let matrix = *nalgebra::Rotation3::new(self.w()).matrix();
+        std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+    }
+
+    /// The displacement of the whole frame in units of the path's length: `t = V(w) u`, so that `X' = Rot X +
+    /// t / nu` for a point with `|u| = 1`.
+    ///
+    /// `V = I + (1 - cos a) / a^2 [w]x + (a - sin a) / a^3 [w]x^2`, `a = |w|`.
+    pub fn displacement(&self) -> [f64; 3] {
+        let (w, u) = (self.w(), self.u());
+        let a = w.norm();
+        // Below 1e-4 the series is exact to double precision where the closed form cancels.
+        let (first, second) = if a < 1e-4 {
+            (0.5 - a * a / 24.0, 1.0 / 6.0 - a * a / 120.0)
+        } else {
+            // 1 - cos a = 2 sin^2 (a / 2), which does not cancel.
+            (2.0 * ((0.5 * a).sin() / a).powi(2), (a - a.sin()) / (a * a * a))
+        };
+        let once = w.cross(&u);
+        (u + once * first + w.cross(&once) * second).into()
+    }
+
+    /// The essential matrix `[t]x Rot` of the frame, row by row: `eta'^t E eta = 0` for the two views'
+    /// points.
+    pub fn essential_matrix(&self) -> [[f64; 3]; 3] {
+        let rotation = *nalgebra::Rotation3::new(self.w()).matrix();
+        let matrix = cross_matrix(&Vector3::from(self.displacement())) * rotation;
+        std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+    }
+}
+
+/// The six rows of affine flow at a point: `f6 = sum_j lambda_j G_j u + R6 w`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AffineRows {
+    point: [f64; 2],
+    pub rotation: SMatrix<f64, 6, 3>,
+}
+
+impl AffineRows {
+    /// At `(x, y)` of the plane at distance 1.
+    pub fn new([x, y]: [f64; 2]) -> Self {
+        let rotation = SMatrix::<f64, 6, 3>::from_row_slice(&[
+            -x * y,
+            1.0 + x * x,
+            -y, //
+            -(1.0 + y * y),
+            x * y,
+            x, //
+            -y,
+            2.0 * x,
+            0.0, //
+            0.0,
+            y,
+            1.0, //
+            -x,
+            0.0,
+            -1.0, //
+            -2.0 * y,
+            x,
+            0.0,
+        ]);
+        Self { point: [x, y], rotation }
+    }
+
+    /// The matrix with the columns `G_0 u`, `G_1 u`, `G_2 u` of `(nu, nu_x, nu_y)`; linear in `u`.
+    pub fn depth(&self, u: &Vector3<f64>) -> SMatrix<f64, 6, 3> {
+        let [x, y] = self.point;
+        let (tx, ty) = (u.x - x * u.z, u.y - y * u.z);
+        SMatrix::<f64, 6, 3>::from_row_slice(&[
+            tx, 0.0, 0.0, //
+            ty, 0.0, 0.0, //
+            -u.z, tx, 0.0, //
+            0.0, ty, 0.0, //
+            0.0, 0.0, tx, //
+            -u.z, 0.0, ty,
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn oblique() -> Motion {
+        Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01])
+    }
+
+    fn near(got: &[f64], want: &[f64], tolerance: f64) {
+        for (got, want) in got.iter().zip(want) {
+            assert!((got - want).abs() < tolerance, "{got} is not {want}");
+        }
+    }
+
+    #[test]
+    fn published_values_of_six_numbers_and_of_the_sphere() {
+        let six = oblique().affine_flow([0.2, -0.1], [0.8, 0.3, -0.4]);
+        near(&six, &[0.337146, 0.206645, -0.483972, 0.097092, -0.197473, -0.725699], 5e-7);
+        near(&six[..2], &oblique().plane_flow([0.2, -0.1], 0.8), 1e-15);
+        near(&oblique().sphere_flow([0.48, -0.6, 0.64], 0.8), &[0.222428, 0.472128, 0.275799], 5e-7);
+    }
+
+    #[test]
+    fn screen_rows_are_the_flow_of_the_sphere() {
+        let eta = Vector3::new(0.48, -0.6, 0.64);
+        let (rows, axes, motion) = (Rows::sphere(&eta), tangents(&eta), oblique());
+        let flow = Vector3::from(motion.sphere_flow(eta.into(), 0.8));
+        let model = rows.g * motion.u() * 0.8 + rows.r * motion.w();
+        near((axes * flow).as_slice(), model.as_slice(), 1e-15);
+        near((axes.row(0).transpose().cross(&axes.row(1).transpose())).as_slice(), eta.as_slice(), 1e-15);
+    }
+
+    #[test]
+    fn affine_flow_is_the_slope_of_flow() {
+        let (motion, at, surface, h) = (oblique(), [0.3, -0.2], [0.8, 0.3, -0.4], 1e-6);
+        let flow = |x: f64, y: f64| motion.plane_flow([x, y], 0.8 + 0.3 * (x - at[0]) - 0.4 * (y - at[1]));
+        let six = motion.affine_flow(at, surface);
+        for i in 0..2 {
+            let along_x = (flow(at[0] + h, at[1])[i] - flow(at[0] - h, at[1])[i]) / (2.0 * h);
+            let along_y = (flow(at[0], at[1] + h)[i] - flow(at[0], at[1] - h)[i]) / (2.0 * h);
+            near(&[six[2 + i], six[4 + i]], &[along_x, along_y], 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_essential_matrix_holds_for_two_views() {
+        for rotation in [[0.02, -0.03, 0.01], [1e-6, 0.0, 2e-6], [0.4, 0.3, -0.2]] {
+            let motion = Motion::new([0.6, 0.2, 0.75], rotation);
+            let (essential, t) = (Matrix3::from_fn(|i, j| motion.essential_matrix()[i][j]), motion.displacement());
+            let turn = Matrix3::from_fn(|i, j| motion.rotation_matrix()[i][j]);
+            let before = Vector3::new(0.4, -0.7, 3.0);
+            let after = turn * before + Vector3::from(t) * 0.3;
+            assert!((after.transpose() * essential * before)[0].abs() < 1e-14);
+        }
+    }
+}

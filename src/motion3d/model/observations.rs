@@ -1,0 +1,294 @@
+//! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
+
+use super::derotation::HalfTurn;
+use super::motion::Rows;
+use crate::motion3d::diagnostics::rotation_prior::Known;
+use crate::motion3d::kernels::PLANES;
+use crate::simd::Level;
+use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2, Vector3};
+use rayon::prelude::*;
+
+/// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
+/// multiple of every lane count.
+pub(crate) const CHUNK: usize = 4096;
+
+/// Lanes are filled up with points of weight 0 to a multiple of this.
+const ALIGN: usize = 8;
+
+/// `|G u| / |G|` below which a point sits on the epipole and says nothing.
+const EPIPOLE: f64 = 1e-9;
+
+/// Residuals below this share of the flow are rounding.
+pub(crate) const ROUNDING: f64 = 1e-11;
+
+/// Points that are asked how far their noise is from round, and the share of them of which that is told.
+const ENOUGH: usize = 1000;
+const FAR_FROM_ROUND: f64 = 0.9;
+
+/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other,
+/// where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
+const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
+
+/// By how much residuals may grow from one of these to the next.
+pub(crate) const LESS_ROUND: f64 = 4.0;
+
+/// One point: `f = nu G u + R w + noise` with unit covariance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub g: Matrix2x3<f64>,
+    pub r: Matrix2x3<f64>,
+    pub f: Vector2<f64>,
+}
+
+/// Whitened points as planes: `g` (6), `r` (6), `f` (2), each of `stride` values, of which those after `n`
+/// are zero.
+#[derive(Debug, Clone)]
+pub(crate) struct Observations {
+    pub n: usize,
+    pub stride: usize,
+    planes: Vec<f64>,
+    /// Where the rows are those of: `(x, y, 0)` on the plane, the bearing on the sphere. Half way along a
+    /// displacement this has half of the flow's noise in it.
+    pub position: Vec<[f64; 3]>,
+    /// Where the points were given, in the same axes, for neighbourhoods and what is predicted from them:
+    /// free of the flow's noise, so that a prediction is independent of the point's residual.
+    pub site: Vec<[f64; 3]>,
+    /// Whether positions and sites are bearings.
+    pub spherical: bool,
+    /// Index of each point in what was given.
+    pub source: Vec<u32>,
+    /// `|G u|^2` below which a point gets weight 0.
+    pub floor: f64,
+    /// The instruction set of the kernels.
+    pub level: Level,
+    /// What is known of the rotation beforehand.
+    pub prior: Option<Known>,
+    /// How many points share one error: their own has the variance `1 / shared`.
+    pub shared: f64,
+    /// Whether errors of neighbours are independent.
+    pub independent: bool,
+    /// Whether flow is a displacement over a whole frame.
+    pub displaced: bool,
+    /// The rotation that was taken out of displacements.
+    pub turn: Option<HalfTurn>,
+    /// What everything was multiplied with since it was whitened.
+    units: f64,
+}
+
+impl Row {
+    /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None`
+    /// unless all is finite and `S` positive definite.
+    pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
+        let whiten = unit(covariance)?;
+        let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
+        row.values().iter().all(|value| value.is_finite()).then_some(row)
+    }
+
+    fn values(&self) -> [f64; PLANES] {
+        std::array::from_fn(|p| match p {
+            0..6 => self.g[(p / 3, p % 3)],
+            6..12 => self.r[((p - 6) / 3, p % 3)],
+            _ => self.f[p - 12],
+        })
+    }
+}
+
+impl Observations {
+    /// What a rotation costs for not being the one that is known.
+    pub fn pulled(&self, w: &Vector3<f64>) -> f64 {
+        self.prior.map_or(0.0, |known| known.pull(w).1)
+    }
+
+    /// Usable points in the order given; `source` tells where they come from. Their sites are left to be
+    /// told.
+    pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
+        let n = rows.len();
+        let stride = n.next_multiple_of(ALIGN);
+        let mut planes = vec![0.0; PLANES * stride];
+        let mut parts: Vec<_> = planes.chunks_exact_mut(stride.max(1)).map(|plane| plane.chunks_mut(CHUNK)).collect();
+        let mut chunks: Vec<Vec<&mut [f64]>> = Vec::with_capacity(n.div_ceil(CHUNK));
+        for _ in 0..n.div_ceil(CHUNK) {
+            chunks.push(parts.iter_mut().filter_map(Iterator::next).collect());
+        }
+        // One sum a chunk, added up in their order: the same on any number of threads.
+        let sum = |(rows, part): (&[Row], &mut Vec<&mut [f64]>)| {
+            let mut size = 0.0;
+            for (k, row) in rows.iter().enumerate() {
+                part.iter_mut().zip(row.values()).for_each(|(plane, value)| plane[k] = value);
+                size += row.g.norm_squared();
+            }
+            size
+        };
+        let sizes: Vec<f64> = rows.par_chunks(CHUNK).zip(&mut chunks).map(sum).collect();
+        let size: f64 = sizes.iter().sum();
+        let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
+        Self {
+            n,
+            stride,
+            planes,
+            site: Vec::new(),
+            position,
+            spherical,
+            source,
+            floor,
+            level: Level::detect(),
+            prior: None,
+            shared: 1.0,
+            independent: true,
+            displaced: false,
+            turn: None,
+            units: 1.0,
+        }
+    }
+
+    /// Takes units and what is known beforehand from other observations; these have just been whitened.
+    pub fn like(&mut self, other: &Self) {
+        (self.prior, self.shared, self.displaced) = (other.prior, other.shared, other.displaced);
+        self.independent = other.independent;
+        self.rescale(other.units);
+    }
+
+    /// The points `chosen`, by index among these.
+    pub fn subset(&self, chosen: &[u32]) -> Self {
+        let (n, stride) = (chosen.len(), chosen.len().next_multiple_of(ALIGN));
+        let mut planes = vec![0.0; PLANES * stride];
+        for (p, plane) in planes.chunks_exact_mut(stride.max(1)).enumerate() {
+            let from = self.plane(p);
+            for (to, &k) in plane.iter_mut().zip(chosen) {
+                *to = from[k as usize];
+            }
+        }
+        let pick = |k: &u32| *k as usize;
+        Self {
+            n,
+            stride,
+            planes,
+            position: chosen.iter().map(|k| self.position[pick(k)]).collect(),
+            site: chosen.iter().map(|k| self.site[pick(k)]).collect(),
+            spherical: self.spherical,
+            source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
+            floor: self.floor,
+            level: self.level,
+            prior: self.prior,
+            shared: self.shared,
+            independent: self.independent,
+            displaced: self.displaced,
+            turn: self.turn,
+            units: self.units,
+        }
+    }
+
+    /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with
+    /// little of it.
+    fn stretch(&self, k: usize) -> (f64, Vector2<f64>) {
+        let g = self.row(k).g;
+        // Rows of whitened points are stretched along the axis with little noise.
+        let eigen = SymmetricEigen::new(g * g.transpose());
+        let most = eigen.eigenvalues.imax();
+        let stretch = (eigen.eigenvalues[most] / eigen.eigenvalues[1 - most]).sqrt();
+        (stretch, eigen.eigenvectors.column(most).into_owned())
+    }
+
+    /// How many times as large noise is along one axis as along the other, of all but a tenth of the points
+    /// at most.
+    pub fn longest(&self) -> f64 {
+        let few = (0..self.n).step_by(self.n.div_ceil(ENOUGH).max(1));
+        let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
+        quantile(&mut stretches, FAR_FROM_ROUND)
+    }
+
+    /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
+    /// other: the smaller deviation is taken to be larger.
+    fn rounded(&self, ratio: f64) -> Self {
+        let mut out = self.clone();
+        for k in 0..self.n {
+            let (stretch, axis) = self.stretch(k);
+            if stretch > ratio {
+                let row = self.row(k);
+                let less = Matrix2::identity() - axis * axis.transpose() * (1.0 - ratio / stretch);
+                let rounder = Row { g: less * row.g, r: less * row.r, f: less * row.f };
+                rounder.values().iter().enumerate().for_each(|(p, value)| out.planes[p * self.stride + k] = *value);
+            }
+        }
+        out
+    }
+
+    /// The same points in rounder noise, the roundest first; none where their own is round.
+    pub fn rounder(&self) -> Vec<Self> {
+        let longest = self.longest();
+        RATIOS.iter().filter(|ratio| **ratio < longest).map(|&ratio| self.rounded(ratio)).collect()
+    }
+
+    /// Measures in other units of noise: everything times `factor`.
+    pub fn rescale(&mut self, factor: f64) {
+        self.planes.iter_mut().for_each(|value| *value *= factor);
+        self.floor *= factor * factor;
+        self.units *= factor;
+    }
+
+    /// The deviation of a point's own error, in units of noise.
+    pub fn own(&self) -> f64 {
+        self.shared.sqrt().recip()
+    }
+
+    /// One plane, `stride` values.
+    pub fn plane(&self, p: usize) -> &[f64] {
+        &self.planes[p * self.stride..(p + 1) * self.stride]
+    }
+
+    /// The planes of the points `range`, whose start is a multiple of the lane count.
+    pub fn slices(&self, range: &std::ops::Range<usize>) -> [&[f64]; PLANES] {
+        std::array::from_fn(|p| &self.plane(p)[range.clone()])
+    }
+
+    /// The chunks, the last one up to the filling points.
+    pub fn chunks(&self) -> impl ExactSizeIterator<Item = std::ops::Range<usize>> + Clone + '_ {
+        let stride = self.stride;
+        (0..stride.div_ceil(CHUNK)).map(move |c| c * CHUNK..((c + 1) * CHUNK).min(stride))
+    }
+
+    /// Point `k`.
+    pub fn row(&self, k: usize) -> Row {
+        let at = |p: usize| self.planes[p * self.stride + k];
+        Row {
+            g: Matrix2x3::from_fn(|i, j| at(3 * i + j)),
+            r: Matrix2x3::from_fn(|i, j| at(6 + 3 * i + j)),
+            f: Vector2::new(at(12), at(13)),
+        }
+    }
+
+    /// How many points count nothing, as another rotation leads them behind the camera.
+    pub fn unseen(&self) -> usize {
+        let along = |p: usize| &self.plane(p)[..self.n];
+        along(0).iter().zip(along(4)).filter(|(first, second)| **first == 0.0 && **second == 0.0).count()
+    }
+
+    /// The median of `|f|`, in units of noise.
+    pub fn median_flow(&self) -> f64 {
+        let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
+        median(&mut lengths)
+    }
+}
+
+/// `L^-1` of `S = L L^t`; `None` unless `S` is positive definite.
+fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let first = covariance[(0, 0)].sqrt();
+    let below = covariance[(1, 0)] / first;
+    let second = (covariance[(1, 1)] - below * below).sqrt();
+    let positive = first > 0.0 && second > 0.0;
+    positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
+}
+
+/// The median (the upper one of two), 0 of nothing; reorders the values.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// The value at a share of the sorted values, 0 of nothing; reorders the values.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = ((values.len() as f64 * share) as usize).min(values.len() - 1);
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}

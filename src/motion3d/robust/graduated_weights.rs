@@ -1,0 +1,56 @@
+//! From directions that are searched to motions that points obey, by weights that narrow.
+
+use super::{APART, INLIER, search};
+use crate::math::random::CounterRng;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::{LESS_ROUND, Observations};
+use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::starts::apart;
+use rayon::prelude::*;
+use std::iter::once;
+
+/// The bound of the search in shares of the flow: the spacing of the directions itself leaves residuals.
+const SPACING: f64 = 0.06;
+
+/// What the cut of Tukey's weights is divided by from one refinement to the next.
+const NARROWING: f64 = 1.6;
+
+/// The same points, with rounder noise first: where it is far from round the valleys are too narrow for the
+/// search.
+pub(crate) struct Narrowing<'a> {
+    rounder: Vec<Observations>,
+    own: &'a Observations,
+}
+
+impl<'a> Narrowing<'a> {
+    pub fn new(own: &'a Observations) -> Self {
+        Self { rounder: own.rounder(), own }
+    }
+
+    /// The most promising directions of the search, at most `count`, refined one by one.
+    pub fn motions(&self, count: usize, rng: CounterRng) -> Vec<Motion> {
+        let first = self.rounder.first().unwrap_or(self.own);
+        let bound = INLIER.max(SPACING * first.median_flow());
+        let starts = apart(search::search(first, INLIER, SPACING, rng), APART, count);
+        starts.into_par_iter().map(|(start, _)| self.led(start, bound)).collect()
+    }
+
+    fn led(&self, start: Motion, bound: f64) -> Motion {
+        let (mut motion, mut cut) = (start, bound);
+        for points in self.rounder.iter().chain(once(self.own)) {
+            motion = narrow(points, motion, cut);
+            cut = INLIER * LESS_ROUND;
+        }
+        motion
+    }
+}
+
+/// Refines with Tukey's weights, which narrow from `bound` to the inliers'.
+pub(crate) fn narrow(observations: &Observations, start: Motion, bound: f64) -> Motion {
+    let (mut motion, mut cut) = (start, bound);
+    while cut > INLIER {
+        motion = refine(observations, motion, Some(cut), Effort::ROUGH).motion;
+        cut /= NARROWING;
+    }
+    refine(observations, motion, Some(INLIER), Effort { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
+}

@@ -1,0 +1,104 @@
+//! Whether a motion hangs on points that may be outliers: of few points, those that obey it by chance can be
+//! the ones that decide.
+
+use super::INLIER;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::{Observations, median};
+use crate::motion3d::model::result::MotionEstimate;
+use crate::motion3d::solver::covariance::{Matrix5, inverse};
+use nalgebra::{Matrix2x3, SMatrix, Vector3};
+
+/// From so many inliers on no few of them decide.
+const MANY: usize = 300;
+
+/// The share of cases in which no more outliers than assumed obey by chance.
+const SURE: f64 = 0.95;
+
+/// By how much the deviation may grow without the points that may be outliers.
+const MOST: f64 = 2.0;
+
+type Vector5 = SMatrix<f64, 5, 1>;
+
+/// Whether the direction's deviation would more than double without the inliers that tell most of it, of as
+/// many as outliers may obey by chance.
+///
+/// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
+/// them fall within three deviations.
+pub(crate) fn hangs_on_few(observations: &Observations, found: &MotionEstimate) -> bool {
+    let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
+    let rejected = observations.n - inliers.len();
+    if rejected == 0 || inliers.len() >= MANY {
+        return false;
+    }
+    let chance = chance(observations, &found.motion, |k| found.inliers[observations.source[k] as usize]);
+    let suspects = most_likely(chance * rejected as f64);
+    let rows: Vec<Vector5> = inliers.iter().filter_map(|&k| row(observations, found, k)).collect();
+    grows(&rows, observations, suspects)
+}
+
+/// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those
+/// evenly spread over twice the median residual of the rejected.
+fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) -> bool) -> f64 {
+    let seen = depths(observations, motion);
+    let mut sizes: Vec<f64> =
+        (0..observations.n).filter(|&k| !obeys(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
+    INLIER / (2.0 * median(&mut sizes).max(INLIER))
+}
+
+/// The number that a Poisson variable of this mean exceeds in no more than 5 % of all cases.
+fn most_likely(mean: f64) -> usize {
+    let (mut term, mut count) = ((-mean).exp(), 0);
+    let mut sum = term;
+    while sum < SURE && count < MANY {
+        count += 1;
+        term *= mean / count as f64;
+        sum += term;
+    }
+    count
+}
+
+/// The row `D(nu~)` of an inlier; `None` at the epipole.
+fn row(observations: &Observations, found: &MotionEstimate, k: usize) -> Option<Vector5> {
+    let point = observations.row(k);
+    let t = point.g * found.motion.u();
+    let s = t.norm();
+    if s * s <= observations.floor {
+        return None;
+    }
+    let p = nalgebra::Vector2::new(t.y, -t.x) / s;
+    let nu = found.inverse_depth_smooth[observations.source[k] as usize];
+    let axes = Matrix2x3::from_fn(|i, j| found.tangent[i][j]);
+    let (turn, spin): (_, Vector3<f64>) = (axes * point.g.transpose() * p * nu, point.r.transpose() * p);
+    Some(Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z))
+}
+
+/// Takes the row without which the deviation grows most, again and again, and tells whether that is too much.
+fn grows(rows: &[Vector5], observations: &Observations, suspects: usize) -> bool {
+    let mut information: Matrix5 = rows.iter().map(|row| row * row.transpose()).sum();
+    if let Some(known) = &observations.prior {
+        let mut block = information.fixed_view_mut::<3, 3>(2, 2);
+        block += known.information;
+    }
+    let Some(mut covariance) = inverse(&information) else { return true };
+    let trace = |covariance: &Matrix5| covariance[(0, 0)] + covariance[(1, 1)];
+    let limit = MOST * MOST * trace(&covariance);
+    let mut left: Vec<&Vector5> = rows.iter().collect();
+    for _ in 0..suspects.min(rows.len()) {
+        // Without a row: `C + C d d^t C / (1 - d^t C d)`.
+        let added = |row: &Vector5| {
+            let moved = covariance * row;
+            (moved[0] * moved[0] + moved[1] * moved[1]) / (1.0 - row.dot(&moved))
+        };
+        let costs: Vec<f64> = left.iter().map(|row| added(row)).collect();
+        let worst = (0..left.len()).fold(0, |worst, k| if costs[k] > costs[worst] { k } else { worst });
+        information -= left[worst] * left[worst].transpose();
+        left.swap_remove(worst);
+        let Some(next) = inverse(&information) else { return true };
+        covariance = next;
+        if trace(&covariance) > limit {
+            return true;
+        }
+    }
+    false
+}

@@ -1,0 +1,269 @@
+//! Points that obey one motion among points that do not.
+
+mod competing_motions;
+mod depth_consistency;
+mod graduated_weights;
+mod leverage;
+mod mixture;
+mod moving_objects;
+mod noise_scale;
+mod outlier_posterior;
+mod regional_score;
+mod residual_autocorrelation;
+mod residual_structure;
+mod search;
+mod single_noise;
+mod two_motion_fit;
+
+use super::estimate::Scaled;
+use super::kernels::{consensus as truncated, depths};
+use super::model::motion::Motion;
+use super::model::observations::Observations;
+use super::solver::refine::{Effort, FEWER, MANY, refine};
+use super::solver::starts::sample;
+use crate::math::random::CounterRng;
+use competing_motions::{among_many_strays, rivals, second};
+use depth_consistency::Gate;
+use graduated_weights::Narrowing;
+pub(crate) use leverage::hangs_on_few;
+pub(crate) use mixture::{Told, among_strays};
+pub(crate) use noise_scale::larger;
+use outlier_posterior::Strays;
+pub(crate) use single_noise::one_noise;
+
+/// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be
+/// as far.
+const INLIER: f64 = 3.0;
+
+/// Starts that are refined, and the least angle between them, degrees.
+const STARTS: usize = 5;
+const APART: f64 = 10.0;
+
+/// Rounds towards a fixed set of inliers.
+const ROUNDS: usize = 10;
+
+/// Times that the depth gate closes.
+const GATES: usize = 2;
+
+/// The share of strays among those that obey from which on they matter for the search.
+const MATTER: f64 = 0.03;
+
+/// From which share on the motions of few points are not known: which of them are strays decides between
+/// directions far apart, whose residuals and depths are as likely.
+const DOUBT: f64 = 0.1;
+
+/// Fewest points that a motion is found from.
+const LEAST: usize = 5;
+
+/// Two motions of different points of which neither has a tenth of all points more than the other: which is
+/// the scene's cannot be told.
+const MAJORITY: f64 = 0.1;
+
+/// What residuals that estimate noise are fewer by: the unknowns of a motion.
+const UNKNOWNS: usize = 5;
+
+/// Below so many points a few of them can agree by chance far better than the noise of all is: see [`whole`].
+const SELECTED: usize = 100;
+
+/// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be
+/// sure; the factor between both noises that makes a difference.
+const WORTH: f64 = 4.0;
+const SURE: f64 = 10.0;
+const APART_NOISE: f64 = 1.5;
+
+/// By how much, in nats, outliers must lengthen that for there to be none.
+const LONGER: f64 = 1.0;
+
+/// Inliers below which a selection of them, whose noise is not known either, is not believed in.
+const FEWEST: usize = 20;
+
+/// A motion and the points that obey it.
+#[derive(Debug, Clone)]
+pub(crate) struct Consensus {
+    pub motion: Motion,
+    /// Indices among the observations, ascending.
+    pub inliers: Vec<u32>,
+    /// Those of them that the motion is to be estimated from: a thing that moves by itself has points that
+    /// obey by chance, and these pull the same way.
+    pub inner: Vec<u32>,
+    /// Other motions that about as many points obey, and how much more each costs, in squared units of noise;
+    /// the best first.
+    pub rivals: Vec<Rival>,
+    /// Whether the points are too few to tell outliers from large noise.
+    pub doubtful: bool,
+    /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
+    pub whole: bool,
+    /// Whether so many strays obey that least squares on all that obey would follow them.
+    pub many: bool,
+    /// How likely points are strays that obey by chance; `None` where nothing is known of that.
+    pub strays: Option<Strays>,
+    /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
+    pub quiet: Option<Vec<bool>>,
+}
+
+impl Consensus {
+    fn new(motion: Motion, inliers: Vec<u32>) -> Self {
+        Self {
+            motion,
+            inliers,
+            inner: Vec::new(),
+            rivals: Vec::new(),
+            doubtful: false,
+            whole: false,
+            many: false,
+            strays: None,
+            quiet: None,
+        }
+    }
+}
+
+/// Another motion of many points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rival {
+    pub motion: Motion,
+    pub excess: f64,
+    /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is
+    /// another minimum for the same points.
+    pub others: bool,
+}
+
+/// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated,
+/// and the points are measured in it afterwards.
+pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let found = obeyed(scaled, rng)?;
+    Some(with_doubts(&scaled.observations, found, rng))
+}
+
+fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    if !scaled.unknown {
+        return in_known_noise(&scaled.observations, rng);
+    }
+    let whole = (scaled.observations.n < SELECTED).then(|| single_noise::sigma(&scaled.observations, rng)).flatten();
+    let whole = whole.map(|sigma| sigma * scaled.sigma);
+    let found = noise_scale::consensus(scaled, rng)?;
+    let Some(sigma) = whole.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
+    let shorter = single_noise::shortening(&scaled.observations, &found, sigma);
+    // Whatever is the case, one noise that hardly differs from the other does no harm.
+    let (n, k) = (scaled.observations.n, found.inliers.len());
+    let doubtful = k < n && sigma > APART_NOISE && (shorter < SURE || k < FEWEST);
+    if shorter < WORTH {
+        scaled.take(sigma);
+        let found = in_known_noise(&scaled.observations, rng)?;
+        return Some(Consensus { doubtful: doubtful || found.doubtful, whole: shorter < -LONGER, ..found });
+    }
+    Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
+}
+
+fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
+    let fewer = first_asked(observations, rng);
+    let on = fewer.as_ref().unwrap_or(observations);
+    let candidates = candidates(on, rng)?;
+    let &(best, _) = candidates.first()?;
+    let mut rivals = rivals(on, &candidates);
+    let mut found = settle(observations, best)?;
+    let gate = Gate::new(observations);
+    for _ in 0..GATES {
+        let (kept, _) = gate.passed(&found);
+        if kept.len() < LEAST {
+            break;
+        }
+        let motion = refine(&observations.subset(&kept), found.motion, None, Effort::of(observations.n)).motion;
+        let obeying = obeying(observations, &motion);
+        found = Consensus::new(motion, obeying);
+    }
+    let (mut inliers, mut strays) = gate.passed(&found);
+    let many = strays.as_ref().is_some_and(|strays| strays.share > MATTER);
+    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates) {
+        found = Consensus { many, ..Consensus::new(motion, obeying(observations, &motion)) };
+        (inliers, strays) = gate.passed(&found);
+        rivals = others;
+        let share = strays.as_ref().map_or(0.0, |strays| strays.share);
+        found.doubtful = share > DOUBT && observations.n < MANY;
+    }
+    if inliers.len() >= LEAST {
+        found.inliers = inliers;
+        found.strays = strays;
+    }
+    found.rivals = rivals;
+    if found.inliers.len() < LEAST {
+        return None;
+    }
+    found.inner.clone_from(&found.inliers);
+    if let Some(inner) = moving_objects::inner(observations, &found) {
+        found.inner = inner.inliers;
+        found.quiet = inner.quiet;
+        found.rivals.extend(inner.rival);
+    }
+    Some(found)
+}
+
+/// The same with the motion that it may be instead.
+fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
+    // Errors that go together look like other motions everywhere.
+    if !observations.independent {
+        return found;
+    }
+    let fewer = first_asked(observations, rng);
+    let inner = fewer.is_none();
+    let mut on = fewer.unwrap_or_else(|| observations.clone());
+    // Residuals that are cut off where noise told too small ends pull nowhere.
+    let variance = larger(observations, &found.motion);
+    on.rescale(variance.sqrt().recip());
+    let shown = if inner && variance <= 1.0 { found.inner.clone() } else { obeying(&on, &found.motion) };
+    let instead = residual_structure::instead(&on, &found.motion, &shown, rng);
+    let instead = instead.map(|other| Rival { excess: other.excess * variance, ..other });
+    found.rivals.extend(instead);
+    found
+}
+
+/// The points that a search begins with; `None` where it begins with all.
+fn first_asked(observations: &Observations, rng: CounterRng) -> Option<Observations> {
+    (observations.n > MANY).then(|| observations.subset(&sample(observations.n, FEWER, rng.stream(9))))
+}
+
+/// Motions that many points obey, with what each costs: the cheapest first.
+fn candidates(observations: &Observations, rng: CounterRng) -> Option<Vec<(Motion, f64)>> {
+    let found = Narrowing::new(observations).motions(STARTS, rng);
+    let mut all: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    all.extend(second(observations, all.first()?.0, rng.stream(10)));
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    Some(all)
+}
+
+/// The sign with the lower truncated cost, and that.
+fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
+    let signs = [motion, motion.reversed()].map(|motion| (motion, truncated(observations, &motion, INLIER)));
+    if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
+}
+
+/// Points within three deviations of their epipolar line and of the half space before the camera.
+fn obeying(observations: &Observations, motion: &Motion) -> Vec<u32> {
+    let seen = depths(observations, motion);
+    let obeys = |&k: &u32| {
+        let k = k as usize;
+        seen.e[k].abs() < INLIER && seen.nu[k] * seen.s2[k].sqrt() > -INLIER
+    };
+    (0..observations.n as u32).filter(obeys).collect()
+}
+
+/// Maximum likelihood on the points that obey, until these stay the same.
+fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
+    let mut motion = start;
+    let mut inliers = obeying(observations, &motion);
+    for _ in 0..ROUNDS {
+        if inliers.len() < LEAST {
+            return None;
+        }
+        motion = refine(&observations.subset(&inliers), motion, None, Effort::of(observations.n)).motion;
+        let next = obeying(observations, &motion);
+        // Of many points a few always lie on the border.
+        let settled =
+            next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
+        inliers = next;
+        if settled {
+            break;
+        }
+    }
+    (inliers.len() >= LEAST).then_some(Consensus::new(motion, inliers))
+}

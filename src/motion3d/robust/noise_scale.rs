@@ -1,0 +1,104 @@
+//! The noise that the inliers leave, where it is not told.
+//!
+//! It is a fixed point of its own estimate, and there may be several: with a thing that moves by itself, one
+//! at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the
+//! same sign as their neighbours', which those of noise do not.
+
+use super::residual_autocorrelation::alike;
+use super::{Consensus, UNKNOWNS, in_known_noise};
+use crate::math::random::CounterRng;
+use crate::motion3d::estimate::Scaled;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+
+/// First guesses, in shares of the median flow: the next one where residuals go together.
+const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];
+
+/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal
+/// distribution cut there.
+const CUT: f64 = 2.5;
+const CUT_VARIANCE: f64 = 0.911;
+
+/// The share of the information about a variance that is left to them.
+const CUT_INFORMATION: f64 = 0.69;
+
+/// Most rounds, and steps of each.
+const ROUNDS: usize = 4;
+const STEPS: usize = 50;
+
+/// The share of the inliers in larger noise that those in smaller noise must be.
+const MOST: f64 = 0.5;
+
+/// The motion that most points obey in the noise that they leave; points are measured in that afterwards.
+pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let flow = scaled.observations.median_flow() * scaled.sigma;
+    let mut larger: Option<(Consensus, f64)> = None;
+    for share in FIRST_SHARES {
+        scaled.take(share * flow / scaled.sigma);
+        let Some(found) = fixed_point(scaled, rng) else { break };
+        let enough =
+            larger.as_ref().is_none_or(|(one, _)| found.inliers.len() as f64 > MOST * one.inliers.len() as f64);
+        if enough && !alike(&scaled.observations, &found.motion, &found.inliers) {
+            return Some(found);
+        }
+        if larger.is_none() {
+            larger = Some((found, scaled.sigma));
+        }
+    }
+    // Nothing tells a thing from errors of flow that go together.
+    let (found, sigma) = larger?;
+    scaled.take(sigma / scaled.sigma);
+    Some(found)
+}
+
+/// From the present units on, the noise that the inliers leave.
+fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let mut found = in_known_noise(&scaled.observations, rng)?;
+    for _ in 0..ROUNDS {
+        let sigma = noise(&depths(&scaled.observations, &found.motion).e[..scaled.observations.n]);
+        scaled.take(sigma);
+        found = in_known_noise(&scaled.observations, rng)?;
+        if (sigma - 1.0).abs() < 0.02 {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// By how many deviations the noise of points that obey must be larger than it is told.
+const LARGER: f64 = 4.0;
+
+/// What the noise of the points that obey is larger by, in variance, than is told, where chance does not
+/// explain it; 1 where errors are not independent.
+pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
+    if !observations.independent {
+        return 1.0;
+    }
+    let variance = noise(&depths(observations, motion).e[..observations.n]).powi(2);
+    let chance = LARGER * (2.0 / (CUT_INFORMATION * observations.n as f64)).sqrt();
+    if variance > 1.0 + chance { variance } else { 1.0 }
+}
+
+/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal
+/// distribution"; the five unknowns take their share away.
+fn noise(residuals: &[f64]) -> f64 {
+    let mut sigma = 1.0;
+    for _ in 0..STEPS {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for e in residuals.iter().filter(|e| e.abs() < CUT * sigma) {
+            sum += e * e;
+            count += 1;
+        }
+        if count <= UNKNOWNS || sum <= 0.0 {
+            break;
+        }
+        let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
+        let settled = (next - sigma).abs() < 1e-6 * sigma;
+        sigma = next;
+        if settled {
+            break;
+        }
+    }
+    sigma
+}

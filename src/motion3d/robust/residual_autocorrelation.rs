@@ -1,0 +1,56 @@
+//! Whether residuals go together: where points move otherwise, they have the same sign as their neighbours'.
+
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::solver::neighbours::Tree;
+
+/// Points from which on there are enough of them to tell.
+pub(crate) const ENOUGH: usize = 50;
+
+/// Neighbours whose residuals are looked at, and deviations by which they go together.
+const NEAREST: usize = 8;
+const TOGETHER: f64 = 3.0;
+
+/// Whether the residuals of neighbours among `points` have the same sign more often than noise does.
+pub(crate) fn alike(observations: &Observations, motion: &Motion, points: &[u32]) -> bool {
+    if points.len() < ENOUGH {
+        return false;
+    }
+    let seen = depths(observations, motion).e;
+    let sites: Vec<[f64; 3]> = points.iter().map(|&k| observations.site[k as usize]).collect();
+    let tree = Tree::new(&sites);
+    let places: Vec<u32> = (0..points.len() as u32).collect();
+    let lists = tree.nearest(&places, NEAREST);
+    let residual = |place: usize| seen[points[tree.order()[place] as usize] as usize];
+    let (mut products, mut squares) = (0.0, 0.0);
+    for place in 0..points.len() {
+        let own = residual(place);
+        squares += own * own;
+        products += lists.of(place).iter().map(|&near| own * residual(near as usize)).sum::<f64>();
+    }
+    let variance = squares / points.len() as f64;
+    // Each of these pairs may come twice.
+    let pairs = (NEAREST * points.len()) as f64;
+    products > TOGETHER * variance * (2.0 * pairs).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::tests::scenes::{Scene, W, oblique};
+
+    #[test]
+    fn residuals_of_another_motion_are_alike_and_those_of_noise_are_not() {
+        let mut chance = 0;
+        for seed in 0..100 {
+            let points = Scene::oblique(400, 0.02, seed).observations();
+            let all: Vec<u32> = (0..400).collect();
+            chance += u32::from(alike(&points, &oblique(), &all));
+            // Off by half of the rotation, about a deviation of a point.
+            let near = Motion::new(oblique().translation, W.map(|w| 1.5 * w));
+            assert!(alike(&points, &near, &all), "{seed}");
+        }
+        assert!(chance <= 3, "{chance}");
+    }
+}

@@ -1,0 +1,79 @@
+//! Whether residuals are those of noise, and what motion it may be instead.
+
+use super::regional_score::pulling;
+use super::residual_autocorrelation::{ENOUGH, alike};
+use super::two_motion_fit::{Division, Two};
+use super::{APART, INLIER, Rival, truncated};
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::solver::refine::{Effort, refine};
+
+/// Residuals whose mean square, in units of noise, is less than this do not matter.
+const LITTLE: f64 = 0.25;
+
+/// Parts of the picture from which two motions are looked for.
+const PARTS: usize = 4;
+
+/// What two motions must explain more than one: twice the unknowns of one more, and which points have it. And
+/// of each point, where that of more points is the same: errors of flow that go together look like the motion
+/// of a few.
+const ALL: f64 = 20.0;
+const EACH: f64 = 0.12;
+
+/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the
+/// same: where two motions explain them better, that of more points, or else of fewer, if it is another.
+/// `None` where that is not worth another motion, as where errors of flow go together and that is not told.
+///
+/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's
+/// motion alone, and what every search among all of them ends at; but it leaves residuals in both.
+pub(crate) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
+    let mut parts = otherwise(observations, found, points)?;
+    let own = observations.subset(points);
+    let (n, together) = (own.n as f64, refine(&own, *found, None, Effort::FULL).equations.cost);
+    let division = Division::of(own);
+    if parts.is_empty() {
+        parts = division.quarters();
+    }
+    let divided = |part: &Vec<u32>| division.from(part, found, rng);
+    let two = parts.iter().take(PARTS).filter_map(divided).min_by(|a: &Two, b: &Two| a.cost.total_cmp(&b.cost))?;
+    let another = |motion: &&Motion| motion.angle_to(found).to_degrees() > APART;
+    let gain = together - two.cost;
+    let [more, fewer] = &two.motions;
+    let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
+    let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
+    (gain > ALL).then(|| Rival { motion: *motion, excess: excess.max(0.0), others: true })
+}
+
+/// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same
+/// sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.
+fn otherwise(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
+    if points.len() < ENOUGH {
+        return None;
+    }
+    let seen = depths(observations, motion).e;
+    let squares: f64 = points.iter().map(|&k| seen[k as usize].powi(2)).sum();
+    if squares <= LITTLE * points.len() as f64 {
+        return None;
+    }
+    let parts = pulling(observations, motion, points);
+    (!parts.is_empty() || alike(observations, motion, points)).then_some(parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::tests::scenes::{Scene, W, oblique};
+
+    #[test]
+    fn few_points_and_residuals_far_less_than_noise_tell_nothing() {
+        let all: Vec<u32> = (0..400).collect();
+        let near = Motion::new(oblique().translation, W.map(|w| 1.5 * w));
+        let points = Scene::oblique(400, 0.02, 1).observations();
+        assert!(otherwise(&points, &near, &all).is_some());
+        assert!(otherwise(&points, &near, &all[..ENOUGH - 1]).is_none());
+        let settled = Scene::oblique(400, 0.0, 1).observations();
+        assert!(otherwise(&settled, &oblique(), &all).is_none());
+    }
+}

@@ -1,0 +1,51 @@
+//! Whether few points have outliers at all: one motion of all of them in larger noise may be as good an
+//! explanation as one of the points that happen to agree.
+
+use super::{Consensus, UNKNOWNS};
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::observations::{Observations, median};
+use crate::motion3d::solver::likelihood::minima;
+
+/// The noise of all points if all obey one motion.
+pub(crate) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64> {
+    let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
+    let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
+    Some((best / degrees as f64).sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0)
+}
+
+/// By how much the mean square may exceed what the median says of it.
+const TAILS: f64 = 1.5;
+
+/// Whether the lengths of two-dimensional residuals, NaN where there is none, are those of one normal
+/// distribution: few of points that are many times as large as most would make their mean square larger than
+/// their median has it, which is `2 ln 2` variances where the mean is two.
+pub(crate) fn one_noise(residuals: &[f64]) -> bool {
+    let mut squares: Vec<f64> = residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    mean <= TAILS * median(&mut squares) / std::f64::consts::LN_2
+}
+
+/// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present
+/// units of noise, for all points, less that with the noise of the inliers and the others anywhere.
+///
+/// Lengths of descriptions (J. Rissanen 1978): `-ln` of the densities, that of an outlier uniform over the
+/// residuals' range, and `ln C(n, k)` for which points they are. A selection among few points makes residuals
+/// small that the unknowns do not account for.
+pub(crate) fn shortening(observations: &Observations, found: &Consensus, sigma: f64) -> f64 {
+    let (n, k) = (observations.n, found.inliers.len());
+    if k >= n {
+        return 0.0;
+    }
+    let seen = depths(observations, &found.motion);
+    let sum = |k: &u32| seen.e[*k as usize].powi(2);
+    let own = (found.inliers.iter().map(sum).sum::<f64>() / k.saturating_sub(UNKNOWNS).max(1) as f64).sqrt();
+    let range = 2.0 * seen.e[..n].iter().fold(0.0f64, |most, e| most.max(e.abs()));
+    let normal = |count: usize, sigma: f64| {
+        let free = count.saturating_sub(UNKNOWNS) as f64;
+        free * (sigma.ln() + 0.5) + 0.5 * count as f64 * (2.0 * std::f64::consts::PI).ln()
+    };
+    let chosen: f64 = (0..n - k).map(|i| ((n - i) as f64 / (i + 1) as f64).ln()).sum();
+    let apart = normal(k, own) + (n - k) as f64 * range.ln() + chosen;
+    normal(n, sigma) - apart
+}

@@ -1,0 +1,143 @@
+//! Points as those of two motions, where one of all leaves residuals that are no noise's.
+
+use super::graduated_weights::Narrowing;
+use super::{INLIER, LEAST, cheaper_sign};
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::solver::neighbours::{Neighbours, Tree};
+use crate::motion3d::solver::refine::{Effort, refine};
+
+/// Neighbours that say with a point which motion it has: things that move by themselves are whole.
+const NEAREST: usize = 8;
+
+/// What a point counts at most: neighbours across the border of a thing do not decide.
+const MOST: f64 = INLIER * INLIER;
+
+/// Times that points are given to the motion that they fit, and that both are looked for anew, everywhere.
+const ROUNDS: usize = 8;
+const ANEW: usize = 3;
+
+/// Two motions, that of more points first, and what each point leaves with its own, summed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Two {
+    pub motions: [Motion; 2],
+    pub cost: f64,
+}
+
+/// The points that are to be divided.
+pub(crate) struct Division {
+    points: Observations,
+    tree: Tree,
+    near: Neighbours,
+}
+
+impl Division {
+    /// Of more points than [`NEAREST`].
+    pub fn of(points: Observations) -> Self {
+        let tree = Tree::new(&points.site[..points.n]);
+        let places: Vec<u32> = (0..points.n as u32).collect();
+        let near = tree.nearest(&places, NEAREST);
+        Self { points, tree, near }
+    }
+
+    /// Halves and quarters of the picture, by index.
+    pub fn quarters(&self) -> Vec<Vec<u32>> {
+        let halves = self.tree.halves(self.points.n / 4);
+        halves.into_iter().map(|places| self.tree.order()[places].to_vec()).collect()
+    }
+
+    /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or
+    /// nearly so; `None` where one of both loses its points.
+    pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<Two> {
+        let mut second = vec![false; self.points.n];
+        for &k in part {
+            second[k as usize] = true;
+        }
+        let mut motions = [*start; 2];
+        for round in 0..ROUNDS {
+            for (own, motion) in motions.iter_mut().enumerate() {
+                let members = self.points.subset(&chosen(&second, own == 1));
+                if members.n <= LEAST.max(NEAREST) {
+                    return None;
+                }
+                *motion = if round < ANEW {
+                    Narrowing::new(&members).motions(1, rng).pop()?
+                } else {
+                    refine(&members, *motion, None, Effort::ROUGH).motion
+                };
+            }
+            let next = self.nearer(&motions);
+            if next == second && round >= ANEW {
+                break;
+            }
+            second = next;
+        }
+        let members = [false, true].map(|own| self.points.subset(&chosen(&second, own)));
+        if members.iter().any(|members| members.n <= LEAST) {
+            return None;
+        }
+        let fitted: [_; 2] = std::array::from_fn(|own| refine(&members[own], motions[own], None, Effort::FULL));
+        let cost = fitted.iter().map(|minimum| minimum.equations.cost).sum();
+        let signed: [Motion; 2] = std::array::from_fn(|own| cheaper_sign(&members[own], fitted[own].motion).0);
+        let motions = if members[0].n < members[1].n { [signed[1], signed[0]] } else { signed };
+        Some(Two { motions, cost })
+    }
+
+    /// Which points, with their neighbours, the second motion leaves less of.
+    fn nearer(&self, motions: &[Motion; 2]) -> Vec<bool> {
+        let [first, second] = motions.each_ref().map(|motion| depths(&self.points, motion).e);
+        let order = self.tree.order();
+        let gain = |place: u32| {
+            let k = order[place as usize] as usize;
+            first[k].powi(2).min(MOST) - second[k].powi(2).min(MOST)
+        };
+        let mut out = vec![false; self.points.n];
+        for place in 0..self.points.n as u32 {
+            let around: f64 = self.near.of(place as usize).iter().map(|&near| gain(near)).sum();
+            out[order[place as usize] as usize] = gain(place) + around > 0.0;
+        }
+        out
+    }
+}
+
+/// The indices of those that are `wanted`.
+fn chosen(second: &[bool], wanted: bool) -> Vec<u32> {
+    (0..second.len() as u32).filter(|&k| second[k as usize] == wanted).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::tests::scenes::{Scene, W, oblique};
+
+    #[test]
+    fn both_motions_are_found_from_a_part_that_is_neither() {
+        let thing = Motion::new([-0.8, 0.1, 0.3], W.map(|w| 1.5 * w));
+        for seed in 0..5 {
+            let mut scene = Scene::new(oblique(), 400, 0.6, 0.05, seed, |_, _, r| 0.5 + r);
+            let moved = Scene::new(thing, 400, 0.6, 0.05, seed, |_, _, r| 0.5 + r);
+            for k in (0..400).filter(|&k| scene.points[k][0] > 0.2) {
+                scene.flow[k] = moved.flow[k];
+            }
+            let part: Vec<u32> = (0..400).filter(|&k| scene.points[k as usize][0] > 0.0).collect();
+            let points = scene.observations();
+            let one = refine(&points, oblique(), None, Effort::FULL).equations.cost;
+            let division = Division::of(points);
+            let two = division.from(&part, &oblique(), CounterRng::new(seed)).unwrap();
+            let off = [(0, oblique()), (1, thing)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
+            assert!(off[0] < 15.0 && off[1] < 15.0 && two.cost < 0.7 * one, "{seed}: {off:?} {} {one}", two.cost);
+            assert_eq!(division.quarters().iter().filter(|part| part.len() == 200).count(), 2);
+        }
+    }
+
+    #[test]
+    fn points_that_move_as_one_have_no_second_motion_that_is_worth_it() {
+        let points = Scene::oblique(300, 0.02, 1).observations();
+        let one = refine(&points, oblique(), None, Effort::FULL).equations.cost;
+        let division = Division::of(points);
+        let two = division.from(&(0..100).collect::<Vec<u32>>(), &oblique(), CounterRng::new(1));
+        assert!(two.is_none_or(|two| two.cost > 0.75 * one));
+    }
+}

@@ -1,0 +1,264 @@
+//! The estimating equation with smoothed depths in its weights.
+
+use super::covariance::{Matrix5, direction_spread, inverse};
+use super::profile_likelihood::Valley;
+use super::smoothing::{DepthSmoother, Smoothed};
+use crate::motion3d::kernels::{Bilinear, depths, information, slope};
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::Observations;
+use nalgebra::{Matrix2x3, SymmetricEigen};
+
+/// Times that depths are smoothed and the equation is solved.
+const ROUNDS: usize = 3;
+
+/// A change of the direction, degrees, that is not worth another round.
+const SETTLED: f64 = 0.001;
+
+/// The farthest that the direction may come from where it began, degrees.
+const FARTHEST: f64 = 30.0;
+
+/// Most Newton steps, and the length of one that is the last.
+const STEPS: usize = 30;
+const STEP: f64 = 1e-11;
+
+/// The solution of the estimating equation.
+#[derive(Debug, Clone)]
+pub(crate) struct Efficient {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    /// What the weights make of it, see [`sandwich`].
+    pub covariance: Matrix5,
+    /// The depths in the weights, `nu~`; as long as the planes.
+    pub smooth: Vec<f64>,
+    /// Their posterior variances; `None` of depths from elsewhere.
+    pub variance: Option<Vec<f64>>,
+}
+
+impl Efficient {
+    /// The covariance with what a valley that bends and widens adds, and whether it tells the valley.
+    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> (Matrix5, bool) {
+        let valley = Valley { observations, motion: &self.motion, tangent: &self.tangent };
+        let mut made = None;
+        valley.lengthened(&self.covariance, |motion: &Motion| {
+            if self.variance.is_none() {
+                return self.smooth.clone();
+            }
+            made.get_or_insert_with(&smoother).smooth(&depths(observations, motion)).nu
+        })
+    }
+}
+
+/// Where weights have their depths from.
+#[derive(Debug)]
+pub(crate) enum WeightDepths<'a> {
+    /// Smoothed anew at each motion.
+    Smoothed(&'a mut DepthSmoother),
+    /// Known from elsewhere, as long as the planes.
+    Known(Vec<f64>),
+}
+
+impl WeightDepths<'_> {
+    pub fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
+        match self {
+            Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
+            Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
+        }
+    }
+
+    /// What known depths are to be multiplied with to be in the unit of the translation, by least squares
+    /// against the depths of the flow; `None` where these do not tell: such depths say nothing about the
+    /// scene.
+    fn unit(&self, observations: &Observations, motion: &Motion) -> Option<f64> {
+        let Self::Known(given) = self else { return Some(1.0) };
+        let own = depths(observations, motion);
+        let (mut along, mut square) = (0.0, 0.0);
+        for k in 0..observations.n {
+            along += own.s2[k] * own.nu[k] * given[k];
+            square += own.s2[k] * given[k] * given[k];
+        }
+        (along > RELATED * square.sqrt()).then(|| along / square)
+    }
+}
+
+/// Deviations above zero of the factor between known depths and those of the flow, below which they have
+/// nothing to do with each other.
+const RELATED: f64 = 3.0;
+
+/// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far
+/// away.
+///
+/// `e_k` is independent of every depth along the epipolar lines, so that a wrong depth in the weight causes
+/// no bias.
+pub(crate) fn efficient(
+    observations: &Observations,
+    start: &Motion,
+    mut weights: WeightDepths<'_>,
+) -> Option<Efficient> {
+    let mut motion = *start;
+    let mut smooth = weights.at(observations, &motion);
+    let unit = weights.unit(observations, start)?;
+    for round in 0..ROUNDS {
+        if round > 0 {
+            smooth = weights.at(observations, &motion);
+        }
+        let before = motion;
+        motion = if unit == 1.0 {
+            solve(observations, &before, &smooth.nu)?
+        } else {
+            let scaled: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
+            solve(observations, &before, &scaled)?
+        };
+        if motion.angle_to(start).to_degrees() > FARTHEST {
+            return None;
+        }
+        if motion.angle_to(&before).to_degrees() < SETTLED {
+            break;
+        }
+    }
+    told(observations, motion, smooth, matches!(weights, WeightDepths::Known(_)).then_some(unit))
+}
+
+/// The same without a solution: what the weights say about the covariance at `motion`.
+pub(crate) fn unsolved(
+    observations: &Observations,
+    motion: &Motion,
+    mut weights: WeightDepths<'_>,
+) -> Option<Efficient> {
+    let smooth = weights.at(observations, motion);
+    told(observations, *motion, smooth, None)
+}
+
+/// `known`: the unit of depths that are known from elsewhere.
+fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Option<f64>) -> Option<Efficient> {
+    let tangent = tangents(&motion.u());
+    let covariance = match known {
+        Some(unit) => {
+            let nu: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
+            known_sandwich(observations, &motion, &tangent, &nu)?
+        }
+        None => sandwich(observations, &motion, &tangent, &smooth)?,
+    };
+    let variance = known.is_none().then_some(smooth.variance);
+    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance })
+}
+
+/// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are
+/// too noisy to tell it.
+const SLOPES: std::ops::Range<f64> = 0.25..4.0;
+
+/// The least singular value of the slope relative to the largest at which known depths determine the motion.
+const DETERMINED: f64 = 1e-3;
+
+/// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights:
+/// `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off,
+/// depths from elsewhere).
+fn sandwich(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    smooth: &Smoothed,
+) -> Option<Matrix5> {
+    let spread = damping(observations, motion, tangent, &smooth.nu)?;
+    let squares = information(observations, motion, tangent, &smooth.nu, spread);
+    let plain = inverse(&squares)?;
+    let slope = slope(observations, motion, tangent, &smooth.nu, &smooth.share, spread);
+    let whiten = squares.cholesky()?.l().try_inverse()?;
+    let relative = whiten * slope * whiten.transpose();
+    let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
+    if !sizes.iter().all(|size| SLOPES.contains(size)) {
+        return Some(plain);
+    }
+    let Some(back) = slope.try_inverse() else { return Some(plain) };
+    let covariance = back * squares * back.transpose();
+    Some(0.5 * (covariance + covariance.transpose()))
+}
+
+/// The same for depths from elsewhere, which no noise of the flow is in: however wrong they are, only what
+/// they leave undetermined is not known.
+fn known_sandwich(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> Option<Matrix5> {
+    let spread = damping(observations, motion, tangent, nu)?;
+    let squares = information(observations, motion, tangent, nu, spread);
+    let slope = slope(observations, motion, tangent, nu, &vec![0.0; nu.len()], spread);
+    let whiten = squares.cholesky()?.l().try_inverse()?;
+    let sizes = (whiten * slope * whiten.transpose()).singular_values();
+    let back = slope.try_inverse().filter(|_| sizes.min() > DETERMINED * sizes.max())?;
+    let covariance = back * squares * back.transpose();
+    let covariance = 0.5 * (covariance + covariance.transpose());
+    covariance.cholesky().map(|_| covariance)
+}
+
+/// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
+pub(crate) fn damping(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> Option<f64> {
+    inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
+}
+
+/// The root of the equation whose weights are frozen at `start`.
+fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
+    let tangent = tangents(&start.u());
+    let spread = damping(observations, start, &tangent, nu)?;
+    let equation = Bilinear::new(observations, start, &tangent, nu, spread);
+    let mut motion = *start;
+    for _ in 0..STEPS {
+        let tangent = tangents(&motion.u());
+        let (value, slope) = equation.at(&motion, &tangent);
+        let step = slope.lu().solve(&-value)?;
+        if !step.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        motion = motion.stepped(&tangent, &step);
+        if step.norm() < STEP {
+            return Some(motion);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::tests::scenes::Scene;
+    use nalgebra::SMatrix;
+
+    #[test]
+    fn the_slope_of_the_equation_is_its_own() {
+        let scene = Scene::oblique(40, 0.1, 5);
+        let observations = scene.observations();
+        let tangent = tangents(&scene.motion.u());
+        let mut nu = scene.inverse_depth.clone();
+        nu.resize(observations.stride, 0.0);
+        let equation = Bilinear::new(&observations, &scene.motion, &tangent, &nu, 0.01);
+        let at = Motion::new([0.5, 0.1, 0.8], [0.01, -0.02, 0.03]);
+        let axes = tangents(&at.u());
+        let (_, slope) = equation.at(&at, &axes);
+        for axis in 0..5 {
+            let value = |by: f64| {
+                let mut step = SMatrix::<f64, 5, 1>::zeros();
+                step[axis] = by;
+                equation.at(&at.stepped(&axes, &step), &axes).0
+            };
+            let numeric = (value(1e-6) - value(-1e-6)) / 2e-6;
+            let error = (numeric - slope.column(axis)).norm();
+            assert!(error < 1e-6 * slope.column(axis).norm(), "{axis}: {error}");
+        }
+    }
+
+    #[test]
+    fn true_depths_with_exact_flow_leave_the_truth_alone() {
+        let scene = Scene::oblique(40, 0.0, 5);
+        let observations = scene.observations();
+        let mut nu = scene.inverse_depth.clone();
+        nu.resize(observations.stride, 0.0);
+        let found = efficient(&observations, &scene.motion, WeightDepths::Known(nu)).unwrap();
+        assert!(found.motion.angle_to(&scene.motion) < 1e-10);
+    }
+}

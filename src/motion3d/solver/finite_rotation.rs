@@ -1,0 +1,305 @@
+//! Which rotation is taken out of displacements, and when that is worth its while.
+//!
+//! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
+//! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
+//! of them ([`turned`](crate::motion3d::model::derotation)) have none. Where the rest would move an estimate by a small share of
+//! its deviation, nothing is turned.
+
+use super::likelihood::{close, different};
+use super::refine::{Effort, Minimum, refine};
+use super::starts::at_most;
+use crate::math::random::CounterRng;
+use crate::motion3d::diagnostics::correlated_noise::slopes;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::{Observations, quantile};
+use crate::motion3d::model::whitening::Intake;
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Points whose rest is looked at, and those from which a first rotation is found.
+const SAMPLED: usize = 256;
+const FIRST: usize = 200;
+
+/// Squared shift of an estimate, in its deviations, that is negligible.
+const NEGLIGIBLE: f64 = 0.01;
+
+/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the
+/// change of the rotation, rad, that is rounding.
+const SETTLED: f64 = 1e-14;
+const ROUGHLY: f64 = 1e-3;
+const MANY: usize = 10_000;
+const ROUNDING: f64 = 1e-13;
+
+/// What a rest may add to squared residuals, in deviations of their sum by chance, before anything is known
+/// of the motion.
+const HIDDEN: f64 = 0.1;
+
+/// Root mean square of the rest, in units of noise, that decides of hardly a point whether it obeys.
+const OBEYING: f64 = 0.1;
+
+/// The farthest, degrees, that a minimum may come from itself under another one's rotation.
+const APART: f64 = 12.0;
+
+/// Most times that rows are turned about what they gave.
+const ROUNDS: usize = 6;
+
+/// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are
+/// followed, too.
+pub(crate) const WANDERED: f64 = 0.1;
+
+/// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and
+/// rounds of weights.
+const PAIRS: usize = 32;
+const SHARE: f64 = 0.3;
+const STEPS: usize = 6;
+/// The cut of Tukey's weights in units of the deciding residual.
+const CUT: f64 = 3.0;
+/// Times that the first rotation is taken out and found again.
+const TURNS: usize = 3;
+
+/// By how much the residuals of `motion` would change if the points were turned about its rotation, at a
+/// sample of them.
+fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
+    let few = at_most(points, SAMPLED, CounterRng::new(0));
+    let (here, turned) = (depths(&few, motion), intake.turned(&few, HalfTurn::of(motion)));
+    let changes = if few.turn.is_some() {
+        let there = depths(&turned, motion);
+        there.e.iter().zip(&here.e).map(|(there, here)| there - here).take(few.n).collect()
+    } else {
+        (0..few.n).map(|k| half_way_residual(&turned, motion, k) - here.e[k]).collect()
+    };
+    (few, changes)
+}
+
+/// The residual of a turned point with the row of the translation half way, as those that are not turned have
+/// it: `G(m) t = G(eta_1') t - (eta_2' - eta_1') t_z / 2`.
+fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
+    let Some(turn) = &turned.turn else { return 0.0 };
+    let row = turned.row(k);
+    let (t, left) = (row.g * motion.u(), row.f - row.r * motion.w());
+    let middle = t - left * (0.5 * (turn.mean * motion.u()).z);
+    let s2 = middle.norm_squared();
+    if s2 > turned.floor { (t.y * left.x - t.x * left.y) / s2.sqrt() } else { 0.0 }
+}
+
+/// The square of what an estimate would come out otherwise by, in its deviations, if the points were turned
+/// about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
+pub(crate) fn shift(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> f64 {
+    if !points.displaced {
+        return 0.0;
+    }
+    let (few, changes) = changes(intake, points, motion);
+    let tangent = tangents(&motion.u());
+    let nu = depths(&few, motion).nu;
+    let (mut h, mut g) = (SMatrix::<f64, 5, 5>::zeros(), SMatrix::<f64, 5, 1>::zeros());
+    for (k, change) in changes.iter().enumerate() {
+        let row = slopes(&few, motion, &tangent, nu[k], k);
+        h += row * row.transpose();
+        g += row * *change;
+    }
+    let share = points.n as f64 / few.n.max(1) as f64;
+    // Without a solution the sum of squares is more.
+    let most: f64 = changes.iter().map(|change| change * change).sum();
+    share * h.cholesky().map_or(most, |factor| g.dot(&factor.solve(&g)).min(most))
+}
+
+/// Whether turning the points about the rotation of `motion` would move its estimate.
+pub(crate) fn matters(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> bool {
+    shift(intake, points, motion) > NEGLIGIBLE
+}
+
+/// Whether it would decide otherwise of points that obey.
+pub(crate) fn decides(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> bool {
+    if !points.displaced {
+        return false;
+    }
+    let (_, changes) = changes(intake, points, motion);
+    changes.iter().map(|change| change * change).sum::<f64>() > OBEYING * OBEYING * changes.len() as f64
+}
+
+/// The points with a rotation taken out that explains most of the flow by itself, of all points or (`robust`)
+/// of many; `None` where that hides in the noise, or where there is none.
+///
+/// What is left of the flow is short, and so is the rest of third order: even a search that knows nothing of
+/// the motion then sees exact flow, nearly. Of noise that is `unknown` anything may be more.
+pub(crate) fn beforehand(
+    intake: &Intake<'_>,
+    points: &Observations,
+    (robust, unknown): (bool, bool),
+    rng: CounterRng,
+) -> Option<Observations> {
+    if !points.displaced {
+        return None;
+    }
+    let few = &*at_most(points, FIRST, rng.stream(0));
+    let again =
+        |points: &Observations, w| if robust { Some(reweighted(points, w)) } else { least_squares(points, |_| 1.0) };
+    let mut w = again(few, if robust { likeliest(few, rng.stream(1))? } else { Vector3::zeros() })?;
+    let mut turned = intake.turned(few, HalfTurn::new(&w));
+    let hidden = if unknown { 0.0 } else { HIDDEN * 2.0 * (points.n as f64).sqrt() };
+    if rest(few, &turned, &w) * points.n as f64 <= hidden {
+        return None;
+    }
+    for _ in 0..TURNS {
+        w = again(&turned, w)?;
+        turned = intake.turned(few, HalfTurn::new(&w));
+    }
+    Some(intake.turned(points, HalfTurn::new(&w)))
+}
+
+/// The points with the rotation taken out that explains most of their flow by itself, whatever was taken out
+/// before; `None` where there is none.
+pub(crate) fn afresh(intake: &Intake<'_>, points: &Observations) -> Option<Observations> {
+    let mut turned = intake.turned(points, HalfTurn::new(&Vector3::zeros()));
+    for _ in 0..=TURNS {
+        let w = least_squares(&turned, |_| 1.0)?;
+        turned = intake.turned(points, HalfTurn::new(&w));
+    }
+    Some(turned)
+}
+
+/// The mean square of what turning changes in the flow that a rotation leaves.
+fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
+    let changed = |k: usize| {
+        let (before, after) = (points.row(k), turned.row(k));
+        ((before.f - before.r * w) - (after.f - after.r * w)).norm_squared()
+    };
+    (0..points.n).map(changed).sum::<f64>() / points.n as f64
+}
+
+/// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all
+/// points, and refines `found`. `unknown`: the noise is what the lead leaves.
+///
+/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn
+/// out to be much larger once its own rotation is taken out, or that is quite another one, the other minima
+/// are followed, too, and only those stay that are as good as the best.
+pub(crate) fn settle(
+    intake: &Intake<'_>,
+    all: &mut Observations,
+    inliers: &mut Observations,
+    found: &mut Vec<Minimum>,
+    lead: &Minimum,
+    unknown: bool,
+) {
+    let follow = |minimum: &Minimum| follow(intake, inliers, *minimum, unknown);
+    let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
+    let own = follow(lead);
+    let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
+    let before = inliers.turn.map_or_else(Vector3::zeros, |turn| turn.rotation);
+    let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
+    let (again, turned) = if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
+        let Some(turned) = own.turned else { return };
+        let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, Effort::ROUGH);
+        let again = different(others.par_iter().map(again).chain([own.minimum]).collect());
+        (again, turned)
+    } else {
+        let mut followed: Vec<Followed> = others.par_iter().map(follow).collect();
+        followed.push(own);
+        followed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let best = &followed[0];
+        let good = followed.iter().filter(|other| other.cost <= limit(best.cost));
+        let turned = best.turned.as_ref().unwrap_or(inliers).clone();
+        let again = |other: &Followed| {
+            let there = refine(&turned, other.minimum.motion, None, Effort::ROUGH);
+            (there.motion.angle_to(&other.minimum.motion).to_degrees() < APART).then_some(there)
+        };
+        (different(good.filter_map(again).chain([best.minimum]).collect()), turned)
+    };
+    // Without a rotation that can be taken out the linear model's minima stay.
+    if again.is_empty() {
+        return;
+    }
+    (*found, *inliers) = (again, turned);
+    if let Some(turn) = inliers.turn {
+        *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, turn) };
+    }
+}
+
+/// The noise's variance in present units: 1, or what a minimum leaves.
+fn noise(cost: f64, n: usize, unknown: bool) -> f64 {
+    if unknown { cost / n.saturating_sub(5).max(1) as f64 } else { 1.0 }
+}
+
+/// A minimum with its own rotation taken out of the points, where that makes a difference.
+struct Followed {
+    minimum: Minimum,
+    turned: Option<Observations>,
+    /// What it leaves; infinite where points are led behind the camera, which then do not count, or by more
+    /// than half a turn.
+    cost: f64,
+}
+
+/// Turns the points about the rotation of a minimum until that stays.
+fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unknown: bool) -> Followed {
+    let settled = if points.n < MANY { SETTLED } else { ROUGHLY };
+    let mut negligible = if points.turn.is_some() { settled } else { NEGLIGIBLE };
+    let mut turned: Option<Observations> = None;
+    for _ in 0..ROUNDS {
+        let here = turned.as_ref().unwrap_or(points);
+        let w = minimum.motion.w();
+        let same = here.turn.is_some_and(|turn| (turn.rotation - w).norm() < ROUNDING);
+        if same || shift(intake, here, &minimum.motion) <= negligible * noise(minimum.equations.cost, points.n, unknown)
+        {
+            break;
+        }
+        let next = intake.turned(here, HalfTurn::of(&minimum.motion));
+        minimum = refine(&next, minimum.motion, None, Effort::of(next.n));
+        turned = Some(next);
+        negligible = settled;
+    }
+    // More than half a turn is less of one the other way round.
+    let whole = minimum.motion.w().norm() > std::f64::consts::PI;
+    let lost = whole || turned.as_ref().is_some_and(|turned| turned.unseen() > points.unseen());
+    Followed { minimum, turned, cost: if lost { f64::INFINITY } else { minimum.equations.cost } }
+}
+
+/// The rotation of two points that most points come near to.
+fn likeliest(points: &Observations, rng: CounterRng) -> Option<Vector3<f64>> {
+    let draw = |place: u64| ((rng.uniform(place) * points.n as f64) as usize).min(points.n - 1);
+    let pair = |i: u64| least_squares(&points.subset(&[draw(2 * i), draw(2 * i + 1)].map(|k| k as u32)), |_| 1.0);
+    let tried = (0..PAIRS as u64).filter_map(pair).chain(least_squares(points, |_| 1.0));
+    let cost = |w: Vector3<f64>| (deciding(points, &w), w);
+    tried.map(cost).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, w)| w)
+}
+
+/// The squared residual that decides between rotations: that of a point at the end of the nearest [`SHARE`].
+fn deciding(points: &Observations, w: &Vector3<f64>) -> f64 {
+    let mut squares: Vec<f64> = (0..points.n).map(|k| left(points, k, w)).collect();
+    quantile(&mut squares, SHARE)
+}
+
+fn left(points: &Observations, k: usize, w: &Vector3<f64>) -> f64 {
+    let row = points.row(k);
+    (row.f - row.r * w).norm_squared()
+}
+
+/// A rotation by least squares with a weight for each point.
+fn least_squares(points: &Observations, weight: impl Fn(usize) -> f64) -> Option<Vector3<f64>> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for k in 0..points.n {
+        let (row, weight) = (points.row(k), weight(k));
+        normal += row.r.transpose() * row.r * weight;
+        right += row.r.transpose() * row.f * weight;
+    }
+    let w = normal.cholesky()?.solve(&right);
+    w.iter().all(|value| value.is_finite()).then_some(w)
+}
+
+/// The same with Tukey's weights about `start`.
+fn reweighted(points: &Observations, start: Vector3<f64>) -> Vector3<f64> {
+    let mut w = start;
+    for _ in 0..STEPS {
+        let cut = CUT * CUT * deciding(points, &w).max(f64::MIN_POSITIVE);
+        // Where hardly a point counts the last rotation was better.
+        let Some(next) = least_squares(points, |k| (1.0 - left(points, k, &w) / cut).max(0.0).powi(2)) else { break };
+        let settled = (next - w).norm() < ROUNDING;
+        w = next;
+        if settled {
+            break;
+        }
+    }
+    w
+}

@@ -1,0 +1,158 @@
+//! Maximum likelihood over all motions, and which of several minima it was.
+
+use super::refine::{Effort, FEWER, MANY, Minimum, refine};
+use super::smoothing::{DepthSmoother, Smoother};
+use super::starts::{Searched, sample};
+use crate::math::random::CounterRng;
+use crate::motion3d::diagnostics::degenerate::by_chance;
+use crate::motion3d::kernels::depths;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use rayon::prelude::*;
+
+/// Minima that are then refined on all points, beside the one with the smoothest depths and the first where
+/// signs count without their noise.
+const FINALISTS: usize = 2;
+
+/// Directions nearer than this, degrees, are one minimum.
+pub(crate) const SAME: f64 = 0.5;
+
+/// A minimum of the likelihood with what speaks against it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    pub minimum: Minimum,
+    /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared
+    /// units of noise.
+    pub cost: f64,
+    /// The same but for what noise alone leads behind the camera, where the roughness is in it; else
+    /// infinite.
+    pub fair: f64,
+}
+
+impl Candidate {
+    /// With the sign that has fewer depths behind the camera.
+    pub fn signed(observations: &Observations, minimum: &Minimum) -> Self {
+        let reversed = minimum.reversed(observations);
+        let better = if reversed.equations.behind < minimum.equations.behind { reversed } else { *minimum };
+        // J is of the minimum in both signs; taken from one of them, so that a cut does not matter.
+        Self { minimum: better, cost: reversed.equations.cost + better.equations.behind, fair: f64::INFINITY }
+    }
+
+    pub fn motion(&self) -> &Motion {
+        &self.minimum.motion
+    }
+
+    /// `J` and those depths behind the camera that noise does not lead there.
+    fn without_noise(&self) -> f64 {
+        self.minimum.equations.cost + self.minimum.equations.signs()
+    }
+}
+
+/// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the
+/// best minimum leaves more than that, it is looked for from more starts.
+pub(crate) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
+    let rounder = observations.rounder();
+    let first = rounder.first().unwrap_or(observations);
+    let searched = Searched::new(first, rng.stream(0));
+    let led = |starts: Vec<Motion>| {
+        let mut starts = starts;
+        for points in &rounder {
+            starts = refined(points, starts, rng).iter().map(|minimum| minimum.motion).collect();
+        }
+        refined(observations, starts, rng)
+    };
+    let found = led(searched.starts());
+    let free = observations.n.saturating_sub(5) as f64 / observations.shared;
+    let noise = |best: &Minimum| by_chance(best.equations.cost, free);
+    if unknown || free <= 0.0 || found.first().is_none_or(noise) {
+        return found;
+    }
+    different(found.into_iter().chain(led(searched.further())).collect())
+}
+
+/// The minima that starts lead to.
+fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) -> Vec<Minimum> {
+    let refined = if observations.n > MANY {
+        let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
+        let rough: Vec<Minimum> =
+            starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
+        let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
+        let rough = different(rough);
+        let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
+        finalists.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let fairest = finalists.iter().min_by(|a, b| a.without_noise().total_cmp(&b.without_noise())).copied();
+        finalists.truncate(FINALISTS);
+        // The truth may be neither of those whose residuals happen to be small.
+        let smoothest = choose(&fewer, &rough, smoother).0.into_iter().next();
+        for added in [smoothest, fairest].into_iter().flatten() {
+            if finalists.iter().all(|known| known.motion() != added.motion()) {
+                finalists.push(added);
+            }
+        }
+        // What leaves more on few points than chance explains need not be followed on many, whatever its
+        // signs and depths. (Signs do not decide here: at a minimum that is not reached yet they are of other
+        // depths.)
+        let left = |finalist: &Candidate| finalist.minimum.equations.cost;
+        let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
+        let limit = least + close(fewer.n) * (least / fewer.n as f64).max(1.0);
+        finalists.retain(|finalist| left(finalist) <= limit);
+        let followed =
+            |candidate: &Candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n));
+        finalists.iter().map(followed).collect()
+    } else {
+        starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()
+    };
+    different(refined)
+}
+
+/// Sorted by cost, each minimum once, whatever its sign.
+pub(crate) fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
+    minima.retain(|minimum| minimum.equations.cost.is_finite());
+    minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
+    let limit = SAME.to_radians().cos();
+    let mut kept: Vec<Minimum> = Vec::with_capacity(minima.len());
+    for minimum in minima {
+        if kept.iter().all(|other| other.motion.u().dot(&minimum.motion.u()).abs() < limit) {
+            kept.push(minimum);
+        }
+    }
+    kept
+}
+
+/// By how much the costs of two minima of `n` points may differ by chance.
+pub(crate) fn close(n: usize) -> f64 {
+    8.0 * (n as f64).sqrt() + 25.0
+}
+
+/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness
+/// of their depths, too.
+///
+/// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and
+/// differ by about `2 sqrt(n)` by chance.
+pub(crate) fn choose(
+    observations: &Observations,
+    minima: &[Minimum],
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> (Vec<Candidate>, Option<DepthSmoother>) {
+    let mut candidates: Vec<Candidate> =
+        minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
+    candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
+    let least = candidates.iter().map(Candidate::without_noise).fold(f64::INFINITY, f64::min);
+    let rival = |candidate: &Candidate| {
+        candidate.cost < best + close(observations.n) || candidate.without_noise() < least + close(observations.n)
+    };
+    let (mut rivals, others): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|one| rival(one));
+    if rivals.len() < 2 {
+        return (candidates, None);
+    }
+    let smoother = smoother();
+    for candidate in &mut rivals {
+        let rough = smoother.cost(&depths(observations, &candidate.minimum.motion));
+        candidate.fair = candidate.without_noise() + rough;
+        candidate.cost += rough;
+    }
+    rivals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    rivals.extend(others);
+    (rivals, Some(smoother))
+}

@@ -1,0 +1,166 @@
+//! Levenberg-Marquardt on the five unknowns of a motion.
+
+use crate::motion3d::kernels::{Equations, equations};
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::Observations;
+use nalgebra::{Matrix2x3, SMatrix};
+
+/// Points from which on there are many: so that a search takes no longer, it begins with fewer of them.
+pub(crate) const MANY: usize = 4000;
+pub(crate) const FEWER: usize = 2000;
+
+/// The largest share of `H` that may be noise of the depths where steps are taken without that.
+const MOST: f64 = 0.95;
+
+/// Deviations of a step that is near the minimum.
+const NEAR: f64 = 0.3;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Most steps.
+    pub steps: usize,
+    /// Length of a step `(psi, w)`, rad, that is not worth another.
+    pub tolerance: f64,
+    /// The same in deviations of what is found, as far as its residuals tell these.
+    pub deviations: f64,
+}
+
+impl Effort {
+    /// To leave a motion as it is.
+    pub const NONE: Self = Self { steps: 0, tolerance: 0.0, deviations: 0.0 };
+    /// For a start that will be refined again.
+    pub const ROUGH: Self = Self { steps: 15, tolerance: 1e-4, deviations: 0.0 };
+    /// To the minimum.
+    pub const FULL: Self = Self { steps: 60, tolerance: 1e-10, deviations: 0.0 };
+
+    /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the
+    /// deviation hardly anything is left.
+    pub const fn of(n: usize) -> Self {
+        if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
+    }
+}
+
+/// A minimum with the equations there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Minimum {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    pub equations: Equations,
+}
+
+impl Minimum {
+    fn at(observations: &Observations, motion: Motion, cut: Option<f64>) -> Self {
+        let tangent = tangents(&motion.u());
+        Self { motion, tangent, equations: equations(observations, &motion, &tangent, cut) }
+    }
+
+    /// The same with all depths of the other sign: `e` and `J` stay, `D` at the depths changes its sign with
+    /// the axes.
+    pub fn reversed(&self, observations: &Observations) -> Self {
+        Self::at(observations, self.motion.reversed(), None)
+    }
+}
+
+/// The step that solves the damped equations of `n` points; `None` where they have no solution.
+///
+/// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they
+/// would leave the share `P / H` of the way, and are taken without it.
+fn step(equations: &Equations, n: usize, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
+    let Equations { h, p, gradient, .. } = equations;
+    let solved = |matrix: SMatrix<f64, 5, 5>| {
+        let damped = matrix + SMatrix::from_diagonal(&(h.diagonal() * damping));
+        let step = damped.cholesky()?.solve(gradient);
+        step.iter().all(|value| value.is_finite()).then_some(step)
+    };
+    let careful = solved(*h)?;
+    let near = squared_deviations(equations, &careful, n) < NEAR * NEAR && (h - p / MOST).cholesky().is_some();
+    if near { solved(h - p) } else { Some(careful) }
+}
+
+/// The square of a step in deviations of what is found, as far as residuals of `n` points tell these.
+fn squared_deviations(equations: &Equations, step: &SMatrix<f64, 5, 1>, n: usize) -> f64 {
+    step.dot(&(equations.h * step)) * n as f64 / equations.cost
+}
+
+/// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along
+/// with it.
+///
+/// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton
+/// steps.
+pub(crate) fn refine(observations: &Observations, start: Motion, cut: Option<f64>, effort: Effort) -> Minimum {
+    let mut here = Minimum::at(observations, start, cut);
+    let mut damping = 1e-4;
+    for _ in 0..effort.steps {
+        let Some(change) = step(&here.equations, observations.n, damping) else {
+            damping = (damping * 10.0f64).max(1e-6);
+            if damping > 1e12 {
+                break;
+            }
+            continue;
+        };
+        let there = Minimum::at(observations, here.motion.stepped(&here.tangent, &change), cut);
+        let deviations = squared_deviations(&here.equations, &change, observations.n).sqrt();
+        let settled = change.norm() < effort.tolerance || deviations < effort.deviations;
+        if there.equations.cost <= here.equations.cost {
+            here = there;
+            damping *= 0.1;
+        } else {
+            damping *= 10.0;
+        }
+        if settled || damping > 1e12 {
+            break;
+        }
+    }
+    here
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::tests::scenes::Scene;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn the_gradient_is_that_of_the_cost() {
+        let scene = Scene::oblique(60, 0.05, 3);
+        let observations = scene.observations();
+        for cut in [None, Some(2.0)] {
+            let at = Motion::new([0.5, 0.3, 0.8], [0.03, -0.02, 0.0]);
+            let here = Minimum::at(&observations, at, cut);
+            for axis in 0..5 {
+                let h = 1e-6;
+                let cost = |by: f64| {
+                    let mut step = SMatrix::<f64, 5, 1>::zeros();
+                    step[axis] = by;
+                    Minimum::at(&observations, at.stepped(&here.tangent, &step), cut).equations.cost
+                };
+                let slope = (cost(h) - cost(-h)) / (2.0 * h);
+                let want = -2.0 * here.equations.gradient[axis];
+                assert!((slope - want).abs() < 1e-4 * want.abs().max(1.0), "{cut:?} {axis}: {slope} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn exact_flow_gives_the_exact_motion() {
+        let scene = Scene::oblique(60, 0.0, 3);
+        let near = Motion::of(&(scene.motion.u() + Vector3::new(0.05, -0.04, 0.02)).normalize(), &Vector3::zeros());
+        let found = refine(&scene.observations(), near, None, Effort::FULL);
+        assert!(found.motion.angle_to(&scene.motion) < 1e-9);
+        assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
+    }
+
+    /// Of depths so noisy that their noise is seven tenths of `H`, Gauss-Newton steps would leave as much of
+    /// the way each.
+    #[test]
+    fn noisy_depths_do_not_shorten_steps() {
+        let observations = Scene::oblique(20000, 0.3, 5).observations();
+        let least = refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, Effort::FULL);
+        let noisy = |share: f64| (least.equations.h - least.equations.p / share).cholesky().is_none();
+        assert!(noisy(0.7) && !noisy(MOST));
+        let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.004, -0.002, 0.0, 0.0, 0.0]]));
+        let found = refine(&observations, near, None, Effort { steps: 3, ..Effort::FULL });
+        assert!(found.motion.angle_to(&least.motion) < 1e-4, "{}", found.motion.angle_to(&least.motion));
+    }
+}

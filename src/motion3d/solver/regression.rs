@@ -1,0 +1,227 @@
+//! Depths predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
+
+use super::neighbours::Neighbours;
+use crate::motion3d::model::motion::tangents;
+use crate::simd::{Kernel, Lanes, Level, dispatch};
+use nalgebra::{Matrix2x3, Vector3};
+use rayon::prelude::*;
+
+/// Points of one task; a multiple of every lane count.
+const BAND: usize = 256;
+
+/// Most lanes.
+const MOST: usize = 16;
+
+/// Weight that the farthest neighbour keeps.
+const TAIL: f64 = 0.001;
+
+/// Share of the points' weight that is added to their spread, so that points on one line determine a line.
+const RIDGE: f64 = 1e-9;
+
+/// Noise variance of a prediction that nothing is known for.
+pub(crate) const NO_PREDICTION: f64 = 1e30;
+
+/// What a regression needs of a point, by its place in the tree: where it is, its depth and the inverse
+/// variance of that.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Site {
+    pub at: [f64; 3],
+    pub nu: f64,
+    pub s2: f64,
+}
+
+/// Predictions `q` and the variances `c` that noise of the neighbours gives them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Prediction {
+    pub q: Vec<f64>,
+    pub c: Vec<f64>,
+}
+
+struct Regress<'a> {
+    sites: &'a [Site],
+    asked: &'a [u32],
+    neighbours: &'a Neighbours,
+    /// Index of the first of `asked` in `neighbours`.
+    first: usize,
+    k: usize,
+    spherical: bool,
+    q: &'a mut [f64],
+    c: &'a mut [f64],
+}
+
+/// The neighbours number `j` of a group of points, seen from each of them in units of its reach.
+struct Group {
+    x: [f64; MOST],
+    y: [f64; MOST],
+    /// Square distance.
+    d2: [f64; MOST],
+    nu: [f64; MOST],
+    s2: [f64; MOST],
+}
+
+impl Group {
+    #[inline(always)]
+    fn put(&mut self, lane: usize, from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64) {
+        let d =
+            [(site.at[0] - from.at[0]) * scale, (site.at[1] - from.at[1]) * scale, (site.at[2] - from.at[2]) * scale];
+        self.d2[lane] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let [x, y] = match axes {
+            None => [d[0], d[1]],
+            Some(e) => [
+                e[(0, 0)] * d[0] + e[(0, 1)] * d[1] + e[(0, 2)] * d[2],
+                e[(1, 0)] * d[0] + e[(1, 1)] * d[1] + e[(1, 2)] * d[2],
+            ],
+        };
+        self.x[lane] = x;
+        self.y[lane] = y;
+        self.nu[lane] = site.nu;
+        self.s2[lane] = site.s2;
+    }
+}
+
+impl Kernel<f64> for Regress<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let mut group = Group { x: [0.0; MOST], y: [0.0; MOST], d2: [0.0; MOST], nu: [0.0; MOST], s2: [0.0; MOST] };
+        let (one, tail) = (V::constant(1.0), V::constant(TAIL));
+        for start in (0..self.asked.len()).step_by(V::LANES) {
+            let lanes = V::LANES.min(self.asked.len() - start);
+            let mut from = [Site::default(); MOST];
+            let mut axes = [None; MOST];
+            let mut scale = [0.0; MOST];
+            for lane in 0..lanes {
+                from[lane] = self.sites[self.asked[start + lane] as usize];
+                if self.spherical {
+                    axes[lane] = Some(tangents(&Vector3::from(from[lane].at)));
+                }
+                let last = &self.sites[self.neighbours.of(self.first + start + lane)[self.k - 1] as usize].at;
+                let d = [last[0] - from[lane].at[0], last[1] - from[lane].at[1], last[2] - from[lane].at[2]];
+                let reach = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                scale[lane] = if reach > 0.0 { 1.0 / reach } else { 0.0 };
+            }
+            // Sums over neighbours: X^t Omega X, X^t Omega nu, X^t Omega V Omega X with rows (1, x, y).
+            let mut n = [V::zero(); 6];
+            let mut b = [V::zero(); 3];
+            let mut v = [V::zero(); 6];
+            for j in 0..self.k {
+                for lane in 0..lanes {
+                    let place = self.neighbours.of(self.first + start + lane)[j];
+                    group.put(lane, &from[lane], &self.sites[place as usize], axes[lane].as_ref(), scale[lane]);
+                }
+                let (x, y) = (V::load(&group.x), V::load(&group.y));
+                // The farthest is at 1 up to the rounding of distances.
+                let d2 = V::load(&group.d2).min(one);
+                let near = one - d2 * d2.sqrt();
+                let kappa = near.mul_add(near, tail);
+                let omega = kappa * V::load(&group.s2);
+                let noise = kappa * omega;
+                let products = [one, x, y, x * x, x * y, y * y];
+                let nu = V::load(&group.nu) * omega;
+                for i in 0..6 {
+                    n[i] = omega.mul_add(products[i], n[i]);
+                    v[i] = noise.mul_add(products[i], v[i]);
+                }
+                for i in 0..3 {
+                    b[i] = nu.mul_add(products[i], b[i]);
+                }
+            }
+            let ridge = n[0] * V::constant(RIDGE);
+            let (xx, yy) = (n[3] + ridge, n[5] + ridge);
+            // The first row of the inverse, times the determinant.
+            let first = xx.mul_add(yy, -(n[4] * n[4]));
+            let second = n[2].mul_add(n[4], -(n[1] * yy));
+            let third = n[1].mul_add(n[4], -(n[2] * xx));
+            let determinant = n[0].mul_add(first, n[1].mul_add(second, n[2] * third));
+            let known = V::zero().lt(determinant);
+            let inverse = one / determinant;
+            let q = first.mul_add(b[0], second.mul_add(b[1], third * b[2])) * inverse;
+            let mixed = first.mul_add(second * v[1], first.mul_add(third * v[2], second * third * v[4]));
+            let pure = first.mul_add(first * v[0], second.mul_add(second * v[3], third * third * v[5]));
+            let c = (mixed + mixed + pure) * inverse * inverse;
+            let (mut at_q, mut at_c) = ([0.0; MOST], [0.0; MOST]);
+            V::select(known, q, V::zero()).store(&mut at_q);
+            V::select(known, c, V::constant(NO_PREDICTION)).store(&mut at_c);
+            self.q[start..start + lanes].copy_from_slice(&at_q[..lanes]);
+            self.c[start..start + lanes].copy_from_slice(&at_c[..lanes]);
+        }
+    }
+}
+
+/// Predicts the depth of each of `asked` (places in the tree) from the `k` nearest of its neighbours, itself
+/// left out.
+///
+/// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the
+/// smoother's weights `l`.
+pub(crate) fn regress(
+    sites: &[Site],
+    asked: &[u32],
+    neighbours: &Neighbours,
+    k: usize,
+    spherical: bool,
+    level: Level,
+) -> Prediction {
+    let mut out = Prediction { q: vec![0.0; asked.len()], c: vec![0.0; asked.len()] };
+    let bands = out.q.par_chunks_mut(BAND).zip(out.c.par_chunks_mut(BAND)).zip(asked.par_chunks(BAND));
+    bands.enumerate().for_each(|(band, ((q, c), asked))| {
+        let first = band * BAND;
+        dispatch(level, Regress { sites, asked, neighbours, first, k, spherical, q, c });
+    });
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::motion3d::solver::neighbours::Tree;
+    use nalgebra::{DMatrix, DVector};
+
+    /// The same by matrices.
+    fn plain(sites: &[Site], from: &Site, nearest: &[u32], axes: &Matrix2x3<f64>) -> (f64, f64) {
+        let to = |j: &u32| Vector3::from(sites[*j as usize].at) - Vector3::from(from.at);
+        let reach = nearest.iter().map(|j| to(j).norm()).fold(0.0, f64::max);
+        let rows: Vec<_> = nearest.iter().map(|j| axes * to(j)).collect();
+        let x = DMatrix::from_fn(rows.len(), 3, |i, j| if j == 0 { 1.0 } else { rows[i][j - 1] });
+        let kappa = |j: &u32| (1.0 - (to(j).norm() / reach).powi(3)).powi(2) + 0.001;
+        let omega = DMatrix::from_diagonal(&DVector::from_iterator(
+            nearest.len(),
+            nearest.iter().map(|j| kappa(j) * sites[*j as usize].s2),
+        ));
+        let nu = DVector::from_iterator(nearest.len(), nearest.iter().map(|&j| sites[j as usize].nu));
+        let solve = (x.transpose() * &omega * &x).try_inverse().unwrap() * x.transpose() * omega;
+        let c = nearest.iter().enumerate().map(|(i, &j)| solve[(0, i)].powi(2) / sites[j as usize].s2).sum();
+        ((solve * nu)[0], c)
+    }
+
+    #[test]
+    fn lanes_agree_with_matrices_on_the_plane_and_on_the_sphere() {
+        let rng = CounterRng::new(8);
+        for spherical in [false, true] {
+            let at = |k: u64| {
+                let p = [0, 1, 2].map(|i| rng.normal(3 * k + i));
+                if spherical { Vector3::from(p).normalize().into() } else { [p[0], p[1], 0.0] }
+            };
+            let tree = Tree::new(&(0..150).map(at).collect::<Vec<_>>());
+            let site = |(i, &at): (usize, &[f64; 3])| Site {
+                at,
+                nu: rng.stream(1).normal(i as u64),
+                s2: 0.5 + rng.stream(2).uniform(i as u64),
+            };
+            let sites: Vec<Site> = tree.points().iter().enumerate().map(site).collect();
+            let asked: Vec<u32> = (0..150).step_by(7).collect();
+            let lists = tree.nearest(&asked, 32);
+            for k in [8, 32] {
+                let got = regress(&sites, &asked, &lists, k, spherical, Level::detect());
+                for (i, &place) in asked.iter().enumerate() {
+                    let from = &sites[place as usize];
+                    let flat = Matrix2x3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
+                    let axes = if spherical { tangents(&Vector3::from(from.at)) } else { flat };
+                    let (q, c) = plain(&sites, from, &lists.of(i)[..k], &axes);
+                    assert!((got.q[i] - q).abs() < 1e-5 * q.abs().max(1.0), "{} {q}", got.q[i]);
+                    assert!((got.c[i] - c).abs() < 1e-5 * c, "{} {c}", got.c[i]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as
+//! far as that can be trusted.
+
+use super::neighbours::{Neighbours, SIZES, Tree};
+use super::regression::{Prediction, Site, regress};
+use super::starts::sample;
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::Depths;
+use crate::motion3d::model::observations::Observations;
+use crate::simd::Level;
+
+/// Most points that predictors are compared on.
+const COMPARED: usize = 4000;
+
+/// Most that a point counts, in squared standard deviations: a step in depth must not decide alone.
+const CAP: f64 = 25.0;
+
+/// Rounds of the excess variance of one prior.
+const PRIOR_ROUNDS: usize = 50;
+
+/// Which predictors may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Smoother {
+    /// The better of both on these points.
+    #[default]
+    Auto,
+    /// One normal distribution of all inverse depths.
+    Prior,
+    /// Local-linear regression on the 8, 16, 32 or 64 nearest points.
+    Neighbours,
+}
+
+/// What predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Prior,
+    Nearest(usize),
+}
+
+/// A fitted predictor with what it says about the compared points.
+struct Fitted {
+    kind: Kind,
+    prediction: Prediction,
+    excess: f64,
+    /// Mean of `ln tot + min(res^2 / tot, 25)`.
+    loss: f64,
+}
+
+/// Depths for the weights, how much of each point's own is in them, and their posterior variances; as long as
+/// the planes.
+#[derive(Debug, Clone)]
+pub(crate) struct Smoothed {
+    pub nu: Vec<f64>,
+    pub share: Vec<f64>,
+    pub variance: Vec<f64>,
+}
+
+/// Smooths depths of one set of points; the neighbourhoods are found once.
+#[derive(Debug)]
+pub(crate) struct DepthSmoother {
+    tree: Tree,
+    which: Smoother,
+    spherical: bool,
+    level: Level,
+    /// Places in the tree of the points that predictors are compared on, and their neighbours.
+    compared: Vec<u32>,
+    lists: Neighbours,
+    /// Neighbours of all points, where only some are compared.
+    everyone: Option<Neighbours>,
+}
+
+impl DepthSmoother {
+    /// For these points.
+    pub fn new(observations: &Observations, which: Smoother, rng: CounterRng) -> Self {
+        let tree = Tree::new(&observations.site);
+        let n = observations.n;
+        let compared = sample(n, COMPARED, rng);
+        let most = SIZES.into_iter().rfind(|&k| k < n);
+        let lists = most.map_or_else(Neighbours::default, |k| tree.nearest(&compared, k));
+        Self {
+            tree,
+            which,
+            spherical: observations.spherical,
+            level: observations.level,
+            compared,
+            lists,
+            everyone: None,
+        }
+    }
+
+    /// Points with their depths, by place in the tree.
+    fn sites(&self, depths: &Depths) -> Vec<Site> {
+        let places = self.tree.order().iter().zip(self.tree.points());
+        places.map(|(&i, &at)| Site { at, nu: depths.nu[i as usize], s2: depths.s2[i as usize] }).collect()
+    }
+
+    /// The predictor with the least loss on the compared points.
+    fn best(&self, sites: &[Site], which: Smoother) -> Fitted {
+        let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
+        let mut best: Option<Fitted> = None;
+        let mut offer = |fitted: Fitted| {
+            if best.as_ref().is_none_or(|best| fitted.loss < best.loss) {
+                best = Some(fitted);
+            }
+        };
+        if which != Smoother::Neighbours || self.lists.k == 0 {
+            offer(Self::prior(sites, &compared));
+        }
+        for k in SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior) {
+            let prediction = regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
+            let excess = excess(&compared, &prediction);
+            let loss = loss(&compared, &prediction, excess, 0.0);
+            offer(Fitted { kind: Kind::Nearest(k), prediction, excess, loss });
+        }
+        best.expect("one predictor at least was offered")
+    }
+
+    /// One normal prior: mean with weights `1 / (v + t2)`, `t2` the scatter beyond the noise.
+    fn prior(sites: &[Site], compared: &[Site]) -> Fitted {
+        let (mut mean, mut excess) = (0.0, 0.0);
+        for _ in 0..PRIOR_ROUNDS {
+            let (mut sum, mut total) = (0.0, 0.0);
+            for site in sites {
+                let weight = site.s2 / (1.0 + excess * site.s2);
+                sum += weight * site.nu;
+                total += weight;
+            }
+            mean = if total > 0.0 { sum / total } else { 0.0 };
+            let (mut scatter, mut squares) = (0.0, 0.0);
+            for site in sites.iter().filter(|site| site.s2 > 0.0) {
+                let weight = site.s2 / (1.0 + excess * site.s2);
+                scatter += weight * weight * ((site.nu - mean) * (site.nu - mean) - 1.0 / site.s2);
+                squares += weight * weight;
+            }
+            let next = if squares > 0.0 { (scatter / squares).max(0.0) } else { 0.0 };
+            let settled = (next - excess).abs() <= 1e-6 * next;
+            excess = next;
+            if settled {
+                break;
+            }
+        }
+        let prediction = Prediction { q: vec![mean; compared.len()], c: vec![0.0; compared.len()] };
+        let loss = loss(compared, &prediction, excess, 0.0);
+        Fitted { kind: Kind::Prior, prediction, excess, loss }
+    }
+
+    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 /
+    /// tot, 25)]`. Whatever smooths the weights, this looks at the better predictor.
+    pub fn cost(&self, depths: &Depths) -> f64 {
+        let sites = self.sites(depths);
+        let fitted = self.best(&sites, Smoother::Auto);
+        let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
+        loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
+    }
+
+    /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
+    pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
+        let sites = self.sites(depths);
+        let Fitted { kind, prediction, excess, .. } = self.best(&sites, self.which);
+        let all = match kind {
+            Kind::Prior => {
+                let mean = prediction.q.first().copied().unwrap_or(0.0);
+                Prediction { q: vec![mean; sites.len()], c: vec![0.0; sites.len()] }
+            }
+            Kind::Nearest(_) if self.compared.len() == sites.len() => prediction,
+            Kind::Nearest(k) => {
+                let everyone: Vec<u32> = (0..sites.len() as u32).collect();
+                if self.everyone.as_ref().is_none_or(|lists| lists.k < k) {
+                    self.everyone = Some(self.tree.nearest(&everyone, k));
+                }
+                let lists = self.everyone.as_ref().expect("made just before");
+                regress(&sites, &everyone, lists, k, self.spherical, self.level)
+            }
+        };
+        let none = vec![0.0; depths.nu.len()];
+        let mut out = Smoothed { nu: none.clone(), share: none.clone(), variance: none };
+        for (place, (site, &i)) in sites.iter().zip(self.tree.order()).enumerate() {
+            // (t2 + c) / (t2 + c + 1 / s2), which is 0 at the epipole.
+            let (q, spread) = (all.q[place], excess + all.c[place]);
+            let wide = spread * site.s2;
+            let share = wide / (wide + 1.0);
+            out.share[i as usize] = share;
+            out.variance[i as usize] = spread / (wide + 1.0);
+            out.nu[i as usize] = q + share * (site.nu - q);
+        }
+        out
+    }
+}
+
+/// The scatter of depths about their predictions beyond both noises, `t2`.
+fn excess(sites: &[Site], prediction: &Prediction) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (site, (q, c)) in sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.s2 > 0.0) {
+        let noise = 1.0 / site.s2 + c;
+        let weight = 1.0 / (noise * noise);
+        let square = (site.nu - q) * (site.nu - q);
+        sum += weight * (square.min(CAP * noise) - noise);
+        total += weight;
+    }
+    if total > 0.0 { (sum / total).max(0.0) } else { 0.0 }
+}
+
+/// Mean of `ln tot + min(res^2 / tot, 25)`, `tot = t2 + v + c`; with `relative` 1, of `ln(tot s^2)`.
+fn loss(sites: &[Site], prediction: &Prediction, excess: f64, relative: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (site, (q, c)) in sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.s2 > 0.0) {
+        let total = excess + 1.0 / site.s2 + c;
+        let square = (site.nu - q) * (site.nu - q);
+        sum += total.ln() + relative * site.s2.ln() + (square / total).min(CAP);
+        count += 1;
+    }
+    if count > 0 { sum / count as f64 } else { f64::INFINITY }
+}

@@ -1,0 +1,218 @@
+//! The search over directions: where on the half sphere the residuals are small.
+
+use super::refine::{Effort, refine};
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::best_rotation;
+use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::observations::Observations;
+use nalgebra::{Vector2, Vector3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Directions on the half sphere, about 8 degrees apart.
+const DIRECTIONS: usize = 300;
+
+/// Most points that the search looks at.
+pub(crate) const SEARCHED: usize = 1000;
+
+/// Starts that are refined, and the least angle between them, degrees.
+const STARTS: usize = 5;
+const APART: f64 = 12.0;
+
+/// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is
+/// as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond
+/// it, starts among them, and the share that these are apart.
+const ACROSS: usize = 12;
+const NARROW: f64 = 0.45;
+const BEYOND: f64 = 0.25;
+const STARTS_WITHIN: usize = 3;
+const APART_WITHIN: f64 = 0.25;
+
+/// Starts that are refined where what the first left is no noise, and the least angle between them, degrees.
+const FURTHER: usize = 16;
+const APART_FURTHER: f64 = 4.0;
+
+/// Starts among what a few steps on a few points lead to.
+const BASINS: usize = 4;
+const FEW: usize = 128;
+const STEPS: Effort = Effort { steps: 4, tolerance: 1e-2, deviations: 0.0 };
+
+/// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
+const TOGETHER: usize = 20;
+
+/// Evenly spread directions with `z > 0`: a Fibonacci lattice.
+pub(crate) fn half_sphere() -> Vec<Vector3<f64>> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let direction = |i: usize| {
+        let z = (i as f64 + 0.5) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let radius = (1.0 - z * z).sqrt();
+        Vector3::new(radius * cos, radius * sin, z)
+    };
+    (0..DIRECTIONS).map(direction).collect()
+}
+
+/// `count` different indices below `n`, ascending, at random: the same for the same seed.
+pub(crate) fn sample(n: usize, count: usize, rng: CounterRng) -> Vec<u32> {
+    if count >= n {
+        return (0..n as u32).collect();
+    }
+    // Those with the smallest random keys.
+    let mut keyed: Vec<(u64, u32)> = (0..n as u32).map(|k| (rng.bits(u64::from(k)), k)).collect();
+    keyed.select_nth_unstable(count - 1);
+    let mut chosen: Vec<u32> = keyed[..count].iter().map(|&(_, k)| k).collect();
+    chosen.sort_unstable();
+    chosen
+}
+
+/// Evaluates every direction of the half sphere.
+pub(crate) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
+    each(&half_sphere(), work)
+}
+
+/// Evaluates directions in groups that threads share.
+fn each<R: Send>(directions: &[Vector3<f64>], work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
+    let groups: Vec<Vec<R>> =
+        directions.par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
+    groups.into_iter().flatten().collect()
+}
+
+/// The best of the motions, cheapest first, no two within `apart` degrees of each other (or of each other's
+/// opposite).
+pub(crate) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -> Vec<(Motion, f64)> {
+    motions.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let limit = apart.to_radians().cos();
+    let mut kept: Vec<(Motion, f64)> = Vec::with_capacity(count);
+    for candidate in motions {
+        if kept.iter().all(|(other, _)| other.u().dot(&candidate.0.u()).abs() < limit) {
+            kept.push(candidate);
+            if kept.len() == count {
+                break;
+            }
+        }
+    }
+    kept
+}
+
+/// All points, or `most` random ones.
+pub(crate) fn at_most(observations: &Observations, most: usize, rng: CounterRng) -> Cow<'_, Observations> {
+    if observations.n > most {
+        Cow::Owned(observations.subset(&sample(observations.n, most, rng)))
+    } else {
+        Cow::Borrowed(observations)
+    }
+}
+
+/// Directions that were looked at, each with the rotation that suits it best and what that leaves.
+pub(crate) struct Searched {
+    all: Vec<(Motion, f64)>,
+    basins: Vec<(Motion, f64)>,
+    within: Vec<(Motion, f64)>,
+    /// Least angle between starts within the picture, degrees.
+    apart: f64,
+}
+
+impl Searched {
+    /// The whole half sphere, and a narrow picture more closely, by `J` on at most 1000 random points.
+    pub fn new(observations: &Observations, rng: CounterRng) -> Self {
+        let searched = &*at_most(observations, SEARCHED, rng);
+        let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
+        let (within, width) = within(searched);
+        let all = evaluate(best);
+        let basins = basins(searched, &all, rng.stream(7));
+        Self { all, basins, within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
+    }
+
+    /// The most promising motions: the best, and those in whose neighbourhood the least is left, lest all lie
+    /// in one long valley.
+    pub fn starts(&self) -> Vec<Motion> {
+        let all = apart(self.all.clone(), APART, STARTS).into_iter();
+        let basins = apart(self.basins.clone(), APART, BASINS);
+        let within = apart(self.within.clone(), self.apart, STARTS_WITHIN);
+        different(all.chain(basins).chain(within))
+    }
+
+    /// More of them, where none of those led to the flow's noise.
+    pub fn further(&self) -> Vec<Motion> {
+        let all = apart(self.all.clone(), APART_FURTHER, FURTHER).into_iter();
+        let basins = apart(self.basins.clone(), APART_FURTHER, FURTHER);
+        let within = apart(self.within.clone(), 0.5 * self.apart, FURTHER);
+        different(all.chain(basins).chain(within))
+    }
+}
+
+/// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow
+/// that the nearest direction looks worse than hundreds of others.
+fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -> Vec<(Motion, f64)> {
+    let few = &*at_most(observations, FEW, rng);
+    let led = |&(motion, _): &(Motion, f64)| {
+        let minimum = refine(few, motion, None, STEPS);
+        (minimum.motion, minimum.equations.cost)
+    };
+    apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(led).collect()
+}
+
+/// The motions, each once.
+fn different(motions: impl Iterator<Item = (Motion, f64)>) -> Vec<Motion> {
+    let mut kept: Vec<Motion> = Vec::new();
+    for (motion, _) in motions {
+        if !kept.contains(&motion) {
+            kept.push(motion);
+        }
+    }
+    kept
+}
+
+/// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half
+/// width, rad.
+fn within(observations: &Observations) -> (Vec<Vector3<f64>>, f64) {
+    let none = (Vec::new(), 0.0);
+    let seen = |at: &[f64; 3]| {
+        let along = if observations.spherical { at[2] } else { 1.0 };
+        Vector3::new(at[0], at[1], along).normalize()
+    };
+    let sum: Vector3<f64> = observations.site.iter().map(seen).sum();
+    let Some(middle) = sum.try_normalize(0.0) else { return none };
+    let axes = tangents(&middle);
+    let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+    for direction in observations.site.iter().map(seen) {
+        let along = direction.dot(&middle);
+        if along < NARROW.cos() {
+            return none;
+        }
+        let place = axes * direction / along;
+        (low, high) = (low.inf(&place), high.sup(&place));
+    }
+    let (centre, half) = ((low + high) * 0.5, (high - low) * (0.5 + BEYOND));
+    let step = |i: usize| 2.0 * (i as f64 + 0.5) / ACROSS as f64 - 1.0;
+    let direction = |i: usize| {
+        let at = centre + half.component_mul(&Vector2::new(step(i % ACROSS), step(i / ACROSS)));
+        (middle + axes.transpose() * at).normalize()
+    };
+    ((0..ACROSS * ACROSS).map(direction).collect(), half.max())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_cover_the_half_sphere() {
+        let directions = half_sphere();
+        assert!(directions.iter().all(|d| (d.norm() - 1.0).abs() < 1e-14 && d.z > 0.0));
+        let rng = CounterRng::new(1);
+        for k in 0..500 {
+            let any = Vector3::new(rng.normal(3 * k), rng.normal(3 * k + 1), rng.normal(3 * k + 2)).normalize();
+            let nearest = directions.iter().map(|d| d.dot(&any).abs()).fold(0.0, f64::max);
+            assert!(nearest.acos().to_degrees() < 8.5, "{any}: {}", nearest.acos().to_degrees());
+        }
+    }
+
+    #[test]
+    fn samples_are_different_indices() {
+        let chosen = sample(100, 30, CounterRng::new(4));
+        assert!(chosen.len() == 30 && chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[29] < 100);
+        assert_ne!(chosen, sample(100, 30, CounterRng::new(5)));
+        assert_eq!(sample(3, 30, CounterRng::new(5)), [0, 1, 2]);
+    }
+}

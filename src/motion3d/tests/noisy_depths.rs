@@ -1,0 +1,52 @@
+//! Depths that are mostly noise hide the truth behind a lower minimum: that must not be told as `ok`.
+
+use super::scenes::{Scene, ground, oblique, smooth};
+use crate::motion3d::*;
+
+/// How many of the estimates are `ok`, and how many of those off by more than four deviations and 15 degrees.
+fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
+    let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
+    let (mut confident, mut wrong) = (0, 0);
+    for seed in 0..trials {
+        let scene = scene(7000 + seed);
+        let found = estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &options).unwrap();
+        let error = found.motion.angle_to(&scene.motion).to_degrees();
+        let ok = found.status == Status::Ok;
+        confident += u32::from(ok);
+        wrong += u32::from(ok && error > 15.0 && error > 4.0 * found.direction_std);
+    }
+    (confident, wrong)
+}
+
+#[test]
+fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
+    let side = Motion::new([1.0, 0.3, 0.2], [0.0, 0.02, 0.0]);
+    for (motion, h, sigma) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
+        let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, sigma, seed, |_, y, _| ground(y)));
+        assert!(wrong <= 1, "{motion:?} {sigma}: {wrong}");
+    }
+}
+
+/// Of hardly visible depths half are behind the camera by noise alone, and a wrong motion may have fewer of
+/// them.
+#[test]
+fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
+    let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);
+    for (n, sigma) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
+        let (_, wrong) = counts(30, |seed| Scene::new(ahead, n, 0.5, sigma, seed, |_, y, _| ground(y)));
+        assert!(wrong <= 2, "{n} {sigma}: {wrong}");
+    }
+    let (confident, wrong) = counts(30, |seed| Scene::new(ahead, 1000, 0.5, 0.1, seed, |_, y, _| ground(y)));
+    assert!(confident >= 15 && wrong == 0, "{confident} {wrong}");
+}
+
+#[test]
+fn depths_that_tell_are_trusted() {
+    let motion = oblique();
+    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 500, 0.6, 0.1, seed, |x, y, _| smooth(x, y)));
+    assert!(confident >= 48 && wrong == 0, "{confident} {wrong}");
+    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 1000, 0.6, 0.1, seed, |_, y, _| ground(y)));
+    assert!(confident >= 57 && wrong == 0, "{confident} {wrong}");
+    let (confident, wrong) = counts(60, |seed| Scene::oblique(500, 0.2, seed));
+    assert!(confident >= 54 && wrong == 0, "{confident} {wrong}");
+}
