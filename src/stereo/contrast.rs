@@ -17,7 +17,7 @@ const ALIKE: f32 = 1.15;
 /// The right view times the ratio of both views' contrasts, unless that is nearly 1 or is none. Matching
 /// compares gradients, which a gain changes; a bias they do not see.
 pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, Frame<f32>> {
-    match ratio(left, right) {
+    match ratio(left, right).filter(|_| crate::ablation::keeps("edges.contrast")) {
         Some(ratio) if !(EQUAL[0]..=EQUAL[1]).contains(&ratio) => Cow::Owned(right.map(|&value| value * ratio)),
         _ => Cow::Borrowed(right),
     }

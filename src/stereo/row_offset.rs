@@ -93,7 +93,8 @@ impl RowEstimate {
 
     /// Whether it may be kept for other pairs.
     pub fn is_believed(&self, options: &EdgeDisparityOptions) -> bool {
-        self.settled && self.agreement.suffices() && !self.is_doubtful(options)
+        !crate::ablation::keeps("edges.believed_rows")
+            || self.settled && self.agreement.suffices() && !self.is_doubtful(options)
     }
 }
 
@@ -110,7 +111,7 @@ pub(super) fn row_offset_of(
     let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
     let (left_smooth, right_smooth) = smoothed(left, right);
     let mut agreement = Agreement::new(std::iter::empty());
-    for _ in 0..PASSES {
+    for _ in 0..if crate::ablation::keeps("edges.second_pass") { PASSES } else { 1 } {
         let matches = match_aligned(left, view, right, offset, &options);
         agreement = Agreement::of(&matches);
         let mut windows = windows(&left_smooth, view, &matches, WINDOWS.1);

@@ -117,7 +117,7 @@ fn winners(
 fn lowest(sums: &[u16], costs: &[u16], allowed: Range<usize>) -> Option<(usize, f32)> {
     let best = allowed.min_by_key(|&k| sums[k])?;
     let cost = f32::from(costs[best]) / f32::from(HIGHEST);
-    (cost <= REFUSED).then_some((best, cost))
+    (cost <= REFUSED || !crate::ablation::keeps("edges.refused_cost")).then_some((best, cost))
 }
 
 /// Where the least sum is: beside, or at, the candidate that has it.

@@ -135,6 +135,9 @@ pub(super) fn visible_share([x, y, w, h]: CentredBox, (width, height): (usize, u
 /// Boxes of which less than half is in the picture are less similar.
 #[inline]
 pub(super) fn visibility_factor(bounds: CentredBox, size: (usize, usize)) -> f64 {
+    if !crate::ablation::keeps("particle.visible_share") {
+        return 1.0;
+    }
     (2.0 * visible_share(bounds, size)).min(1.0)
 }
 

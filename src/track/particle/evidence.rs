@@ -60,10 +60,16 @@ fn weigh_track(track: &Track, own: usize, target: &Target, moment: &Moment<'_>) 
         shared = true;
         others += motion_density(residual, other.velocity, scale) + clutter;
     }
-    if shared {
+    if shared && crate::ablation::keeps("particle.shared_tracks") {
         let mine = motion_density(residual, velocity, scale);
         return said(SHARED * track.foreground * mine / (mine + others + clutter), 0.0);
     }
     let speed = velocity[0].hypot(velocity[1]) / (FULL_PENALTY_SPEED * scale);
-    said(track.foreground, BACKGROUND_PENALTY * (1.0 - track.foreground) * speed.min(1.0))
+    said(
+        track.foreground,
+        if crate::ablation::keeps("particle.background_penalty") { 1.0 } else { 0.0 }
+            * BACKGROUND_PENALTY
+            * (1.0 - track.foreground)
+            * speed.min(1.0),
+    )
 }

@@ -40,9 +40,12 @@ pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
         let mine: Vec<usize> = (0..tracks.len()).filter(|&j| tracks[j].owner == Some(own.id)).collect();
         let inside_other =
             |track: &Track| targets.iter().any(|l| l.id != own.id && holds(l.bounds, track.position, 1.0, 0.0));
-        let leaves = |track: &Track| has_jumped(track, scale) || follows_other(track, own, targets, scale);
+        let leaves = |track: &Track| {
+            crate::ablation::keeps("particle.jumping_tracks") && has_jumped(track, scale)
+                || crate::ablation::keeps("particle.other_tracks") && follows_other(track, own, targets, scale)
+        };
         let leaving: Vec<usize> = mine.iter().copied().filter(|&j| leaves(&tracks[j])).collect();
-        if leaving.len() as f64 <= MAX_LOSS * mine.len() as f64 {
+        if !crate::ablation::keeps("particle.mass_loss") || leaving.len() as f64 <= MAX_LOSS * mine.len() as f64 {
             for j in leaving {
                 tracks[j].owner = None;
             }
@@ -53,7 +56,9 @@ pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
             let track = &tracks[j];
             let doubtful = track.foreground < DOUBTFUL;
             let deviates = track.residual.is_none_or(|r| distance(r, middle) > ALIKE * scale);
-            if deviates && (doubtful || inside_other(track)) || own.is_unlike && doubtful {
+            if crate::ablation::keeps("particle.doubtful_tracks") && deviates && (doubtful || inside_other(track))
+                || crate::ablation::keeps("particle.unlike_tracks") && own.is_unlike && doubtful
+            {
                 tracks[j].owner = None;
             }
         }
@@ -97,7 +102,11 @@ pub(super) fn assign(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
             track.owner = None;
         }
         let mut around = targets.iter().filter(|target| holds(target.bounds, track.position, KEEP, 0.0));
-        let (Some(own), None, Some(residual)) = (around.next(), around.next(), track.residual) else { continue };
+        let (Some(own), None, Some(residual)) =
+            (around.next(), around.next().filter(|_| crate::ablation::keeps("particle.single_box")), track.residual)
+        else {
+            continue;
+        };
         let fits = holds(own.bounds, track.position, 1.0, 0.0)
             && track.foreground > MIN_FOREGROUND
             && distance(residual, own.velocity) < GAIN_DIFFERENCE * scale;

@@ -95,7 +95,8 @@ pub(super) struct TrackFactor {
 impl TrackFactor {
     /// The factor of some tracks, of which `own` belong to the target.
     pub fn new(evidence: Vec<TrackEvidence>, own: usize, scale: f64) -> Self {
-        let gain = TRACK_GAIN * (FULL_TRACKS / (own as f64).max(FULL_TRACKS));
+        let own = if crate::ablation::keeps("particle.full_tracks") { own as f64 } else { 0.0 };
+        let gain = TRACK_GAIN * (FULL_TRACKS / own.max(FULL_TRACKS));
         Self { evidence, scale, gain }
     }
 

@@ -254,7 +254,20 @@ impl ParticleOptions {
 
     /// The parts in use: none in paper mode.
     pub(super) fn used_parts(&self) -> Parts {
-        if self.mode == ParticleMode::Improved { self.parts } else { Parts::all(false) }
+        if self.mode != ParticleMode::Improved {
+            return Parts::all(false);
+        }
+        let p = self.parts;
+        Parts {
+            camera: p.camera && crate::ablation::keeps("particle.camera"),
+            labels: p.labels && crate::ablation::keeps("particle.labels"),
+            hidden: p.hidden && crate::ablation::keeps("particle.hidden"),
+            contrast: p.contrast && crate::ablation::keeps("particle.contrast"),
+            values: p.values && crate::ablation::keeps("particle.values"),
+            aspect: p.aspect && crate::ablation::keeps("particle.aspect"),
+            quick_start: p.quick_start && crate::ablation::keeps("particle.quick_start"),
+            recovery: p.recovery && crate::ablation::keeps("particle.recovery"),
+        }
     }
 
     /// Noise of the transition at a length scale.

@@ -72,7 +72,11 @@ impl Presence {
 
     /// Factor of the transition's noise.
     pub fn noise(&self) -> f64 {
-        if self.is_hidden() { (HIDDEN_NOISE.0 + HIDDEN_NOISE.1 * self.hidden as f64).min(1.0) } else { 1.0 }
+        if self.is_hidden() && crate::ablation::keeps("particle.hidden_noise") {
+            (HIDDEN_NOISE.0 + HIDDEN_NOISE.1 * self.hidden as f64).min(1.0)
+        } else {
+            1.0
+        }
     }
 
     /// How many tracks that move with a hidden target make it seen again.
@@ -83,7 +87,9 @@ impl Presence {
     /// Decides whether the target is hidden in this frame. Returns whether it was not before.
     pub fn decide(&mut self, labelled: usize, is_covered: bool, returning: usize) -> bool {
         let few = (labelled as f64) < HIDDEN_SHARE * self.tracks;
-        let hidden = few && (self.is_low || is_covered) && (returning as f64) < self.tracks_to_return();
+        let hidden = few
+            && (self.is_low || is_covered && crate::ablation::keeps("particle.covered"))
+            && (!crate::ablation::keeps("particle.returning") || (returning as f64) < self.tracks_to_return());
         let entered = hidden && self.hidden == 0;
         self.hidden = if hidden { self.hidden + 1 } else { 0 };
         self.was_hidden |= hidden;
@@ -114,7 +120,7 @@ impl Presence {
         let learned = Some(usual + SIMILARITY_GAIN * (similarity - usual));
         if self.is_low {
             let share = if self.was_hidden { NEW_LOOK_AFTER } else { NEW_LOOK.0 };
-            if labelled as f64 >= (share * self.tracks).max(NEW_LOOK.1) {
+            if crate::ablation::keeps("particle.new_look") && labelled as f64 >= (share * self.tracks).max(NEW_LOOK.1) {
                 self.similarity = learned;
             }
             return false;

@@ -43,7 +43,7 @@ pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Optio
     let twin = |l: &super::seeing::Seeing| {
         l.id != seeing.id && !l.is_out && l.hidden > 0 && covered_share(seeing.bounds, l.bounds) > 0.0
     };
-    if moment.seeing.iter().any(twin) {
+    if crate::ablation::keeps("particle.recovery_twin") && moment.seeing.iter().any(twin) {
         return None;
     }
     let group = densest_group(&free_tracks(own, moment), seeing.bounds, moment.scale);
@@ -52,7 +52,7 @@ pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Optio
     }
     let velocity = median_residual(&group)?;
     let middle = [0, 1].map(|i| group.iter().map(|track| track.position[i]).sum::<f64>() / group.len() as f64);
-    if belongs_to_other(middle, velocity, own, moment) {
+    if crate::ablation::keeps("particle.recovery_other") && belongs_to_other(middle, velocity, own, moment) {
         return None;
     }
     let [_, _, w, h] = seeing.bounds;

@@ -127,7 +127,9 @@ fn find_near(seeing: &mut [Seeing], targets: &[Target], options: &ParticleOption
             if own == other || a.is_out || b.is_out {
                 continue;
             }
-            let touch = options.mode == ParticleMode::Improved && boxes_touch(a.bounds, b.bounds);
+            let touch = crate::ablation::keeps("particle.touching_boxes")
+                && options.mode == ParticleMode::Improved
+                && boxes_touch(a.bounds, b.bounds);
             let covered = covered_share(a.bounds, b.bounds) >= COVER;
             if distance(a.place, b.place) <= radius || touch {
                 let likeness = targets[own].appearance.likeness(&targets[other].appearance);

@@ -100,7 +100,11 @@ impl Target {
         let id = self.id;
         let rng = |purpose| stream(moment.options.seed, id, moment.frame, purpose);
         let (selection, transition) = (rng(Purpose::Selection), rng(Purpose::Transition));
-        let count = if seeing.near.is_empty() { moment.options.n_particles } else { moment.options.n_near };
+        let count = if seeing.near.is_empty() || !crate::ablation::keeps("particle.near_particles") {
+            moment.options.n_particles
+        } else {
+            moment.options.n_near
+        };
         self.cloud.select(moment.options.resampling, moment.options.ess_threshold, count, selection);
         if self.is_new && moment.factors.tracks && moment.options.used_parts().quick_start {
             self.quick_start(moment.tracks, rng(Purpose::QuickStart));
@@ -108,7 +112,7 @@ impl Target {
         let noise = moment.options.noise(moment.scale).times(self.presence.noise());
         self.cloud.predict(&moment.camera, &noise, self.first_size, transition);
         let mut prediction = seeing.place;
-        if seeing.entered_low {
+        if seeing.entered_low && crate::ablation::keeps("particle.clear_place") {
             prediction = self.return_to_clear_place(moment);
         }
         if let Some(Recovery { place, velocity }) = recover(self, own, moment) {
@@ -192,12 +196,14 @@ impl Target {
         let seeing = &moment.seeing[own];
         let particles = &self.cloud.particles;
         let on = &moment.factors;
-        let velocity = on.velocity.then(|| VelocityFactor::new(prediction, self.velocity(), moment.scale));
+        let velocity = (on.velocity && crate::ablation::keeps("particle.velocity_factor"))
+            .then(|| VelocityFactor::new(prediction, self.velocity(), moment.scale));
         if self.presence.is_hidden() {
             let factors = Factors { velocity, ..Factors::none(moment.bins.size()) };
             return factors.log_likelihoods(particles);
         }
-        let gain = colour_gain(moment.options.mode) * (1.0 - seeing.likeness);
+        let gain = colour_gain(moment.options.mode)
+            * (1.0 - if crate::ablation::keeps("particle.likeness") { seeing.likeness } else { 0.0 });
         let distances = seeing.near.iter().filter(|_| on.distance).map(|&other| {
             let place = moment.seeing[other].place;
             DistanceFactor { other: place, square: distance(prediction, place).powi(2) }

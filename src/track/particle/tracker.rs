@@ -265,7 +265,7 @@ impl ParticleTracker {
         let missed = std::mem::take(&mut self.missed).into_iter().map(|camera| camera.map(CameraMotion::from_affine));
         let known = missed.chain([known]).reduce(|first, next| Some(first?.then(&next?))).flatten();
         let pyramid = Corners::pyramid(view.grey.clone());
-        let was_cut = self.corners.follow(&self.pyramid, &pyramid)?;
+        let was_cut = self.corners.follow(&self.pyramid, &pyramid)? && crate::ablation::keeps("particle.cut");
         let camera = self.measure_background(known)?;
         let map = self.foreground_map(&view)?;
         self.frame += 1;

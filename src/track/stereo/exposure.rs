@@ -75,7 +75,10 @@ impl Exposure {
             let offset = median(&mut std::array::from_fn::<f64, SHARES, _>(|i| y[i] - gain * x[i]))?;
             Some(Self { gain, offset })
         };
-        told().filter(|told| told.difference(&Self::SAME) > LARGE).unwrap_or(Self::SAME)
+        told()
+            .filter(|_| crate::ablation::keeps("stereo.exposure_levels"))
+            .filter(|told| told.difference(&Self::SAME) > LARGE)
+            .unwrap_or(Self::SAME)
     }
 
     /// The exposure that pixels show which are known to be the same: a line through their brightness before

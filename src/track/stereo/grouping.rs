@@ -46,7 +46,11 @@ pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limit
         let (Some(first), Some(second)) = (motions[a], motions[b]) else { continue };
         let difference = first.depth - second.depth;
         let approaching = (first.growth() + second.growth()) * (disparities[a] - disparities[b]);
-        let alike = difference.abs().min((difference - approaching).abs()) <= limits.depth_motion
+        let alike = difference.abs().min(if crate::ablation::keeps("stereo.approaching") {
+            (difference - approaching).abs()
+        } else {
+            f64::INFINITY
+        }) <= limits.depth_motion
             && median_difference(clusters, [a, b], [&first, &second]) <= limits.motion;
         if alike {
             let (a, b) = (root(&parent, a), root(&parent, b));

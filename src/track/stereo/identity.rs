@@ -119,7 +119,7 @@ impl Identities {
         limits: Option<&Recognition>,
     ) -> Option<Carried> {
         let trust = measured.map_or(0.0, |measured| (measured.support / SEEN_THERE).min(1.0));
-        let sure = trust >= 1.0;
+        let sure = trust >= 1.0 && crate::ablation::keeps("stereo.sure_jump");
         let measured = measured.map(|measured| measured.motion);
         let Some(identity) = self.live.get_mut(k).and_then(Option::as_mut) else {
             return measured.map(|motion| Carried { motion, coasting: false });
@@ -135,7 +135,7 @@ impl Identities {
         if let Some(last) = identity.velocity.filter(|_| !like && !sure) {
             let steady = identity.steady >= limits.steady || measured.is_none();
             let coasted = identity.coasted + gap;
-            if steady && coasted <= limits.coast as f64 + SAME_TIME {
+            if crate::ablation::keeps("stereo.coast") && steady && coasted <= limits.coast as f64 + SAME_TIME {
                 identity.coasted = coasted;
                 return Some(Carried { motion: last, coasting: true });
             }
@@ -144,7 +144,10 @@ impl Identities {
         identity.steady = if like { identity.steady + 1 } else { usize::from(measured.is_some()) };
         // Of who is nearly hidden little is left to measure, and where it is waited for depends on it.
         identity.velocity = match (identity.velocity, measured) {
-            (Some(last), Some(now)) if like => Some(std::array::from_fn(|i| last[i] + trust * (now[i] - last[i]))),
+            (Some(last), Some(now)) if like => {
+                let trust = if crate::ablation::keeps("stereo.trusted_velocity") { trust } else { 1.0 };
+                Some(std::array::from_fn(|i| last[i] + trust * (now[i] - last[i])))
+            }
             (last, now) => now.or(last),
         };
         measured.map(|motion| Carried { motion, coasting: false })
@@ -158,7 +161,7 @@ impl Identities {
                 && let Some(identity) = self.live[k].take()
             {
                 // Who never moved steadily is not known well enough to be recognised.
-                if identity.steady > 0 {
+                if identity.steady > 0 || !crate::ablation::keeps("stereo.never_steady") {
                     self.resting.push(Resting { identity, since });
                 }
             }
@@ -201,7 +204,11 @@ impl Identities {
             let mut pairs = Vec::new();
             for (r, resting) in self.resting.iter().enumerate() {
                 let waits_for = |new: &&Sighting| {
-                    let part = |own: &Identity| own.born > resting.identity.born && own.is_outgrown(new);
+                    let part = |own: &Identity| {
+                        crate::ablation::keeps("stereo.part_renamed")
+                            && own.born > resting.identity.born
+                            && own.is_outgrown(new)
+                    };
                     new.pixels as f64 >= least && self.live[new.component].as_ref().is_none_or(part)
                 };
                 for new in seen.iter().filter(waits_for) {
@@ -221,7 +228,9 @@ impl Identities {
             }
             let mut left = taken.into_iter();
             self.resting.retain(|_| !left.next().unwrap_or(false));
-            self.pass_to_larger_parts(at, seen, least, limits);
+            if crate::ablation::keeps("stereo.larger_parts") {
+                self.pass_to_larger_parts(at, seen, least, limits);
+            }
         }
         for &Sighting { component, position, pixels, spread } in seen {
             if self.live[component].is_none() {
@@ -243,7 +252,7 @@ impl Identity {
     fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 3]), gap: f64) {
         self.peak = pixels.max(FORGET.powf(gap) * self.peak);
         self.position = match self.velocity {
-            Some(velocity) if pixels < COVERED * self.peak => {
+            Some(velocity) if crate::ablation::keeps("stereo.covered_position") && pixels < COVERED * self.peak => {
                 std::array::from_fn(|i| self.position[i] + gap * velocity[i])
             }
             _ => {
@@ -262,7 +271,11 @@ impl Identity {
         let mut sum = 0.0;
         for i in 0..3 {
             let expected = self.position[i] + steps * velocity[i];
-            let part = if i < 2 { covered * HALF_EXTENT * self.spread[i] } else { 0.0 };
+            let part = if i < 2 && crate::ablation::keeps("stereo.covered_tolerance") {
+                covered * HALF_EXTENT * self.spread[i]
+            } else {
+                0.0
+            };
             let tolerance = limits.tolerance[i] + steps * limits.tolerance_per_step[i] + part;
             let off = (seen.position[i] - expected).abs() / tolerance;
             if off > 1.0 {
@@ -282,7 +295,8 @@ impl Identity {
     fn resembles(&self, seen: &Sighting) -> bool {
         let (factor, layers) = AS_THICK;
         let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
-        thicker <= factor * thinner + layers && !self.is_outgrown(seen)
+        (thicker <= factor * thinner + layers || !crate::ablation::keeps("stereo.thickness"))
+            && !(self.is_outgrown(seen) && crate::ablation::keeps("stereo.size"))
     }
 }
 

@@ -103,7 +103,9 @@ pub(super) fn affine_motion(
 ) -> Option<PlaneMotion> {
     let task = Task::new(before, after, pixels)?;
     let mut best: Option<([f64; 6], f64)> = None;
-    for (start, way) in starts.iter().flat_map(|start| WAYS.iter().map(move |way| (start, way))) {
+    for (start, way) in starts.iter().flat_map(|start| {
+        WAYS[..if crate::ablation::keeps("stereo.second_way") { 2 } else { 1 }].iter().map(move |way| (start, way))
+    }) {
         let mut map = [start[0], start[1], 0.0, 0.0, 0.0, 0.0];
         let Some(residual) = task.go(way, &mut map, start) else { continue };
         if best.is_none_or(|(_, least)| residual < least) {

@@ -77,14 +77,18 @@ pub(super) fn fine_motions(
     let mut last = LastView::new(from, levels, &large);
     let mut planes = plane_motions(&last, next, guesses, (reach, least));
     // What motions tell of the exposure leads to better ones.
-    if let Some(told) = Exposure::of_motions(&from.clusters, &planes, pictures).filter(|told| told.differs(&large)) {
+    if let Some(told) = Exposure::of_motions(&from.clusters, &planes, pictures)
+        .filter(|told| crate::ablation::keeps("stereo.exposure_motion") && told.differs(&large))
+    {
         last = LastView::new(from, levels, &told);
         planes = plane_motions(&last, next, guesses, (reach, least));
     }
     let noise = noise(&from.clusters, &planes);
     let one = |k: usize| {
         let plane = match (planes[k]?, noise) {
-            (plane, Some(noise)) if plane.deviation > UNEXPLAINED * noise => {
+            (plane, Some(noise))
+                if crate::ablation::keeps("stereo.visible_motion") && plane.deviation > UNEXPLAINED * noise =>
+            {
                 let expected: Vec<[f64; 2]> =
                     [guesses[k].last, guesses[k].beside].into_iter().flatten().map(|[u, v, _]| [u, v]).collect();
                 visible_motion(&last.levels, next.levels, &places(&from.clusters, k), (plane, &expected), noise)?
@@ -132,7 +136,8 @@ fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &
     let depth = robust_mean(&mut changes)?;
     // Pixels that meet another surface tell a change of disparity, too, but each another one.
     let agreeing = changes.iter().filter(|change| (*change - depth).abs() <= AGREEING).count();
-    (agreeing as f64 >= LEAST_SHARE * changes.len() as f64).then_some((depth, agreeing as f64 / pixels.len() as f64))
+    (!crate::ablation::keeps("stereo.depth_agreeing") || agreeing as f64 >= LEAST_SHARE * changes.len() as f64)
+        .then_some((depth, agreeing as f64 / pixels.len() as f64))
 }
 
 /// Deviation of what motions leave in general, grey levels: the median over the pixels of all clusters that

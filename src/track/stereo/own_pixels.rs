@@ -43,6 +43,9 @@ pub(super) struct View<'a> {
 /// those of its outline that are beyond it. Of all where hardly half would be left.
 pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64; 2] {
     let all = places(clusters, k);
+    if !crate::ablation::keeps("stereo.own_pixels") {
+        return middle(&all);
+    }
     let own = own_places(&all, view);
     middle(if 2 * own.len() > all.len() { &own } else { &all })
 }

@@ -216,6 +216,9 @@ impl Voxels {
     /// Where voxel `n` is, cells: its centre along x and y, the mean of its points in depth.
     pub fn place(&self, n: usize) -> [f64; 3] {
         let [x, y, _] = self.cells[n];
+        if !crate::ablation::keeps("stereo.mean_depths") {
+            return self.cells[n].map(f64::from);
+        }
         [f64::from(x), f64::from(y), self.depths[n]]
     }
 

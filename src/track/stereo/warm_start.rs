@@ -32,7 +32,8 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     let mut out = posterior.clone();
     for (matrix, nu) in out.scale_inverses.chunks_exact_mut(D * D).zip(&out.degrees_of_freedom) {
         for i in 0..D {
-            matrix[i * D + i] += nu * UNCERTAINTY[i] * UNCERTAINTY[i];
+            matrix[i * D + i] +=
+                if crate::ablation::keeps("stereo.widened") { 1.0 } else { 0.0 } * nu * UNCERTAINTY[i] * UNCERTAINTY[i];
         }
     }
     for (mean, motion) in out.means.chunks_exact_mut(D).zip(motions) {
@@ -68,10 +69,12 @@ pub(super) fn reseed(
     let least = options.reseed_below.max(1.0);
     let explained = explaining(all, options);
     let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
-    let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained)
-        .into_iter()
-        .partition(|blob| blob.pixels >= least && blob.explains_itself(all, explained));
-    if unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > ANOTHER_SCENE * all {
+    let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained).into_iter().partition(|blob| {
+        blob.pixels >= least && (!crate::ablation::keeps("stereo.thin_blobs") || blob.explains_itself(all, explained))
+    });
+    if crate::ablation::keeps("stereo.another_scene")
+        && unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > ANOTHER_SCENE * all
+    {
         return Ok(None);
     }
     let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
@@ -83,7 +86,7 @@ pub(super) fn reseed(
     }
     let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all), options)).collect();
     let mut seeds = vec![false; components];
-    for (k, blob) in dead.into_iter().zip(&blobs) {
+    for (k, blob) in dead.into_iter().zip(&blobs).filter(|_| crate::ablation::keeps("stereo.reseed")) {
         blob.place(posterior, k, options);
         seeds[k] = true;
     }

@@ -82,7 +82,11 @@ impl StereoTracker {
         }
         let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
         // What stops for a frame has not jumped, and nothing is learnt of its way.
-        let motions = if self.is_repeated(&points, &levels) { self.stay() } else { self.carry(view) };
+        let motions = if crate::ablation::keeps("stereo.repeated") && self.is_repeated(&points, &levels) {
+            self.stay()
+        } else {
+            self.carry(view)
+        };
         let last = self.last.take();
         let carried: Vec<Option<[f64; 3]>> = match &last {
             Some(last) => (0..motions.len()).map(|k| voxel_motion(&last.clusters, k, &motions[k]?.0)).collect(),
@@ -106,7 +110,7 @@ impl StereoTracker {
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
         // What is left over of everything else may be anywhere: it needs no new name each time.
         let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
-            (Some(last), Some(before), Some(now)) => {
+            (Some(last), Some(before), Some(now)) if crate::ablation::keeps("stereo.left_over") => {
                 self.is_left_over(&last.clusters, before, k)
                     && self.is_left_over(&clusters, now, k)
                     && clusters.pixels[k].len() <= 2 * last.clusters.pixels[k].len()

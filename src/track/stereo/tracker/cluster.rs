@@ -51,7 +51,7 @@ impl StereoTracker {
         // What is not to be fitted has no weight; it is given to a component all the same.
         let without = |start: &Posterior, strays: &[usize]| {
             let mut kept = weights.clone();
-            for &n in strays {
+            for &n in strays.iter().filter(|_| crate::ablation::keeps("stereo.outlier_voxels")) {
                 kept[n] = 0.0;
             }
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))

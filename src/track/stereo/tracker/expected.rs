@@ -26,7 +26,10 @@ impl StereoTracker {
         (0..components)
             .map(|k| {
                 let last = known.iter().find(|(other, _)| *other == k).map(|(_, velocity)| *velocity);
-                Guess { last, beside: self.beside(k, &known) }
+                Guess {
+                    last: last.filter(|_| crate::ablation::keeps("stereo.last_start")),
+                    beside: self.beside(k, &known).filter(|_| crate::ablation::keeps("stereo.beside_start")),
+                }
             })
             .collect()
     }
@@ -59,7 +62,10 @@ impl StereoTracker {
     ) -> Vec<Option<FineMotion>> {
         let (cell, gap) = (before.lattice().cell(), self.moment.gap);
         let assumed = |k: usize| {
-            if before.pixels[k].is_empty() || k >= after.components() {
+            if !crate::ablation::keeps("stereo.assumed_motion")
+                || before.pixels[k].is_empty()
+                || k >= after.components()
+            {
                 return None;
             }
             let centre = middle(&places(before, k));

@@ -26,7 +26,7 @@ impl StereoTracker {
         let (forward, backward) = both_ways(before, &clustered.clusters, &moves);
         let sizes = [before, &clustered.clusters].map(|all| all.members.iter().map(Vec::len).collect::<Vec<_>>());
         let names = successors(&forward, &backward, [&sizes[0], &sizes[1]], self.options.arc_threshold);
-        if names.iter().enumerate().all(|(k, name)| k == *name) {
+        if !crate::ablation::keeps("stereo.successors") || names.iter().enumerate().all(|(k, name)| k == *name) {
             return (clustered, seeded, (forward, backward));
         }
         let newcomers =
@@ -55,7 +55,7 @@ fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]
     let backward = (0..after.components())
         .map(|k| {
             let own = back(k, motions.get(k).unwrap_or(&None));
-            if own.get(k).is_some_and(|share| *share > 0.0) {
+            if !crate::ablation::keeps("stereo.back_by_covering") || own.get(k).is_some_and(|share| *share > 0.0) {
                 return own;
             }
             let covering = (0..before.components())

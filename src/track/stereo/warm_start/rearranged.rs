@@ -44,8 +44,8 @@ pub(in super::super) fn rearrange(
     for (k, _) in &several {
         pool.leave_alone(*k);
     }
-    while pool.join_pieces() {}
-    for (k, parts) in several {
+    while crate::ablation::keeps("stereo.join_pieces") && pool.join_pieces() {}
+    for (k, parts) in several.into_iter().filter(|_| crate::ablation::keeps("stereo.part")) {
         pool.part(k, parts);
     }
     pool.changed.iter().for_each(|&k| pool.wholes[k].place(posterior, k, options));
