@@ -43,13 +43,13 @@ class Case:
     def scene(self, origin: tuple[float, float] = (0.0, 0.0)) -> scenes.Scene:
         """The scene through a window at `origin`."""
         rms = self.speed / fastest(self.wavelength, self.seed)
-        return scenes.Scene("waves", width=SIZE, height=SIZE, origin=origin, seed=self.seed, carrier="noise", speed=rms, wavelength=self.wavelength)
+        return scenes.Scene("waves", width=SIZE, height=SIZE, origin=origin, random_state=self.seed, carrier="noise", speed=rms, wavelength=self.wavelength)
 
 
 @functools.cache
 def fastest(wavelength: float, seed: int) -> float:
     """The greatest speed in the frame of a field whose root-mean-square speed is 1 px/frame."""
-    unit = scenes.Scene("waves", width=SIZE, height=SIZE, seed=seed, carrier="speckle", speed=1.0, wavelength=wavelength)
+    unit = scenes.Scene("waves", width=SIZE, height=SIZE, random_state=seed, carrier="speckle", speed=1.0, wavelength=wavelength)
     return float(np.linalg.norm(unit.truth(0.0).flow, axis=-1).max())
 
 
@@ -61,7 +61,7 @@ def clean_frame(wavelength: float, speed: float, seed: int, t: float) -> Array:
 
 def frame(case: Case, t: float) -> Picture:
     """What the camera sees at a time: noise, whole grey levels, 0 to 255."""
-    camera = scenes.Sensor(noise=case.noise, rounding="nearest", saturate=True, seed=case.seed)
+    camera = scenes.Sensor(noise=case.noise, rounding="nearest", saturate=True, random_state=case.seed)
     return camera.apply_u8(clean_frame(case.wavelength, case.speed, case.seed, t), index=int(t) + 8)
 
 

@@ -44,8 +44,8 @@ class Family:
 
     def frames(self, size: tuple[int, int], noise: float, seed: int, count: int) -> tuple[list[Array], Any]:
         """What an 8-bit camera sees, and the exact mean flow at the pixels that the estimate belongs to."""
-        scene = scenes.Scene(self.motion, width=size[0], height=size[1], seed=seed, carrier=self.carrier, **self.parameters)
-        camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=seed)
+        scene = scenes.Scene(self.motion, width=size[0], height=size[1], random_state=seed, carrier=self.carrier, **self.parameters)
+        camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
         times = (0.0, 1.0) if count == 2 else (-1.0, 0.0, 1.0)
         pictures = [camera.apply_u8(scene.frame(t), index=int(t) + 8) for t in times]
         return pictures, scene.truth(0.0, between=(0.0, 1.0))

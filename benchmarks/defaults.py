@@ -31,8 +31,8 @@ SCENES = [
 
 def measure(name: str, carrier: str | None, noise: float, options: dict) -> tuple[float, float, float, float]:
     """Errors of flow and Jacobian, and coverage of both, in the middle of three frames."""
-    scene = scenes.Scene(name, width=128, height=112, seed=5, carrier=carrier)
-    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=1)
+    scene = scenes.Scene(name, width=128, height=112, random_state=5, carrier=carrier)
+    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate((-1.0, 0.0, 1.0))]
     field, truth = jacoflow.estimate(frames, **options), scene.truth(0.0)
     inner = np.zeros(field.shape, bool)

@@ -93,7 +93,7 @@ def tracks() -> Named:
     frames = moving_square(20)
     result = jacoflow.track.track(frames, bbox=(19.5, 19.5, 13, 13))
     yield "track layered", [result.position, result.velocity, result.covariance]
-    street = jacoflow.scenes.TargetScene("people_static", seed=1, scale=0.5)
+    street = jacoflow.scenes.TargetScene("people_static", random_state=1, scale=0.5)
     frames = [street.frame(t) for t in range(60, 72)]
     followed = jacoflow.track.track_particles(frames, street.boxes()[60], threads=1)
     yield "track particle", [np.asarray(step.boxes) for step in followed]

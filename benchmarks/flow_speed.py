@@ -30,7 +30,7 @@ def speed(rounds: int, width: int = 640, height: int = 480, ours: list[Setting] 
 
     The presets run a second time with the instruction set beyond AVX2, where there is one.
     """
-    scene = jacoflow.scenes.Scene("waves", width=width, height=height, seed=1, speed=2.0, wavelength=256.0)
+    scene = jacoflow.scenes.Scene("waves", width=width, height=height, random_state=1, speed=2.0, wavelength=256.0)
     camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
     frames = [camera.apply_u8(scene.frame(t - 1.0), index=t) for t in range(3)]
     contestants: dict[tuple[str, int], Callable[[], object]] = {}

@@ -29,7 +29,7 @@ def frames(width: int, height: int) -> np.ndarray:
     """Three 8-bit frames of one moving surface that passes in front of another: motion boundaries take the most memory."""
     camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
     surfaces = [
-        jacoflow.scenes.Scene("waves", width=width, height=height, seed=seed, speed=2.0, wavelength=256.0) for seed in (1, 2)
+        jacoflow.scenes.Scene("waves", width=width, height=height, random_state=seed, speed=2.0, wavelength=256.0) for seed in (1, 2)
     ]
     pictures = []
     for t in range(3):

@@ -69,7 +69,7 @@ class Settings:
         boxes, starts = np.full(sequence.boxes.shape, np.nan), sequence.starts
         first = int(starts.min())
         begun = {k: sequence.boxes[first, k] for k in np.flatnonzero(starts == first).tolist()}
-        tracker = ParticleTracker(sequence.frames[first], begun, mode=self.mode, seed=seed, **self.options)
+        tracker = ParticleTracker(sequence.frames[first], begun, mode=self.mode, random_state=seed, **self.options)
         boxes[first, list(begun)] = sequence.boxes[first, list(begun)]
         ended: set[int] = set()
         for t in range(first + 1, len(sequence.frames)):

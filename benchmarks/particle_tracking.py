@@ -66,7 +66,7 @@ PARTS = (
 
 def scene(name: str, recording: int) -> Sequence:
     """A recording of a scene."""
-    made = scenes.TargetScene(name, seed=recording)
+    made = scenes.TargetScene(name, random_state=recording)
     return Sequence(name, made.frames(), made.boxes())
 
 
@@ -125,7 +125,7 @@ def single(data: Path, contestants: list[Contestant]) -> list[Row]:
 
 def speed(threads: int = 2, rounds: int = 3) -> list[Row]:
     """Time of a frame of 720 x 480 with two targets that cross, 1000 particles each and 2000 while they are near, beside CSRT, in one run."""
-    made = scenes.TargetScene("people_handheld", seed=SEEDS[0], scale=1.0)
+    made = scenes.TargetScene("people_handheld", random_state=SEEDS[0], scale=1.0)
     frames, boxes = made.frames(), made.boxes()
     times: dict[str, list[float]] = {}
     for mode in ("improved", "paper") * rounds:

@@ -21,9 +21,9 @@ CENTRE = ((WIDTH - 1) / 2, (HEIGHT - 1) / 2)
 def shake() -> tuple[scenes.Scene, np.ndarray]:
     """The still world through the moving camera: the scene and its 8-bit frames (COUNT, HEIGHT, WIDTH)."""
     scene = scenes.Scene(
-        "affine", width=WIDTH, height=HEIGHT, seed=12, sigma=2.5, u=PAN[0], v=PAN[1], u_x=ZOOM, u_y=-ROLL, v_x=ROLL, v_y=ZOOM
+        "affine", width=WIDTH, height=HEIGHT, random_state=12, sigma=2.5, u=PAN[0], v=PAN[1], u_x=ZOOM, u_y=-ROLL, v_x=ROLL, v_y=ZOOM
     )
-    camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, seed=3)
+    camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, random_state=3)
     return scene, np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(scene.frames(COUNT))])
 
 

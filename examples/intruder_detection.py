@@ -26,9 +26,9 @@ def place(t: float) -> tuple[float, float]:
 def watch() -> np.ndarray:
     """The camera's frames, uint8 (COUNT, HEIGHT, WIDTH)."""
     still = {name: 0.0 for name in ("u_x", "u_y", "v_x", "v_y")}
-    yard = scenes.Scene("affine", width=WIDTH, height=HEIGHT, seed=4, u=0.0, v=0.0, std=25.0, **still).frame(0.0)
-    person = scenes.Scene("affine", width=WIDTH, height=HEIGHT, seed=5, u=SPEED[0], v=SPEED[1], std=30.0, mean=110.0, **still)
-    camera = scenes.Sensor(noise=2.0, rounding="nearest", saturate=True, seed=6)
+    yard = scenes.Scene("affine", width=WIDTH, height=HEIGHT, random_state=4, u=0.0, v=0.0, std=25.0, **still).frame(0.0)
+    person = scenes.Scene("affine", width=WIDTH, height=HEIGHT, random_state=5, u=SPEED[0], v=SPEED[1], std=30.0, mean=110.0, **still)
+    camera = scenes.Sensor(noise=2.0, rounding="nearest", saturate=True, random_state=6)
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     frames = []
     for t in range(COUNT):

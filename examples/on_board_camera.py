@@ -35,7 +35,7 @@ class Thing:
         rate = 0.0 if self.contact is None else 1.0 / self.contact
         x, y = self.centre
         u, v = self.velocity
-        return scenes.Scene("affine", width=WIDTH, height=HEIGHT, seed=seed, centre_x=x, centre_y=y, u=u, v=v, u_x=rate, u_y=0.0, v_x=0.0, v_y=rate)
+        return scenes.Scene("affine", width=WIDTH, height=HEIGHT, random_state=seed, centre_x=x, centre_y=y, u=u, v=v, u_x=rate, u_y=0.0, v_x=0.0, v_y=rate)
 
     def mask(self, t: float) -> np.ndarray:
         grow = 1.0 if self.contact is None else np.exp(t / self.contact)
@@ -60,12 +60,12 @@ def look(t: float) -> np.ndarray:
     """The camera's 8-bit frame of time t."""
     rate = 1.0 / 200.0
     background = scenes.Scene(
-        "affine", width=WIDTH, height=HEIGHT, seed=1, centre_x=HEADING[0], centre_y=HEADING[1], u=0.0, v=0.0, u_x=rate, u_y=0.0, v_x=0.0, v_y=rate
+        "affine", width=WIDTH, height=HEIGHT, random_state=1, centre_x=HEADING[0], centre_y=HEADING[1], u=0.0, v=0.0, u_x=rate, u_y=0.0, v_x=0.0, v_y=rate
     )
     image = background.frame(t)
     for seed, thing in enumerate(THINGS, start=2):
         image = np.where(thing.mask(t), thing.scene(seed).frame(t), image)
-    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=9)
+    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=9)
     return camera.apply_u8(image, index=int(t) + 1)
 
 

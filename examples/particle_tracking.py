@@ -24,7 +24,7 @@ def overlap(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    scene = scenes.TargetScene("people_handheld", seed=10)
+    scene = scenes.TargetScene("people_handheld", random_state=10)
     frames = [scene.frame(t) for t in range(FIRST, LAST)]
     truth = scene.boxes()[FIRST:LAST]
     tracks = track.track_particles(frames, truth[0], keep_frames=True)

@@ -22,9 +22,9 @@ CORNER = (90.0, 20.0)
 
 def main() -> None:
     disc = scenes.Scene(
-        "disc", width=PATCH[0], height=PATCH[1], origin=CORNER, seed=8, sigma=3.0, rpm=RPM, fps=FPS, centre_x=AXIS[0], centre_y=AXIS[1], disc_radius=RADIUS
+        "disc", width=PATCH[0], height=PATCH[1], origin=CORNER, random_state=8, sigma=3.0, rpm=RPM, fps=FPS, centre_x=AXIS[0], centre_y=AXIS[1], disc_radius=RADIUS
     )
-    camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, seed=2)
+    camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, random_state=2)
     frames = np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(disc.frames(12))])
     fields = jacoflow.estimate(frames, method="windowed", window_sigma=5.0, fps=FPS)
     # The part of the picture well inside the disc.

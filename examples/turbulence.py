@@ -32,8 +32,8 @@ def statistics(flow: np.ndarray, jacobian: np.ndarray) -> dict[str, float]:
 
 
 def main() -> None:
-    scene = scenes.Scene("turbulence", width=WIDTH, height=HEIGHT, seed=14, speed=SPEED, longest=LONGEST)
-    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=1)
+    scene = scenes.Scene("turbulence", width=WIDTH, height=HEIGHT, random_state=14, speed=SPEED, longest=LONGEST)
+    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))]
     # A narrow window for the short waves, and less smoothing than usual: smoothing takes away strain of a fine tracer.
     field = jacoflow.estimate(frames, method="windowed", window_sigma=2.5, smooth=1.0)

@@ -24,7 +24,7 @@ def main() -> None:
         "vortex",
         width=SIZE,
         height=SIZE,
-        seed=21,
+        random_state=21,
         carrier="particles",
         circulation=CIRCULATION,
         core=CORE,
@@ -35,7 +35,7 @@ def main() -> None:
         density=0.08,
         diameter=4.0,
     )
-    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=1)
+    camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=1)
     frames = np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(scene.frames(5))])
     fields = jacoflow.estimate(frames, method="windowed", window_sigma=6.0)
     rows = []

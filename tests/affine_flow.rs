@@ -348,7 +348,7 @@ fn covariance_is_that_of_repeated_noise() {
         let runs = 3000u64;
         let (mut mean, mut square, mut claimed) = ([0.0; 6], [0.0; 6], [0.0; 6]);
         for k in 0..runs {
-            let sensor = Sensor { noise: sd, seed: k, ..Sensor::default() };
+            let sensor = Sensor { noise: sd, random_state: k, ..Sensor::default() };
             let frames: Vec<Frame<f64>> = clean.iter().zip(0..).map(|(f, i)| sensor.apply(f, i)).collect();
             let field = e.estimate(&three(&frames), 0).unwrap();
             let (m, c) = (field.affine(0).to_array(), field.covariance_at(0).unwrap());

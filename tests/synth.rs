@@ -10,7 +10,7 @@ fn options(carrier: Option<&str>, seed: u64, values: &[(&str, f64)]) -> SceneOpt
         width: 48,
         height: 40,
         origin: (-5.0, 3.0),
-        seed,
+        random_state: seed,
         carrier: carrier.map(String::from),
         values: values.iter().map(|(name, value)| ((*name).to_string(), *value)).collect(),
     }

@@ -185,4 +185,4 @@ class DirichletProcessGaussianMixture(PointMixture):
         _demand("inference", self.inference, str, '"map" or "vb"')
         if not isinstance(self.merge, bool):
             raise TypeError(f"merge: expected True or False, got {self.merge!r}")
-        return {**parameters, "seed": _seed(self.random_state)}
+        return {**parameters, "random_state": _seed(self.random_state)}

@@ -1035,7 +1035,7 @@ class UnscentedKalmanFilter(GaussianFilter):
 class Scene:
     """A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 
-    `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `seed`
+    `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `random_state`
     makes everything random; `carrier` (one of `scenes.carriers()`) is what the motion moves; `parameters` are those of
     `scenes.parameters(name)`, each in the unit told there. Time t is in frames, brightness in grey levels of an 8-bit scale.
     """
@@ -1046,7 +1046,7 @@ class Scene:
         width: int | None = None,
         height: int | None = None,
         origin: tuple[float, float] | None = None,
-        seed: int | None = None,
+        random_state: int | None = None,
         carrier: str | None = None,
         **parameters: float,
     ) -> Scene: ...
@@ -1086,7 +1086,7 @@ class TargetScene:
     """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
     exact boxes.
 
-    `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and
+    `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait, shake and
     noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
     the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
     and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
@@ -1096,7 +1096,7 @@ class TargetScene:
         cls,
         name: str,
         *,
-        seed: int = 0,
+        random_state: int = 0,
         scale: float = 0.5,
         noise: float = 2.5,
         frames: int | None = None,
@@ -1145,7 +1145,7 @@ class Sensor:
     """What a camera does to a frame: white noise, rounding, clipping.
 
     `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or "nearest"; `saturate` clips to 0 ... 255;
-    `seed` of the noise. Without arguments it changes nothing.
+    `random_state` of the noise. Without arguments it changes nothing.
     """
     def __new__(
         cls,
@@ -1153,7 +1153,7 @@ class Sensor:
         noise: float | None = None,
         rounding: Literal["none", "floor", "nearest"] | None = None,
         saturate: bool | None = None,
-        seed: int | None = None,
+        random_state: int | None = None,
     ) -> Sensor: ...
     def apply(self, /, frame: _Frame, index: int = 0) -> NDArray[np.float64]:
         """`frame` (H, W) as the camera delivers it, a new float64 array (H, W) in grey levels.

@@ -13,7 +13,7 @@ from ._stereo_options import real_number
 
 MOST_ID = 2**63 - 2
 """Greatest number of a target, no unit."""
-MOST = {"seed": 2**64 - 1, "threads": 2**31 - 1}
+MOST = {"random_state": 2**64 - 1, "threads": 2**31 - 1}
 """Greatest values, no unit, of integers that are not counts of particles."""
 MOST_PARTICLES = 10**8
 """Most particles of a target, no unit: more would take all memory."""
@@ -40,7 +40,7 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
             raise ValueError(f"{name}: expected {expected}, got {out[name]!r}")
     for name in ("n_particles", "n_near"):
         out[name] = _integer(name, out[name], MOST_PARTICLES)
-    out["seed"] = _integer("seed", out["seed"], MOST["seed"])
+    out["random_state"] = _integer("random_state", out["random_state"], MOST["random_state"])
     out["threads"] = None if out["threads"] is None else _integer("threads", out["threads"], MOST["threads"])
     out["scale"] = None if out["scale"] is None else _real("scale", out["scale"])
     out["ess_threshold"] = _real("ess_threshold", out["ess_threshold"])

@@ -190,7 +190,7 @@ class ParticleTracker:
     grey : "error" or "value"
         "value": frames (H, W) are taken as red = green = blue, so that brightness takes the place of colour.
         Default: they are refused.
-    seed : int
+    random_state : int
         Seed of all random numbers.
     threads : int
         Number of threads; default the environment's, else all.
@@ -230,7 +230,7 @@ class ParticleTracker:
         foreground: Literal["ratio", "posterior", "literal", "affine"] = "ratio",
         segmentation: Mapping[str, float | None] | None = None,
         grey: Literal["error", "value"] = "error",
-        seed: int = 0,
+        random_state: int = 0,
         threads: int | None = None,
     ) -> None:
         options = {name: value for name, value in locals().items() if name not in ("self", "frame", "boxes", "__class__")}

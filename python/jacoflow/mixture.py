@@ -208,7 +208,7 @@ class VariationalGaussianMixture(PointMixture):
             if self.threads < 1:
                 raise ValueError(f"threads: expected a positive integer, got {self.threads}")
         _demand("init", self.init, str, '"kmeans++" or "random"')
-        return {**parameters, "seed": _seed(self.random_state)}
+        return {**parameters, "random_state": _seed(self.random_state)}
 
     def _continues(self, points: Array) -> bool:
         """Whether a fit may begin with the components of the last one."""

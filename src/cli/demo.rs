@@ -63,7 +63,8 @@ impl DemoCommand {
             return Err(Error::argument("output", "a folder", got));
         }
         let replace = self.force || is_own_work(&self.output);
-        let scene = build("vortex", &SceneOptions { width: 256, height: 192, seed: 1, ..SceneOptions::default() })?;
+        let scene =
+            build("vortex", &SceneOptions { width: 256, height: 192, random_state: 1, ..SceneOptions::default() })?;
         let plan = OutputPlan::decide(&OutputWish {
             path: Some(&self.output.join("flow")),
             formats: &[],

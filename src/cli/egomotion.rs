@@ -65,7 +65,7 @@ pub struct EgomotionCommand {
     pub turning: Option<f64>,
     /// Seed of the random choices
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Motion")]
-    pub seed: u64,
+    pub random_state: u64,
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
@@ -143,7 +143,7 @@ impl EgomotionCommand {
             motion: MotionOptions {
                 method,
                 robust: !self.no_robust,
-                seed: self.seed,
+                random_state: self.random_state,
                 threads,
                 ..MotionOptions::default()
             },

@@ -31,7 +31,7 @@ const USUAL_FRAMES: usize = 10;
     jacoflow synth --list\n  \
     jacoflow synth ramp -o ramp --frames 400 --rounding floor --truth ramp_truth\n  \
     jacoflow synth disc -o disc.y4m --set rpm=45 --set fps=100 --rate 100 --noise 2\n  \
-    jacoflow synth people_handheld -o people --boxes people.txt --seed 10"
+    jacoflow synth people_handheld -o people --boxes people.txt --random-state 10"
 )]
 pub struct SynthCommand {
     /// Name of the scene (see --list)
@@ -61,7 +61,7 @@ pub struct SynthCommand {
     pub settings: Vec<(String, f64)>,
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    pub random_state: u64,
     /// Standard deviation of added white noise, 8-bit grey levels [default: 0; of a scene of targets 2.5]
     #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
     pub noise: Option<f64>,
@@ -137,7 +137,7 @@ impl SynthCommand {
                 width,
                 height,
                 origin: self.origin,
-                seed: self.seed,
+                random_state: self.random_state,
                 carrier: self.carrier.clone(),
                 values: self.settings.clone(),
             },
@@ -154,7 +154,7 @@ impl SynthCommand {
         }
         let summary = json!({
             "command": "synth", "scene": name, "output": output, "frames": written.0, "width": width, "height": height,
-            "truth": self.truth, "seed": self.seed, "interrupted": matches!(written.1, Err(Error::Interrupted)),
+            "truth": self.truth, "random_state": self.random_state, "interrupted": matches!(written.1, Err(Error::Interrupted)),
         });
         Ok(Report { summary, failure: written.1.err() })
     }
@@ -177,7 +177,7 @@ impl SynthCommand {
         let recording = TargetRecording {
             scene,
             options: TargetSceneOptions {
-                seed: self.seed,
+                random_state: self.random_state,
                 scale: self.scale.unwrap_or(usual.scale),
                 noise: self.noise.unwrap_or(usual.noise),
                 frames: self.frames,
@@ -242,8 +242,12 @@ impl SynthCommand {
             RoundingWord::Nearest => Rounding::Nearest,
             RoundingWord::Floor => Rounding::Floor,
         };
-        let sensor =
-            Sensor { noise: self.noise.unwrap_or(0.0), rounding: Rounding::None, saturate: false, seed: self.seed };
+        let sensor = Sensor {
+            noise: self.noise.unwrap_or(0.0),
+            rounding: Rounding::None,
+            saturate: false,
+            random_state: self.random_state,
+        };
         match self.depth {
             Depth::Eight => AnyFrame::U8(Sensor { rounding, saturate: true, ..sensor }.apply_u8(frame, index)),
             Depth::Float => AnyFrame::F64(sensor.apply(frame, index)),

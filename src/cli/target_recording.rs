@@ -47,7 +47,7 @@ impl TargetRecording<'_> {
         let (width, height) = scene.size();
         let summary = json!({
             "command": "synth", "scene": self.scene, "output": self.output, "frames": written, "width": width, "height": height,
-            "boxes": self.boxes, "targets": scene.target_count(), "seed": self.options.seed,
+            "boxes": self.boxes, "targets": scene.target_count(), "random_state": self.options.random_state,
             "interrupted": matches!(result, Err(Error::Interrupted)),
         });
         Ok(Report { summary, failure: result.err() })

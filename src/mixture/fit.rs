@@ -79,7 +79,7 @@ pub fn fit(points: &Points, options: &MixtureOptions, start: Start) -> Result<Fi
 pub(super) fn best_of_seeds(points: &Points, problem: &Problem) -> Result<Fit> {
     let options = problem.options;
     let (centre, components) = (&problem.planes.centre, options.components);
-    let rng = CounterRng::new(options.seed);
+    let rng = CounterRng::new(options.random_state);
     let mut best: Option<Fit> = None;
     for init in 0..options.n_init {
         let stream = rng.stream(init as u64);

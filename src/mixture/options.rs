@@ -60,7 +60,7 @@ pub struct MixtureOptions {
     /// Components with less weight of points than this are left out: 0, none.
     pub prune_weight: f64,
     /// Seed of the random numbers: 0.
-    pub seed: u64,
+    pub random_state: u64,
     /// Number of threads; results do not depend on it.
     pub threads: Threads,
 }
@@ -79,7 +79,7 @@ impl Default for MixtureOptions {
             n_init: 1,
             seeding: Seeding::KMeans,
             prune_weight: 0.0,
-            seed: 0,
+            random_state: 0,
             threads: Threads::default(),
         }
     }

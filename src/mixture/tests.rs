@@ -97,8 +97,12 @@ fn the_bound_never_falls() {
     for seed in 0..6 {
         let (x, f) = clusters(400, 3, seed);
         let points = Points { dimensions: 3, values: &x, weights: Some(&f) };
-        let fit =
-            fit(&points, &MixtureOptions { seed, seeding: Seeding::Random, ..options(8, 80) }, Start::Seeds).unwrap();
+        let fit = fit(
+            &points,
+            &MixtureOptions { random_state: seed, seeding: Seeding::Random, ..options(8, 80) },
+            Start::Seeds,
+        )
+        .unwrap();
         assert_eq!(fit.lower_bounds.len(), 80);
         for pair in fit.lower_bounds.windows(2) {
             assert!(pair[1] >= pair[0] - 1e-11 * pair[0].abs(), "{pair:?}");

@@ -89,7 +89,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         scaled.may_turn = alone.status == Status::RotationOnly;
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
-    let rng = CounterRng::new(options.seed);
+    let rng = CounterRng::new(options.random_state);
     if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {
         scaled.observations = turned;
     }

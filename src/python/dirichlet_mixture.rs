@@ -28,7 +28,7 @@ fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<DirichletOpt
         n_init: count(from, "n_init")?,
         max_iter: count(from, "max_iter")?,
         tol: entry(from, "tol")?,
-        seed: entry(from, "seed")?,
+        random_state: entry(from, "random_state")?,
         threads: Threads::new(entry(from, "threads")?)?,
     })
 }

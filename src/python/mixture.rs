@@ -82,7 +82,7 @@ fn options(from: &Bound<'_, PyDict>, dimensions: usize) -> PyResult<MixtureOptio
         n_init: count(from, "n_init")?,
         seeding,
         prune_weight: entry(from, "prune_weight")?,
-        seed: entry(from, "seed")?,
+        random_state: entry(from, "random_state")?,
         threads: Threads::new(entry(from, "threads")?)?,
     })
 }

@@ -15,7 +15,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 ///
 /// `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point
-/// `origin` (x, y) px; `seed` makes everything random; `carrier` (one of `scenes.carriers()`) is what the
+/// `origin` (x, y) px; `random_state` makes everything random; `carrier` (one of `scenes.carriers()`) is what the
 /// motion moves; `parameters` are those of `scenes.parameters(name)`, each in the unit told there. Time t is
 /// in frames, brightness in grey levels of an 8-bit scale.
 #[pyclass(module = "jacoflow.scenes", frozen)]
@@ -41,13 +41,13 @@ impl Scene {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (name, *, width=None, height=None, origin=None, seed=None, carrier=None, **parameters))]
+    #[pyo3(signature = (name, *, width=None, height=None, origin=None, random_state=None, carrier=None, **parameters))]
     fn new(
         name: String,
         width: Option<usize>,
         height: Option<usize>,
         origin: Option<(f64, f64)>,
-        seed: Option<u64>,
+        random_state: Option<u64>,
         carrier: Option<String>,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
@@ -59,7 +59,7 @@ impl Scene {
             width: width.unwrap_or(default.width),
             height: height.unwrap_or(default.height),
             origin: origin.unwrap_or(default.origin),
-            seed: seed.unwrap_or(default.seed),
+            random_state: random_state.unwrap_or(default.random_state),
             carrier,
             values,
         };
@@ -152,12 +152,12 @@ impl Scene {
     }
 
     fn __hash__(&self) -> u64 {
-        hash(&(&self.kind, self.options.width, self.options.height, self.options.seed))
+        hash(&(&self.kind, self.options.width, self.options.height, self.options.random_state))
     }
 
     fn __repr__(&self) -> String {
         let (width, height) = self.core.size();
-        format!("Scene({:?}, width={width}, height={height}, seed={})", self.kind, self.options.seed)
+        format!("Scene({:?}, width={width}, height={height}, random_state={})", self.kind, self.options.random_state)
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
@@ -168,7 +168,7 @@ impl Scene {
         options.set_item("width", self.options.width)?;
         options.set_item("height", self.options.height)?;
         options.set_item("origin", self.options.origin)?;
-        options.set_item("seed", self.options.seed)?;
+        options.set_item("random_state", self.options.random_state)?;
         options.set_item("carrier", &self.options.carrier)?;
         Ok((PyTuple::new(py, [&self.kind])?, options))
     }
@@ -177,7 +177,7 @@ impl Scene {
 /// What a camera does to a frame: white noise, rounding, clipping.
 ///
 /// `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or
-/// "nearest"; `saturate` clips to 0 ... 255; `seed` of the noise. Without arguments it changes nothing.
+/// "nearest"; `saturate` clips to 0 ... 255; `random_state` of the noise. Without arguments it changes nothing.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct Sensor {
     sensor: CoreSensor,
@@ -186,8 +186,13 @@ pub struct Sensor {
 #[pymethods]
 impl Sensor {
     #[new]
-    #[pyo3(signature = (*, noise=None, rounding=None, saturate=None, seed=None))]
-    fn new(noise: Option<f64>, rounding: Option<&str>, saturate: Option<bool>, seed: Option<u64>) -> PyResult<Self> {
+    #[pyo3(signature = (*, noise=None, rounding=None, saturate=None, random_state=None))]
+    fn new(
+        noise: Option<f64>,
+        rounding: Option<&str>,
+        saturate: Option<bool>,
+        random_state: Option<u64>,
+    ) -> PyResult<Self> {
         let default = CoreSensor::default();
         let sensor = CoreSensor {
             noise: noise.unwrap_or(default.noise),
@@ -202,7 +207,7 @@ impl Sensor {
                 }
             },
             saturate: saturate.unwrap_or(default.saturate),
-            seed: seed.unwrap_or(default.seed),
+            random_state: random_state.unwrap_or(default.random_state),
         };
         sensor.check()?;
         Ok(Self { sensor })
@@ -235,13 +240,16 @@ impl Sensor {
     }
 
     fn __hash__(&self) -> u64 {
-        hash(&(self.sensor.noise.to_bits(), self.rounding(), self.sensor.saturate, self.sensor.seed))
+        hash(&(self.sensor.noise.to_bits(), self.rounding(), self.sensor.saturate, self.sensor.random_state))
     }
 
     fn __repr__(&self) -> String {
-        let CoreSensor { noise, saturate, seed, .. } = self.sensor;
+        let CoreSensor { noise, saturate, random_state, .. } = self.sensor;
         let saturate = if saturate { "True" } else { "False" };
-        format!("Sensor(noise={noise}, rounding={:?}, saturate={saturate}, seed={seed})", self.rounding())
+        format!(
+            "Sensor(noise={noise}, rounding={:?}, saturate={saturate}, random_state={random_state})",
+            self.rounding()
+        )
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
@@ -249,7 +257,7 @@ impl Sensor {
         options.set_item("noise", self.sensor.noise)?;
         options.set_item("rounding", self.rounding())?;
         options.set_item("saturate", self.sensor.saturate)?;
-        options.set_item("seed", self.sensor.seed)?;
+        options.set_item("random_state", self.sensor.random_state)?;
         Ok((PyTuple::empty(py), options))
     }
 }

@@ -13,7 +13,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
 /// exact boxes.
 ///
-/// `name` is one of `scenes.target_scenes()`. `seed` chooses the recording: world, texture, gait, shake and
+/// `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait, shake and
 /// noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
 /// the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
 /// and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
@@ -47,11 +47,11 @@ impl TargetScene {
 #[pymethods]
 impl TargetScene {
     #[new]
-    #[pyo3(signature = (name, *, seed=0, scale=0.5, noise=2.5, frames=None, colour_cast=0.0))]
+    #[pyo3(signature = (name, *, random_state=0, scale=0.5, noise=2.5, frames=None, colour_cast=0.0))]
     fn new(
         py: Python<'_>,
         name: &str,
-        seed: u64,
+        random_state: u64,
         scale: f64,
         noise: f64,
         frames: Option<Integer>,
@@ -60,7 +60,8 @@ impl TargetScene {
         let count = |Integer(count): Integer| {
             usize::try_from(count).map_err(|_| Error::argument("frames", "a positive integer", count))
         };
-        let options = TargetSceneOptions { seed, scale, noise, frames: frames.map(count).transpose()?, colour_cast };
+        let options =
+            TargetSceneOptions { random_state, scale, noise, frames: frames.map(count).transpose()?, colour_cast };
         let threads = Threads::new(None)?;
         let core = py.detach(|| threads.install(|| CoreScene::new(name, options)))?;
         Ok(Self { core })
@@ -154,19 +155,19 @@ impl TargetScene {
     fn __hash__(&self) -> u64 {
         let options = self.core.options();
         let mut hasher = DefaultHasher::new();
-        (self.core.name(), options.seed, options.scale.to_bits(), options.frames).hash(&mut hasher);
+        (self.core.name(), options.random_state, options.scale.to_bits(), options.frames).hash(&mut hasher);
         hasher.finish()
     }
 
     fn __repr__(&self) -> String {
-        let TargetSceneOptions { seed, scale, .. } = self.core.options();
-        format!("TargetScene({:?}, seed={seed}, scale={scale})", self.core.name())
+        let TargetSceneOptions { random_state, scale, .. } = self.core.options();
+        format!("TargetScene({:?}, random_state={random_state}, scale={scale})", self.core.name())
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
-        let TargetSceneOptions { seed, scale, noise, frames, colour_cast } = self.core.options();
+        let TargetSceneOptions { random_state, scale, noise, frames, colour_cast } = self.core.options();
         let options = PyDict::new(py);
-        options.set_item("seed", seed)?;
+        options.set_item("random_state", random_state)?;
         options.set_item("scale", scale)?;
         options.set_item("noise", noise)?;
         options.set_item("frames", frames)?;

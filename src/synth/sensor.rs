@@ -26,13 +26,13 @@ pub struct Sensor {
     /// Whether values are clipped to 0 ..= 255.
     pub saturate: bool,
     /// Seed of the noise.
-    pub seed: u64,
+    pub random_state: u64,
 }
 
 impl Sensor {
     /// An 8-bit camera: noise, the nearest grey level, clipped to 0 ..= 255.
     pub fn eight_bit(noise: f64, seed: u64) -> Self {
-        Self { noise, rounding: Rounding::Nearest, saturate: true, seed }
+        Self { noise, rounding: Rounding::Nearest, saturate: true, random_state: seed }
     }
 
     /// Refuses noise that is negative or not finite.
@@ -49,7 +49,7 @@ impl Sensor {
     /// The frame as the camera delivers it. Noise depends on the seed, the frame's `index` and the pixel, on
     /// nothing else.
     pub fn apply(&self, frame: &Frame<f64>, index: u64) -> Frame<f64> {
-        let rng = CounterRng::new(self.seed).stream(index);
+        let rng = CounterRng::new(self.random_state).stream(index);
         let mut pixel = 0u64;
         frame.map(|&value| {
             let noise = if self.noise > 0.0 { self.noise * rng.normal(pixel) } else { 0.0 };
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn noise_has_its_spread_and_differs_between_frames() {
-        let sensor = Sensor { noise: 2.0, seed: 4, ..Sensor::default() };
+        let sensor = Sensor { noise: 2.0, random_state: 4, ..Sensor::default() };
         let flat = Frame::filled(200, 100, 100.0);
         let (first, second) = (sensor.apply(&flat, 0), sensor.apply(&flat, 1));
         let variance = first.data().iter().map(|v| (v - 100.0).powi(2)).sum::<f64>() / 20_000.0;

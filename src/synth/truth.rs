@@ -91,7 +91,7 @@ mod tests {
 
     fn options(values: &[(&str, f64)]) -> SceneOptions {
         let values = values.iter().map(|(name, value)| ((*name).to_string(), *value)).collect();
-        SceneOptions { width: 24, height: 20, origin: (3.0, -2.0), seed: 4, values, ..SceneOptions::default() }
+        SceneOptions { width: 24, height: 20, origin: (3.0, -2.0), random_state: 4, values, ..SceneOptions::default() }
     }
 
     #[test]

@@ -176,7 +176,7 @@ fn synth_writes_every_kind_of_recording() {
     place.good("synth vortex -o v16 --frames 2 --size 30x20 --depth 16 --truth t --truth-format npz,flo");
     assert_eq!(place.names("t"), ["000000.flo", "000000.npz", "000001.flo", "000001.npz"]);
     place.good("synth vortex -o v.npy --frames 2 --size 30x20 --depth float");
-    place.good("synth vortex -o v.y4m --frames 2 --size 30x20 --rate 30000/1001 --seed 4 --noise 3");
+    place.good("synth vortex -o v.y4m --frames 2 --size 30x20 --rate 30000/1001 --random-state 4 --noise 3");
     for (input, dtype) in [("v16", "uint16"), ("v.npy", "float64"), ("v.y4m", "uint8")] {
         let info = place.good(&format!("info {input} --json")).json();
         assert_eq!((info["frames"].as_u64(), info["dtype"].as_str()), (Some(2), Some(dtype)), "{input}");
@@ -192,7 +192,7 @@ fn synth_records_scenes_of_targets_with_their_boxes() {
     let place = Place::new();
     assert!(place.good("synth --list").out.contains("meet_and_return"));
     let summary =
-        place.good("synth cars_handheld -o c.npy --boxes c.txt --frames 3 --scale 0.2 --seed 4 --json").json();
+        place.good("synth cars_handheld -o c.npy --boxes c.txt --frames 3 --scale 0.2 --random-state 4 --json").json();
     assert_eq!((summary["frames"].as_u64(), summary["targets"].as_u64()), (Some(3), Some(2)));
     place.good("synth cars_handheld -o c.y4m --frames 2 --scale 0.2");
     place.good("synth cars_handheld -o folder --frames 2 --scale 0.2");

@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 
 /// Two people who walk towards each other before a camera at rest.
 fn scene(frames: usize) -> TargetScene {
-    let options = TargetSceneOptions { seed: 3, scale: 0.3, frames: Some(frames), ..TargetSceneOptions::default() };
+    let options =
+        TargetSceneOptions { random_state: 3, scale: 0.3, frames: Some(frames), ..TargetSceneOptions::default() };
     TargetScene::new("people_static", options).unwrap()
 }
 
@@ -109,8 +110,8 @@ fn one_seed_gives_one_result_on_any_number_of_threads() {
     let place = recorded(&scene);
     let table = |options: &str| place.good(&format!("track frames {QUICK}{} {options}", boxes(&scene, 0))).out;
     let plain = table("--threads 1");
-    assert_eq!(plain, table("--threads 3 --seed 0"));
-    assert_ne!(plain, table("--seed 1"));
+    assert_eq!(plain, table("--threads 3 --random-state 0"));
+    assert_ne!(plain, table("--random-state 1"));
     assert_ne!(plain, table("--mode paper"));
 }
 
@@ -137,7 +138,7 @@ fn mistakes_are_named() {
         (format!("--method particle{one} --foreground maps.png"), vec!["foreground: expected a folder"]),
         ("--method particle --box 900,5,20,30".into(), vec!["box: expected", "target 1"]),
         (format!("--luminance{one} --foreground maps"), vec!["foreground: expected", "--method particle"]),
-        (format!("--luminance{one} --seed 3"), vec!["seed: expected", "stereo or particle"]),
+        (format!("--luminance{one} --random-state 3"), vec!["random_state: expected", "stereo or particle"]),
     ] {
         let ended = place.line(&format!("track frames {options}"));
         assert_eq!(ended.code, 2, "{options}: {}", ended.err);

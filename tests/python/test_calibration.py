@@ -14,7 +14,7 @@ CASES = [("affine", "noise"), ("affine", "speckle"), ("affine", "particles"), ("
 
 
 def camera_frames(scene, noise, seed):
-    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=seed)
+    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
     return [camera.apply_u8(scene.frame(t), index) for index, t in enumerate((-1.0, 0.0, 1.0))]
 
 
@@ -35,7 +35,7 @@ def flow_error(field, truth, known):
 def test_errors_lie_within_their_deviations(name, carrier, noise, method, seeds, share):
     held = {}
     for seed in range(3, 3 + seeds):
-        scene = scenes.Scene(name, width=112, height=96, seed=seed, carrier=carrier)
+        scene = scenes.Scene(name, width=112, height=96, random_state=seed, carrier=carrier)
         # To the next frame, or at the middle one.
         truth = scene.truth(0.0, between=(0.0, 1.0)) if method == "coarse_to_fine" else scene.truth(0.0)
         field = jacoflow.estimate(camera_frames(scene, noise, seed), method=method)
@@ -50,7 +50,7 @@ def test_errors_lie_within_their_deviations(name, carrier, noise, method, seeds,
 
 @pytest.mark.parametrize(("name", "carrier"), CASES)
 def test_the_default_beats_the_baselines(name, carrier):
-    scene = scenes.Scene(name, width=112, height=96, seed=3, carrier=carrier)
+    scene = scenes.Scene(name, width=112, height=96, random_state=3, carrier=carrier)
     frames, truth = camera_frames(scene, 1.0, 1), scene.truth(0.0, between=(0.0, 1.0))
     ours = jacoflow.estimate(frames)
     known = inner(ours, truth)
@@ -62,7 +62,7 @@ def test_the_default_beats_the_baselines(name, carrier):
 @pytest.mark.parametrize("carrier", ["noise", "speckle", "particles"])
 def test_the_flow_is_not_drawn_to_zero(carrier):
     """Slope of the estimate over the truth, on a vortex seen in 8 bits."""
-    scene = scenes.Scene("vortex", width=112, height=96, seed=5, carrier=carrier)
+    scene = scenes.Scene("vortex", width=112, height=96, random_state=5, carrier=carrier)
     field, truth = jacoflow.estimate(camera_frames(scene, 1.0, 1)), scene.truth(0.0, between=(0.0, 1.0))
     known = inner(field, truth)
     slope = np.sum((field.flow * truth.flow)[known]) / np.sum(truth.flow[known] ** 2)
@@ -85,8 +85,8 @@ def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames
     times = (0.0, 1.0) if frames == 2 else (-1.0, 0.0, 1.0)
     held = {name: [] for name in ("u", "v", "divergence", "curl")}
     for (motion, parameters), noise, seed in ((m, n, s) for m in MOTIONS.items() for n, s in ((1.0, 1), (3.0, 2))):
-        scene = scenes.Scene(motion, width=176, height=160, seed=seed, carrier=carrier, **parameters)
-        camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=seed)
+        scene = scenes.Scene(motion, width=176, height=160, random_state=seed, carrier=carrier, **parameters)
+        camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(0.0, 1.0))
         field = jacoflow.estimate(pictures, method="coarse_to_fine", time_scheme="pair" if frames == 2 else None)
@@ -106,8 +106,8 @@ def test_what_leaves_the_frame_has_wide_intervals(frames):
     shear = {"u": 6.0, "v": 0.5, "u_x": 0.0, "v_x": 0.0, "u_y": 0.02, "v_y": 0.0}
     motions = (("affine", shear), ("waves", {"speed": 6.0, "wavelength": 128.0}))
     for (motion, parameters), seed in itertools.product(motions, range(3, 7)):
-        scene = scenes.Scene(motion, width=176, height=160, seed=seed, carrier="noise", **parameters)
-        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=seed)
+        scene = scenes.Scene(motion, width=176, height=160, random_state=seed, carrier="noise", **parameters)
+        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(0.0, 1.0))
         field = jacoflow.estimate(pictures, method="coarse_to_fine", time_scheme="pair" if frames == 2 else None)
@@ -124,7 +124,7 @@ def test_what_leaves_the_frame_has_wide_intervals(frames):
 @pytest.mark.parametrize("size", [(160, 128), (161, 129), (157, 124)])
 def test_deviations_of_mirrored_frames_are_mirrored(size):
     """All four sides are told the same, whatever the size is a multiple of."""
-    scene = scenes.Scene("turbulence", width=size[0], height=size[1], seed=2, carrier="noise", speed=2.0, longest=192.0)
+    scene = scenes.Scene("turbulence", width=size[0], height=size[1], random_state=2, carrier="noise", speed=2.0, longest=192.0)
     frames = [np.round(scene.frame(t)).astype(np.float32) for t in (0.0, 1.0)]
     deviations = jacoflow.estimate(frames, time_scheme="pair").std("u")
     mirrored = jacoflow.estimate([np.ascontiguousarray(frame[::-1, ::-1]) for frame in frames], time_scheme="pair").std("u")[::-1, ::-1]
@@ -138,7 +138,7 @@ def test_deviations_of_mirrored_frames_are_mirrored(size):
 
 def test_the_covariance_is_positive_definite_and_grows_with_noise_and_without_texture():
     rng = np.random.default_rng(2)
-    scene = scenes.Scene("affine", width=160, height=128, seed=4, carrier="noise", u=1.2, v=0.4, u_x=0.0, v_x=0.0, u_y=0.0, v_y=0.0)
+    scene = scenes.Scene("affine", width=160, height=128, random_state=4, carrier="noise", u=1.2, v=0.4, u_x=0.0, v_x=0.0, u_y=0.0, v_y=0.0)
     clean = [scene.frame(t) for t in (0.0, 1.0)]
     fade = np.where(np.arange(160) < 80, 1.0, 0.0)
     deviations = []

@@ -165,8 +165,8 @@ def public_objects(texture):
         jacoflow.Condition.BOTH,
         jacoflow.observability(texture),
         jacoflow.classify([1, 2, 3, 4, 5, 6], [1, 0, 0, 0, 0, 0]),
-        scenes.Scene("disc", width=32, height=32, carrier="speckle", rpm=10.0, seed=4),
-        scenes.Sensor(noise=2.0, rounding="nearest", saturate=True, seed=1),
+        scenes.Scene("disc", width=32, height=32, carrier="speckle", rpm=10.0, random_state=4),
+        scenes.Sensor(noise=2.0, rounding="nearest", saturate=True, random_state=1),
         sigma,
         jacoflow.filters.KalmanFilter(2, 1),
         jacoflow.filters.ExtendedKalmanFilter(2, 1, batch=3),
@@ -223,12 +223,12 @@ def test_other_byte_orders_iterators_and_lists_of_four_are_taken():
 def test_value_objects_equal_their_copies():
     things = [
         scenes.Scene("vortex", width=30, height=20, core=5.0),
-        scenes.Sensor(noise=2.0, seed=3),
+        scenes.Sensor(noise=2.0, random_state=3),
         jacoflow.filters.MerweScaledSigmaPoints(4, 0.5, 2.0, 0.0),
     ]
     others = [
         scenes.Scene("vortex", width=30, height=20, core=6.0),
-        scenes.Sensor(noise=2.0, seed=4),
+        scenes.Sensor(noise=2.0, random_state=4),
         jacoflow.filters.MerweScaledSigmaPoints(4, 0.6, 2.0, 0.0),
     ]
     for thing, other in zip(things, others, strict=True):
@@ -307,7 +307,7 @@ def test_neither_axis_comes_first(options):
 def test_covariances_are_positive_definite_where_little_is_known(noise):
     """A grating leaves the motion along its lines open: the matrices are nearly singular, in single precision."""
     y, x = np.mgrid[:64, :72]
-    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, seed=2)
+    camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=2)
     gratings = [100 + 50 * np.sin((x + 0.7 * y - 0.3 * t) / 4) for t in (-1, 0, 1)]
     field = jacoflow.estimate([camera.apply_u8(grating, index=k) for k, grating in enumerate(gratings)])
     covariance = field.covariance[field.valid].astype(float)

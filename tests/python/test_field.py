@@ -22,7 +22,7 @@ NAMES = ("u", "v", "u_x", "v_x", "u_y", "v_y")
 
 @pytest.fixture(scope="module")
 def field():
-    return jacoflow.estimate(list(scenes.Scene("affine", width=56, height=48, seed=2).frames(3)), diagnostics=True)
+    return jacoflow.estimate(list(scenes.Scene("affine", width=56, height=48, random_state=2).frames(3)), diagnostics=True)
 
 
 def test_shapes_and_kinds(field):
@@ -92,10 +92,10 @@ def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
     motion = dict(u=0.1, v=0.05, u_x=0.003, v_x=0.006, u_y=-0.006, v_y=0.003)
     ratios = []
     for texture in range(4):
-        scene = scenes.Scene("affine", width=72, height=72, seed=texture, **motion)
+        scene = scenes.Scene("affine", width=72, height=72, random_state=texture, **motion)
         clean, truth = [scene.frame(t) for t in (-1.0, 0.0, 1.0)], scene.truth(0.0, between=(0.0, 1.0))
         for seed in range(12):
-            camera = scenes.Sensor(noise=3.0, seed=seed)
+            camera = scenes.Sensor(noise=3.0, random_state=seed)
             frames = [camera.apply(frame, index) for index, frame in enumerate(clean)][3 - count :]
             seen = jacoflow.estimate(frames, smooth=smooth)
             for name in ("divergence", "curl"):
@@ -112,7 +112,7 @@ def test_the_deviation_of_a_regions_mean_holds_the_bias_of_clean_frames(name):
     """Without noise all estimates are biased alike; averaging does not help, and the deviation may not pretend so."""
     ratios = []
     for seed in range(4):
-        scene = scenes.Scene(name, width=96, height=96, seed=seed)
+        scene = scenes.Scene(name, width=96, height=96, random_state=seed)
         camera = scenes.Sensor(noise=0.0, rounding="nearest", saturate=True)
         seen = jacoflow.estimate([camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))])
         truth = scene.truth(0.0, between=(0.0, 1.0))

@@ -68,7 +68,7 @@ def in_child(work):
 
 def film(count=3):
     """Frames so large that their work is split between threads."""
-    return scenes.Scene("affine", width=320, height=240, seed=4).frames(count)
+    return scenes.Scene("affine", width=320, height=240, random_state=4).frames(count)
 
 
 def field(method="instantaneous", **options):

@@ -8,7 +8,7 @@ OPTIONS = {"method": "instantaneous", "threads": 1}
 
 
 def frames(seed, size=(200, 150), dtype=np.float32):
-    scene = jacoflow.scenes.Scene("affine", width=size[0], height=size[1], seed=seed)
+    scene = jacoflow.scenes.Scene("affine", width=size[0], height=size[1], random_state=seed)
     return [scene.frame(t).astype(dtype) for t in range(3)]
 
 

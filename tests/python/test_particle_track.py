@@ -24,7 +24,7 @@ class Clip:
     """Frames (T, H, W, 3) and true boxes (T, K, 4) of part of a scene."""
 
     def __init__(self, name, first, last, seed=10):
-        scene = scenes.TargetScene(name, seed=seed)
+        scene = scenes.TargetScene(name, random_state=seed)
         self.frames = np.stack([scene.frame(t) for t in range(first, last)])
         self.boxes = scene.boxes()[first:last]
         self.frames.flags.writeable = False
@@ -167,7 +167,7 @@ def test_each_likelihood_weighs(apart):
 
 
 def test_the_seed_decides(crossing):
-    one, other, same = (run(crossing, 3, seed=seed, **FEW)[-1] for seed in (0, 1, 0))
+    one, other, same = (run(crossing, 3, random_state=seed, **FEW)[-1] for seed in (0, 1, 0))
     assert_same(one, same)
     assert (one.boxes != other.boxes).all()
 
@@ -190,7 +190,7 @@ def test_a_target_does_not_depend_on_others_that_are_never_near(apart, mode):
         assert_array_equal(step.particles(4)[0], alone.particles(4)[0])
 
 
-@pytest.mark.parametrize("options", [{}, {"mode": "paper", "threads": 2}, {"resampling": "systematic", "ess_threshold": 0.5, "seed": 3}])
+@pytest.mark.parametrize("options", [{}, {"mode": "paper", "threads": 2}, {"resampling": "systematic", "ess_threshold": 0.5, "random_state": 3}])
 def test_a_pickled_tracker_goes_on_bit_for_bit(crossing, options):
     tracker = ParticleTracker(crossing.frames[10], crossing.boxes[10], **FEW, **options)
     for frame in crossing.frames[11:14]:

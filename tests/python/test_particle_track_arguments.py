@@ -52,7 +52,7 @@ def test_boxes_that_cannot_be_followed_are_named(boxes, message):
         ({"segmentation": {"size": 3}}, "segmentation: expected scale, sigma and min_size, got 'size'"),
         ({"segmentation": 3}, "segmentation: expected a dict of"),
         ({"grey": "mean"}, 'grey: expected "error", "value", got "mean"'),
-        ({"seed": -1}, "seed: expected an integer from 0 to"),
+        ({"random_state": -1}, "random_state: expected an integer from 0 to"),
         ({"threads": 0}, "threads: expected a positive integer, got 0"),
     ],
 )
@@ -66,7 +66,7 @@ def test_names_may_come_from_an_iterator():
     assert tracker.options["likelihoods"] == ["colour"] and tracker.options["without"] == ["hidden"]
 
 
-@pytest.mark.parametrize(("name", "value"), [("n_particles", 1.5), ("n_near", True), ("scale", "large"), ("ess_threshold", None), ("seed", "0"), ("threads", 2.0)])
+@pytest.mark.parametrize(("name", "value"), [("n_particles", 1.5), ("n_near", True), ("scale", "large"), ("ess_threshold", None), ("random_state", "0"), ("threads", 2.0)])
 def test_options_of_another_type_are_named(name, value):
     with pytest.raises(TypeError, match=f"^{name}: expected"):
         ParticleTracker(FRAME, [BOX], **{name: value})

@@ -15,7 +15,7 @@ METHODS = st.sampled_from(["windowed", "coarse_to_fine", "lucas_kanade", "horn_s
 
 def pictures(seed, motion=(0.3, -0.2, 0.01, 0.02, -0.02, 0.01)):
     names = ("u", "v", "u_x", "v_x", "u_y", "v_y")
-    return scenes.Scene("affine", width=40, height=36, seed=seed, **dict(zip(names, motion, strict=True))).frames(3)
+    return scenes.Scene("affine", width=40, height=36, random_state=seed, **dict(zip(names, motion, strict=True))).frames(3)
 
 
 @settings(max_examples=15, deadline=None)

@@ -15,8 +15,8 @@ METHODS = ["windowed", "coarse_to_fine", "instantaneous"]
 @pytest.fixture(scope="module")
 def frames():
     """Nine uint8 frames (9, 56, 64) of a steady motion with 3 grey levels of noise."""
-    scene = scenes.Scene("affine", width=64, height=56, seed=4, u=0.2, v=-0.1)
-    camera = scenes.Sensor(noise=3.0, rounding="nearest", saturate=True, seed=2)
+    scene = scenes.Scene("affine", width=64, height=56, random_state=4, u=0.2, v=-0.1)
+    camera = scenes.Sensor(noise=3.0, rounding="nearest", saturate=True, random_state=2)
     stack = np.stack([camera.apply_u8(scene.frame(float(t)), t) for t in range(9)])
     stack.flags.writeable = False
     return stack
@@ -53,7 +53,7 @@ def test_it_starts_with_the_first_estimate_and_gets_surer(frames, method):
     inner = np.s_[12:-12, 12:-12]
     assert np.nanmedian(fused[-1].std("u")[inner]) < 0.75 * np.nanmedian(plain[-1].std("u")[inner])
     if method != "instantaneous":
-        truth = scenes.Scene("affine", width=64, height=56, seed=4, u=0.2, v=-0.1).truth(4.0)
+        truth = scenes.Scene("affine", width=64, height=56, random_state=4, u=0.2, v=-0.1).truth(4.0)
         error = [np.sqrt(np.mean((field.flow - truth.flow)[inner] ** 2)) for field in (plain[-1], fused[-1])]
         assert error[1] < 0.75 * error[0]
 
@@ -128,8 +128,8 @@ def test_bias_that_does_not_average_out_is_told():
     """Particles in a vortex: what windows lose of its bend is lost in every frame. After 23 frames the intervals still hold the truth."""
     shares = []
     for seed in range(3):
-        scene = scenes.Scene("vortex", width=128, height=128, seed=seed, carrier="particles")
-        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, seed=seed)
+        scene = scenes.Scene("vortex", width=128, height=128, random_state=seed, carrier="particles")
+        camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=seed)
         estimator = FlowEstimator(temporal="recursive")
         fields = [estimator.push(camera.apply_u8(scene.frame(float(t)), t)) for t in range(25)]
         truth = scene.truth(23.0, between=(0.0, 1.0))

@@ -9,7 +9,7 @@ from jacoflow import Status, scenes
 
 @pytest.fixture(scope="module")
 def waves():
-    return scenes.Scene("waves", width=40, height=32, seed=2, speed=4.0, wavelength=64.0, carrier="speckle", origin=(5.0, -3.0))
+    return scenes.Scene("waves", width=40, height=32, random_state=2, speed=4.0, wavelength=64.0, carrier="speckle", origin=(5.0, -3.0))
 
 
 def test_truth_between_frames_is_the_displacement(waves):
@@ -36,7 +36,7 @@ def test_matter_keeps_its_brightness_along_the_truth(waves):
     moved = waves.truth(0.0, between=(0, 1)).flow
     for row, column in ((3, 4), (16, 30)):
         u, v = moved[row, column]
-        shifted = scenes.Scene("waves", width=1, height=1, seed=2, speed=4.0, wavelength=64.0, carrier="speckle", origin=(5.0 + column + u, -3.0 + row + v))
+        shifted = scenes.Scene("waves", width=1, height=1, random_state=2, speed=4.0, wavelength=64.0, carrier="speckle", origin=(5.0 + column + u, -3.0 + row + v))
         assert shifted.frame(1.0)[0, 0] == pytest.approx(frame[row, column], abs=1e-6)
 
 

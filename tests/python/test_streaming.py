@@ -18,7 +18,7 @@ FORMS = ["augmented", "non_augmented", "fast", "extended"]
 
 @pytest.fixture(scope="module")
 def frames():
-    return scenes.Scene("affine", width=40, height=32, seed=5).frames(6)
+    return scenes.Scene("affine", width=40, height=32, random_state=5).frames(6)
 
 
 @pytest.mark.parametrize("method", METHODS)

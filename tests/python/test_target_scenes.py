@@ -38,7 +38,7 @@ def changed(scene, t, target):
 @settings(max_examples=15, deadline=None)
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 2**40), share=st.floats(0, 1), scale=st.sampled_from([0.2, 0.5, 0.8]))
 def test_boxes_hold_the_pixels_of_their_targets(name, seed, share, scale):
-    scene = scenes.TargetScene(name, seed=seed, noise=0.0, scale=scale)
+    scene = scenes.TargetScene(name, random_state=seed, noise=0.0, scale=scale)
     t = round(share * (len(scene) - 1))
     for target, (left, top, width, height) in enumerate(scene.boxes()[t]):
         rows, columns = np.nonzero(changed(scene, t, target))
@@ -92,23 +92,23 @@ def test_a_static_camera_does_not_move():
 
 
 def test_scenes_are_the_same_on_any_number_of_threads():
-    program = "import sys; from jacoflow import scenes; sys.stdout.buffer.write(scenes.TargetScene('approach', seed=3, frames=3).frames().tobytes())"
+    program = "import sys; from jacoflow import scenes; sys.stdout.buffer.write(scenes.TargetScene('approach', random_state=3, frames=3).frames().tobytes())"
     outputs = [
         subprocess.run([sys.executable, "-c", program], env={**os.environ, "JACOFLOW_THREADS": threads}, capture_output=True, check=True).stdout
         for threads in ("1", "3")
     ]
-    assert outputs[0] == outputs[1] == scenes.TargetScene("approach", seed=3, frames=3).frames().tobytes()
+    assert outputs[0] == outputs[1] == scenes.TargetScene("approach", random_state=3, frames=3).frames().tobytes()
 
 
 def test_seeds_are_recordings_and_scenes_are_values():
-    options = {"seed": 5, "scale": 0.3, "noise": 1.0, "frames": 3, "colour_cast": 0.2}
+    options = {"random_state": 5, "scale": 0.3, "noise": 1.0, "frames": 3, "colour_cast": 0.2}
     scene = scenes.TargetScene("pillar", **options)
     for twin in (scenes.TargetScene("pillar", **options), copy.copy(scene), pickle.loads(pickle.dumps(scene))):
         assert twin == scene and hash(twin) == hash(scene)
         assert_array_equal(twin.frames(), scene.frames())
-    other = scenes.TargetScene("pillar", **{**options, "seed": 6})
+    other = scenes.TargetScene("pillar", **{**options, "random_state": 6})
     assert other != scene and (other.frames() != scene.frames()).mean() > 0.5
-    assert repr(scene) == 'TargetScene("pillar", seed=5, scale=0.3)'
+    assert repr(scene) == 'TargetScene("pillar", random_state=5, scale=0.3)'
 
 
 @pytest.mark.parametrize(

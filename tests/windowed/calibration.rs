@@ -21,7 +21,7 @@ fn nees(
     let clean: Vec<Frame<f64>> = TRIPLE.iter().map(|&t| scene.frame(t)).collect();
     let mut samples: Vec<Vec<(Vector6<f64>, Matrix6<f64>)>> = Vec::new();
     for seed in 0..realisations {
-        let camera = Sensor { noise: sensor, rounding: Rounding::Nearest, saturate: false, seed };
+        let camera = Sensor { noise: sensor, rounding: Rounding::Nearest, saturate: false, random_state: seed };
         let frames: Vec<Frame<f32>> =
             clean.iter().enumerate().map(|(k, f)| camera.apply(f, k as u64).map(|v| *v as f32)).collect();
         let field = estimate(&frames[..options.frames], options, common);

@@ -65,7 +65,7 @@ fn excess(
     let mut inverses: Vec<Matrix6<f64>> = Vec::new();
     let (mut sum, mut count) = (0.0, 0.0);
     for seed in 0..REALISATIONS {
-        let camera = Sensor { noise, rounding: Rounding::None, saturate: false, seed };
+        let camera = Sensor { noise, rounding: Rounding::None, saturate: false, random_state: seed };
         let seen: Vec<Frame<f64>> = clean.iter().enumerate().map(|(k, f)| camera.apply(f, k as u64)).collect();
         let field = estimate(&seen, common.clone());
         for site in 0..field.len() {

@@ -31,7 +31,7 @@ def estimate_motion(
     correlation_length: float = 0.0,
     flow_scale: float = 0.0,
     flow_offset: float = 0.0,
-    seed: int = 0,
+    random_state: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
     """The rigid motion that explains flow at N points, with covariance, depths and status.
@@ -78,7 +78,7 @@ def estimate_motion(
         Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
     flow_offset : float, units of flow
         Standard deviation of each component of a displacement that all flow has in common (a field tells how large it may be). Most of it looks like a rotation, and no residual tells it; it widens the covariance along what it would make of the motion. Not on the sphere.
-    seed : int
+    random_state : int
         Seed of the random choices.
     threads : int or None
         Number of threads; default: the environment variable JACOFLOW_THREADS, or every processor.
@@ -93,7 +93,7 @@ def estimate_motion(
     given = layout(K, sigma, cov, projection, jacobian is not None)
     options = {
         "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": number("flow_scale", flow_scale), "flow_offset": number("flow_offset", flow_offset), "seed": whole("seed", seed), "threads": None if threads is None else count("threads", threads),
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": number("flow_scale", flow_scale), "flow_offset": number("flow_offset", flow_offset), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = six(flow, jacobian)

@@ -51,13 +51,13 @@ impl ParticleTrackerArguments {
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
-    pub fn options(&self, mode: ParticleMode, seed: Option<u64>, threads: Threads) -> Result<ParticleOptions> {
+    pub fn options(&self, mode: ParticleMode, random_state: Option<u64>, threads: Threads) -> Result<ParticleOptions> {
         let mut options = ParticleOptions { mode, threads, ..ParticleOptions::default() };
         if let Some(particles) = self.particles {
             options.n_particles = particles;
             options.n_near = particles.saturating_mul(2);
         }
-        options.seed = seed.unwrap_or(options.seed);
+        options.random_state = random_state.unwrap_or(options.random_state);
         options.check().map_err(|error| match error {
             Error::Argument { argument: "n_particles" | "n_near", expected, got } => {
                 Error::Argument { argument: "particles", expected, got }

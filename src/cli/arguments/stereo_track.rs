@@ -74,11 +74,16 @@ impl StereoTrackerArguments {
         self.layout.given().or(self.matches.given()).or(own.into_iter().find_map(|given| given))
     }
 
-    /// The options of the stereo tracker; layers of disparity as wide as the range. `seed` of the mixture.
+    /// The options of the stereo tracker; layers of disparity as wide as the range. `random_state` of the mixture.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.
-    pub fn options(&self, mode: StereoMode, seed: Option<u64>, threads: Threads) -> Result<StereoTrackerOptions> {
+    pub fn options(
+        &self,
+        mode: StereoMode,
+        random_state: Option<u64>,
+        threads: Threads,
+    ) -> Result<StereoTrackerOptions> {
         let mut options = StereoTrackerOptions::new(mode);
         if let Some((least, greatest)) = self.matches.disparities {
             options = options.with_disparities([least, greatest]);
@@ -103,7 +108,7 @@ impl StereoTrackerArguments {
             options.grid.layers = layers.unwrap_or(options.grid.layers);
         }
         options.search = self.search.unwrap_or(options.search);
-        options.seed = seed.unwrap_or(options.seed);
+        options.random_state = random_state.unwrap_or(options.random_state);
         options.camera = self.cameras;
         options.threads = threads;
         options.check()?;

@@ -49,7 +49,7 @@ pub struct TrackerArguments {
     pub mode: Option<ModeWord>,
     /// Seed of the random numbers (stereo, particle) [default: 0]
     #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
+    pub random_state: Option<u64>,
     /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
     #[arg(long, value_name = "PX")]
     pub fov: Option<usize>,

@@ -21,7 +21,7 @@ impl TrackCommand {
     pub(super) fn follow_targets(&self, watch: &Watch) -> Result<Report> {
         self.refuse(self.stereo.given(), "stereo")?;
         self.refuse(self.particle.given(), "particle")?;
-        self.refuse(self.tracker.seed.map(|_| "seed"), "stereo or particle")?;
+        self.refuse(self.tracker.random_state.map(|_| "random_state"), "stereo or particle")?;
         let options = self.tracker.gradient()?;
         let threads = Threads::new(self.threads.threads)?;
         let wanted = self.output.wanted(self.tell.json, self.output.overlay.is_some())?;

@@ -23,7 +23,7 @@ impl TrackCommand {
         self.refuse(self.stereo.given(), "stereo")?;
         self.refuse_changes_of_grey()?;
         let mode = self.tracker.particle_mode()?;
-        let options = self.particle.options(mode, self.tracker.seed, Threads::new(self.threads.threads)?)?;
+        let options = self.particle.options(mode, self.tracker.random_state, Threads::new(self.threads.threads)?)?;
         let wanted = self.texts()?;
         self.check_pictures_of_particles()?;
         let opened = open_colour_input(&self.input)?;
@@ -36,7 +36,7 @@ impl TrackCommand {
         let rate = opened.numbering.rate;
         let details = json!({
             "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype, "fps": rate,
-            "method": self.tracker.method, "mode": mode.name(), "particles": options.n_particles, "seed": options.seed,
+            "method": self.tracker.method, "mode": mode.name(), "particles": options.n_particles, "random_state": options.random_state,
             "mot": self.particle.mot, "csv": self.particle.csv, "foreground": self.particle.foreground,
         });
         let mut run = ParticleRun::new(&starts, options, opened.numbering);

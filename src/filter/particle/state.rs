@@ -31,7 +31,7 @@ pub struct ParticleFilter {
     /// Identifier of each set in the random numbers, `(B)`; 0, 1, ... at first.
     pub targets: Vec<u64>,
     /// Seed of the random numbers.
-    pub seed: u64,
+    pub random_state: u64,
     /// Number of predictions so far.
     pub step: u64,
     /// Number of selections since the last prediction: each has random numbers of its own.
@@ -77,7 +77,7 @@ impl ParticleFilter {
             log_evidence_sum: vec![0.0; batch],
             degenerate: vec![0; batch],
             targets: (0..batch as u64).collect(),
-            seed,
+            random_state: seed,
             step: 0,
             selections: 0,
             threads: Threads::default(),
@@ -140,7 +140,7 @@ impl ParticleFilter {
             Purpose::Transition => 1,
             Purpose::Selection(number) => 2 + number,
         };
-        CounterRng::new(self.seed).stream(self.targets[set]).stream(step).stream(purpose)
+        CounterRng::new(self.random_state).stream(self.targets[set]).stream(step).stream(purpose)
     }
 
     /// Calls `work(set, row of (B, N), standard normals, output)` for every particle; normals and output have

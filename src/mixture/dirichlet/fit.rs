@@ -25,7 +25,7 @@ use crate::mixture::start::{from_labels, from_shares};
 pub fn fit_dirichlet(points: &Points, options: &DirichletOptions) -> Result<DirichletMixture> {
     let problem = Problem::new(points, options)?;
     options.threads.install(|| {
-        let rng = CounterRng::new(options.seed);
+        let rng = CounterRng::new(options.random_state);
         let standardised = standardised(points, &problem.planes);
         let standard = Points { values: &standardised, ..*points };
         let mut best: Option<Run> = None;

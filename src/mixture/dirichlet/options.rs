@@ -51,7 +51,7 @@ pub struct DirichletOptions {
     /// `max_iter` rounds.
     pub tol: Option<f64>,
     /// Seed of the starts (0).
-    pub seed: u64,
+    pub random_state: u64,
     /// Number of threads; results do not depend on it.
     pub threads: Threads,
 }
@@ -70,7 +70,7 @@ impl Default for DirichletOptions {
             n_init: 1,
             max_iter: 100,
             tol: Some(1e-4),
-            seed: 0,
+            random_state: 0,
             threads: Threads::default(),
         }
     }

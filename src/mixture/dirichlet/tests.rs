@@ -162,7 +162,7 @@ fn merging_only_raises_the_score_and_more_starts_do() {
     let points = Points { dimensions: 2, values: &x, weights: Some(&w) };
     let score = |options: &DirichletOptions| fit_dirichlet(&points, options).unwrap().lower_bound;
     for seed in 0..5 {
-        let options = DirichletOptions { seed, ..DirichletOptions::default() };
+        let options = DirichletOptions { random_state: seed, ..DirichletOptions::default() };
         let plain = DirichletOptions { merge: false, ..options.clone() };
         assert!(score(&options) > score(&plain));
         assert!(score(&DirichletOptions { n_init: 4, ..plain.clone() }) >= score(&plain));
@@ -215,7 +215,8 @@ fn merging_puts_one_gaussian_together() {
         let rng = CounterRng::new(seed);
         let x: Vec<f64> = (0..800).map(|i| rng.normal(i)).collect();
         let points = Points { dimensions: 2, values: &x, weights: None };
-        let mixture = fit_dirichlet(&points, &DirichletOptions { seed, ..DirichletOptions::default() }).unwrap();
+        let mixture =
+            fit_dirichlet(&points, &DirichletOptions { random_state: seed, ..DirichletOptions::default() }).unwrap();
         assert_near(&mixture.counts[..2], &[400.0, 0.0], 1e-9);
     }
 }

@@ -130,7 +130,7 @@ pub struct MotionOptions {
     /// Errors that all flow has in common, as flow from gradients has them. Default: none.
     pub common: CommonErrors,
     /// Seed of the random choices; default: 0.
-    pub seed: u64,
+    pub random_state: u64,
     /// Number of threads; the result does not depend on it.
     pub threads: Threads,
 }

@@ -153,7 +153,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     if let Some(rotation) = turning(&system) {
         return turning_report(&system, n, &rotation, &options.common, &to_plane(patches.camera));
     }
-    let rng = CounterRng::new(options.seed);
+    let rng = CounterRng::new(options.random_state);
     let mut minima = match options.initial {
         Some(initial) => vec![system.refine(&Motion::new(initial.translation, initial.rotation))],
         None => minima(&system, rng),

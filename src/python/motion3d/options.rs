@@ -26,7 +26,7 @@ pub struct Options<'py> {
     correlation_length: Option<f64>,
     flow_scale: f64,
     flow_offset: f64,
-    seed: Integer,
+    random_state: Integer,
     threads: Option<usize>,
 }
 
@@ -36,7 +36,7 @@ impl Options<'_> {
         let methods = [("auto", Method::Auto), ("ml", Method::MaximumLikelihood), ("efficient", Method::Efficient)];
         let smoothers = [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
         let weights = self.weight_inv_depth.as_ref().map(|given| arrays::doubles("weight_inv_depth", given));
-        let wrong_seed = |_| Error::argument("seed", "an integer of at least 0", self.seed.0);
+        let wrong_random_state = |_| Error::argument("random_state", "an integer of at least 0", self.random_state.0);
         Ok(MotionOptions {
             method: word("method", &self.method, &methods)?,
             robust: self.robust,
@@ -48,7 +48,7 @@ impl Options<'_> {
             shared: self.shared,
             correlation_length: self.correlation_length,
             common: CommonErrors { scale: self.flow_scale, offset: self.flow_offset },
-            seed: u64::try_from(self.seed.0).map_err(wrong_seed)?,
+            random_state: u64::try_from(self.random_state.0).map_err(wrong_random_state)?,
             threads: Threads::new(self.threads)?,
         })
     }

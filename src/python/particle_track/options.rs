@@ -23,7 +23,7 @@ pub(super) struct Given {
     /// Scale, sigma and smallest region.
     segmentation: (f64, f64, Option<usize>),
     grey: String,
-    seed: u64,
+    random_state: u64,
     threads: Option<usize>,
 }
 
@@ -64,7 +64,7 @@ impl Given {
             segment_scale: scale,
             segment_sigma: sigma,
             segment_min_size: min_size,
-            seed: self.seed,
+            random_state: self.random_state,
             threads: Threads::new(self.threads)?,
         };
         options.check()?;

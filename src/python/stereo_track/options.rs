@@ -90,7 +90,7 @@ impl Given {
         options.warm_max_iter = self.warm_max_iter;
         options.n_init = self.n_init;
         options.prune_weight = self.prune_weight;
-        options.seed = self.random_state;
+        options.random_state = self.random_state;
         options.search = self.search;
         options.luminance_levels = self.luminance_levels;
         options.arc_threshold = self.arc_threshold;

@@ -21,7 +21,7 @@ pub(super) const KIND: SceneKind = SceneKind {
         } else {
             settings.positive("disc_radius")?
         };
-        let seed = settings.options.seed;
+        let seed = settings.options.random_state;
         Ok(Box::new(RotatingDisc {
             size: (width, height),
             origin: settings.options.origin,

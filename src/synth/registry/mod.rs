@@ -98,7 +98,7 @@ pub struct SceneOptions {
     /// Scene coordinates of pixel (0, 0), px.
     pub origin: (f64, f64),
     /// Seed of everything random.
-    pub seed: u64,
+    pub random_state: u64,
     /// Name of the carrier; `None`: the first of [`CARRIERS`].
     pub carrier: Option<String>,
     /// Parameters of the scene and its carrier that differ from their defaults.
@@ -107,7 +107,7 @@ pub struct SceneOptions {
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self { width: 256, height: 256, origin: (0.0, 0.0), seed: 0, carrier: None, values: Vec::new() }
+        Self { width: 256, height: 256, origin: (0.0, 0.0), random_state: 0, carrier: None, values: Vec::new() }
     }
 }
 
@@ -138,7 +138,7 @@ pub fn build(name: &str, options: &SceneOptions) -> Result<Box<dyn Scene>> {
             let motion = make(&settings)?;
             match (carrier.texture, carrier.carry) {
                 (Some(texture), _) => {
-                    let texture = texture(&settings, options.seed)?;
+                    let texture = texture(&settings, options.random_state)?;
                     let carried = Carried::new(kind.name, settings.size(), texture, motion);
                     Ok(Box::new(Carried { origin: options.origin, ..carried }))
                 }
@@ -226,7 +226,7 @@ mod tests {
         SceneOptions {
             width: 40,
             height: 32,
-            seed: 5,
+            random_state: 5,
             carrier: carrier.map(String::from),
             values: values.iter().map(|(n, v)| ((*n).to_string(), *v)).collect(),
             ..SceneOptions::default()

@@ -16,7 +16,7 @@ pub(super) const KIND: SceneKind = SceneKind {
     ],
     make: Make::Motion(|settings| {
         // Not the carrier's own stream of random numbers.
-        let seed = settings.options.seed.wrapping_add(0x5eed);
+        let seed = settings.options.random_state.wrapping_add(0x5eed);
         Ok(Box::new(Turbulence::new(settings.value("speed"), settings.positive("longest")?, seed)))
     }),
 };

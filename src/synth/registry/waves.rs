@@ -16,7 +16,7 @@ pub(super) const KIND: SceneKind = SceneKind {
     ],
     make: Make::Motion(|settings| {
         // Not the carrier's own stream of random numbers.
-        let seed = settings.options.seed.wrapping_add(0x3a7e);
+        let seed = settings.options.random_state.wrapping_add(0x3a7e);
         Ok(Box::new(Waves::new(settings.value("speed"), settings.positive("wavelength")?, seed)))
     }),
 };

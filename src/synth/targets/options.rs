@@ -15,7 +15,7 @@ const SCALES: (f64, f64) = (0.1, 8.0);
 pub struct TargetSceneOptions {
     /// Seed of the world, the texture, the gait, the shake and the noise: another recording of the same
     /// scene.
-    pub seed: u64,
+    pub random_state: u64,
     /// What all lengths are multiplied by; at 1 a frame has 720 x 480 px.
     pub scale: f64,
     /// Standard deviation of the white noise of each channel, grey levels.
@@ -30,7 +30,7 @@ pub struct TargetSceneOptions {
 
 impl Default for TargetSceneOptions {
     fn default() -> Self {
-        Self { seed: 0, scale: 0.5, noise: 2.5, frames: None, colour_cast: 0.0 }
+        Self { random_state: 0, scale: 0.5, noise: 2.5, frames: None, colour_cast: 0.0 }
     }
 }
 

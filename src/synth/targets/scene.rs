@@ -55,7 +55,7 @@ impl TargetScene {
     pub fn new(name: &str, options: TargetSceneOptions) -> Result<Self> {
         let kind = options.check(name)?;
         let frames = options.frames.unwrap_or(kind.frames);
-        let rng = |stream: Stream| CounterRng::new(options.seed).stream(stream as u64);
+        let rng = |stream: Stream| CounterRng::new(options.random_state).stream(stream as u64);
         let depth = |&k: &usize| kind.courses[k].mean_size() + LOWER_IS_NEARER * kind.courses[k].start[1];
         let mut order: Vec<usize> = (0..kind.courses.len()).collect();
         order.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
@@ -123,7 +123,7 @@ impl TargetScene {
 
     /// The random numbers of the noise in a frame.
     pub(super) fn noise_of(&self, frame: usize) -> CounterRng {
-        CounterRng::new(self.options.seed).stream(Stream::Noise as u64).stream(frame as u64)
+        CounterRng::new(self.options.random_state).stream(Stream::Noise as u64).stream(frame as u64)
     }
 
     /// The world point relative to the world's centre that a place in the window shows, px.

@@ -169,7 +169,9 @@ fn bilinear(frame: &ColourFrame<u8>, [x, y]: [f64; 2]) -> f64 {
 
 #[test]
 fn frames_do_not_depend_on_threads_or_order_but_on_the_seed() {
-    let make = |seed| TargetScene::new("three_people", TargetSceneOptions { seed, scale: 0.25, ..options() }).unwrap();
+    let make = |seed| {
+        TargetScene::new("three_people", TargetSceneOptions { random_state: seed, scale: 0.25, ..options() }).unwrap()
+    };
     let on = |threads: usize| Threads::new(Some(threads)).unwrap().install(|| [9, 4].map(|t| make(7).frame(t)));
     let first = on(1);
     assert!(first == on(2) && first == on(3));

@@ -63,7 +63,7 @@ fn mixture_options(floor: f64, prior: CovariancePrior, options: &ParticleOptions
         n_components: COMPONENTS,
         covariance_floor: floor * floor,
         covariance_prior: prior,
-        seed: options.seed,
+        random_state: options.random_state,
         threads: options.threads,
         ..DirichletOptions::default()
     }

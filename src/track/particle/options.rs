@@ -200,7 +200,7 @@ pub struct ParticleOptions {
     /// Smallest region, px^2; default `None`: 120 times the square of the scale.
     pub segment_min_size: Option<usize>,
     /// Seed of all random numbers; default 0.
-    pub seed: u64,
+    pub random_state: u64,
     /// Number of threads.
     pub threads: Threads,
 }
@@ -220,7 +220,7 @@ impl Default for ParticleOptions {
             segment_scale: SEGMENT_SCALE,
             segment_sigma: SEGMENT_SIGMA,
             segment_min_size: None,
-            seed: 0,
+            random_state: 0,
             threads: Threads::default(),
         }
     }

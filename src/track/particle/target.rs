@@ -62,7 +62,7 @@ impl Target {
         let scale = options.length_scale(bins.height());
         let [x, y, w, h] = bounds;
         let start = Start { mean: [x, y, 0.0, 0.0, w, h], noise: options.noise(scale), scale };
-        let cloud = Cloud::begin(&start, options.n_particles, stream(options.seed, id, frame, Purpose::Start));
+        let cloud = Cloud::begin(&start, options.n_particles, stream(options.random_state, id, frame, Purpose::Start));
         Self {
             id,
             first_size: [w, h],
@@ -98,7 +98,7 @@ impl Target {
     pub fn advance(&mut self, own: usize, moment: &Moment<'_>) {
         let seeing = &moment.seeing[own];
         let id = self.id;
-        let rng = |purpose| stream(moment.options.seed, id, moment.frame, purpose);
+        let rng = |purpose| stream(moment.options.random_state, id, moment.frame, purpose);
         let (selection, transition) = (rng(Purpose::Selection), rng(Purpose::Transition));
         let count = if seeing.near.is_empty() || !crate::ablation::keeps("particle.near_particles") {
             moment.options.n_particles
@@ -135,7 +135,7 @@ impl Target {
 
     /// The frame shows nothing: particles move on without being weighed.
     pub fn coast(&mut self, options: &ParticleOptions, scale: f64, frame: usize) {
-        let rng = stream(options.seed, self.id, frame, Purpose::Transition);
+        let rng = stream(options.random_state, self.id, frame, Purpose::Transition);
         self.presence.hide();
         let noise = options.noise(scale).times(self.presence.noise());
         self.cloud.predict(&CameraMotion::NONE, &noise, self.first_size, rng);

@@ -311,7 +311,7 @@ impl ParticleTracker {
             let relative = CameraMotion { shift: background.flow, ..CameraMotion::NONE };
             (CameraMotion::NONE, background.foreground, relative)
         } else {
-            let rng = CounterRng::new(self.options.seed).stream(CAMERA_STREAM).stream(self.frame as u64);
+            let rng = CounterRng::new(self.options.random_state).stream(CAMERA_STREAM).stream(self.frame as u64);
             let background = fit_background(&points, &flow, known, rng);
             let foreground = background.probability.iter().map(|q| 1.0 - q).collect();
             let rides = self.options.used_parts().camera || known.is_some();

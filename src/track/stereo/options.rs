@@ -171,7 +171,7 @@ pub struct StereoTrackerOptions {
     /// Components with fewer pixels are dropped while fitting; default 0, which drops none.
     pub prune_weight: f64,
     /// Seed of the cold starts; default 0.
-    pub seed: u64,
+    pub random_state: u64,
     /// How far templates and depths are searched from one ordinary step to the next, cells and disparities;
     /// default 8. Over a gap farther in proportion, at most 64.
     pub search: usize,
@@ -224,7 +224,7 @@ impl StereoTrackerOptions {
             tol: improved.then_some(1e-4),
             n_init: 1,
             prune_weight: 0.0,
-            seed: 0,
+            random_state: 0,
             search: 8,
             luminance_levels: 64,
             arc_threshold: 0.4,

@@ -32,7 +32,7 @@ impl StereoTrackerOptions {
             n_init: self.n_init,
             // Components that are carried along must keep their numbers.
             prune_weight: if carried { 0.0 } else { self.prune_weight },
-            seed: self.seed.wrapping_add(step as u64),
+            random_state: self.random_state.wrapping_add(step as u64),
             threads: self.threads,
             ..MixtureOptions::default()
         }

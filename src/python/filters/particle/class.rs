@@ -133,7 +133,7 @@ impl ParticleFilter {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let batch = self.batch.map_or("None".to_owned(), |b| b.to_string());
-        let (count, seed) = (self.n_particles(py)?, lock(&self.core)?.seed);
+        let (count, seed) = (self.n_particles(py)?, lock(&self.core)?.random_state);
         Ok(format!("ParticleFilter(dim_x={}, n_particles={count}, batch={batch}, random_state={seed})", self.dim_x))
     }
 
@@ -141,7 +141,7 @@ impl ParticleFilter {
         let (py, this, state) = (slf.py(), slf.get(), PyDict::new(slf.py()));
         let core = lock(&this.core)?;
         let array = |values: &Vec<f64>| arrays::owned(py, &[values.len()], values.clone());
-        state.set_item("arguments", (this.dim_x, core.particles(), this.batch, core.seed))?;
+        state.set_item("arguments", (this.dim_x, core.particles(), this.batch, core.random_state))?;
         state.set_item("x", read(py, &this.x).bind(py).call_method0("copy")?)?;
         state.set_item("log_weights", array(&core.log_weights)?)?;
         state.set_item("evidence", (array(&core.log_evidence)?, array(&core.log_evidence_sum)?))?;
