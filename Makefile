@@ -68,7 +68,7 @@ develop: $(BIN)/maturin
 compare: CI := --release
 compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
-	$(BIN)/python benchmarks/compare.py $(if $(DATA),--data $(DATA))
+	$(BIN)/python -m benchmarks.compare $(if $(DATA),--data $(DATA))
 
 # API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python); and README's picture.
 docs: rustdoc install

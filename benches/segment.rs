@@ -1,7 +1,7 @@
 //! Time of the graph segmentation of a colour image of 720 x 480 px (scale 150, sigma 0.8, regions of at
 //! least 120 px), on one and two threads.
 //!
-//! `python benchmarks/segmentation.py` times the same beside scikit-image's and OpenCV's.
+//! `python -m benchmarks.tables.segmentation` times the same beside scikit-image's and OpenCV's.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::math::random::CounterRng;

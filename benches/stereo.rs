@@ -2,7 +2,7 @@
 //! direction classes beside semi-global matching, the paper's mode beside the improved one, whose mixture
 //! begins where the last one ended.
 //!
-//! `JACOFLOW_SIMD=scalar` times the scalar twins of the kernels. `python benchmarks/stereo.py` and
+//! `JACOFLOW_SIMD=scalar` times the scalar twins of the kernels. `python -m benchmarks.tables.stereo` and
 //! `stereo_tracking.py` give the quality that goes with the times.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};

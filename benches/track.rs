@@ -2,7 +2,7 @@
 //! tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and
 //! a target of 80 px in 720 x 480.
 //!
-//! One thread. `python benchmarks/tracking.py` times the same beside OpenCV's trackers.
+//! One thread. `python -m benchmarks.tables.tracking` times the same beside OpenCV's trackers.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::parallel::Threads;

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 here = Path(__file__).parent
-sys.path.insert(0, str(here.parent.parent / "benchmarks"))
-from reference_filter import Settings, ramp_measurements, run  # noqa: E402
+sys.path.insert(0, str(here.parent.parent))
+from benchmarks.rivals.flow_filter import Settings, ramp_measurements, run  # noqa: E402
 from record import write  # noqa: E402
 
 FRAMES = [0, 1, 2, 3, 5, 10, 20, 50, 100, 200, 300, 399]

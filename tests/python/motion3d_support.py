@@ -1,20 +1,16 @@
 """What the tests of rigid 3-D motion share: the scenes and scores of the benchmarks, and the usual scene."""
 
-import sys
-from pathlib import Path
 
+from benchmarks.rivals import motion3d as rivals
+from benchmarks.scenes import motion3d as scenes
+from benchmarks.tables import motion3d_claims as claims
+from benchmarks.tables import motion3d_coverage as coverage
+from benchmarks.tables import motion3d_fixed as fixed
+from benchmarks.tables import motion3d_honesty as honesty
+from benchmarks.tables import motion3d_layouts as layouts
+from benchmarks.tables import motion3d_published as scores
+from benchmarks.tables import motion3d_six as six
 from jacoflow import motion3d
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_claims as claims
-import motion3d_coverage as coverage
-import motion3d_fixed as fixed
-import motion3d_honesty as honesty
-import motion3d_layouts as layouts
-import motion3d_rivals as rivals
-import motion3d_scenes as scenes
-import motion3d_scores as scores
-import motion3d_six as six
 
 __all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "layouts", "rivals", "scenes", "scores", "scene", "six", "start"]
 

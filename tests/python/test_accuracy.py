@@ -1,18 +1,13 @@
 """How far ahead of Farneback's flow the estimate is on scenes with exact truth, and what motions it finds."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
 import jacoflow
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import contestants
-import controlled
+from benchmarks import settings as contestants
+from benchmarks.tables import controlled
 
 FARNEBACK = {
     controlled.Case(64.0, 1.0, 3.0): (0.0723, 0.0114),
@@ -20,7 +15,7 @@ FARNEBACK = {
     controlled.Case(256.0, 1.0, 3.0): (0.0311, 0.00534),
     controlled.Case(256.0, 4.0, 0.0): (0.0708, 0.0138),
 }
-"""Mean end-point error (px) and error of the Jacobian (1/frame) of OpenCV's Farneback with its defaults and `numpy.gradient`, as `benchmarks/controlled.py` prints them."""
+"""Mean end-point error (px) and error of the Jacobian (1/frame) of OpenCV's Farneback with its defaults and `numpy.gradient`, as `benchmarks/tables/controlled.py` prints them."""
 
 
 def contestant(name):

@@ -1,20 +1,16 @@
 """What the comparisons measure with: masks, errors and the noise bound (no rival is needed here)."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from benchmarks import report
+from benchmarks import settings as contestants
+from benchmarks.scores import flow as scoring
+from benchmarks.scores import noise_bound
+from benchmarks.tables import controlled
 from jacoflow import scenes
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import compare
-import contestants
-import controlled
-import noise_bound
-import scoring
 
 
 def test_the_jacobian_counts_away_from_edges_and_unknown_truth():
@@ -123,18 +119,18 @@ def test_settings_are_called_with_their_options():
 
 def test_a_kept_table_takes_new_sections_and_keeps_the_others(tmp_path):
     one, other = {"processor": "A", "numpy": "2"}, {"processor": "B", "numpy": "2"}
-    assert compare.newest(tmp_path) is None
-    compare.Record("2020-01-01", one, {"flow": [{"ms": 1.0}], "tracks": [{"ms": 2.0}], "motion": [{"ms": 3.0}]}).keep(tmp_path)
-    before = compare.newest(tmp_path)
+    assert report.newest(tmp_path) is None
+    report.Record("2020-01-01", one, {"flow": [{"ms": 1.0}], "tracks": [{"ms": 2.0}], "motion": [{"ms": 3.0}]}).keep(tmp_path)
+    before = report.newest(tmp_path)
     assert before is not None
-    updated = before.updated(compare.Record("2020-01-02", other, {"tracks": [{"ms": 4.0}], "bars": [{"ms": 5.0}]}))
+    updated = before.updated(report.Record("2020-01-02", other, {"tracks": [{"ms": 4.0}], "bars": [{"ms": 5.0}]}))
     updated.keep(tmp_path)
-    kept = compare.newest(tmp_path)
+    kept = report.newest(tmp_path)
     assert kept == updated and kept.date == "2020-01-02" and kept.machine == one
     assert list(kept.sections) == ["flow", "tracks", "bars", "motion"]
     assert kept.sections["flow"] == [{"ms": 1.0}] and kept.sections["tracks"] == [{"ms": 4.0}]
     assert kept.elsewhere == {"tracks": other, "bars": other}
     assert kept.markdown().count("Measured on another machine: processor B.") == 2
-    again = kept.updated(compare.Record("2020-01-03", one, {"bars": [{"ms": 6.0}]}))
+    again = kept.updated(report.Record("2020-01-03", one, {"bars": [{"ms": 6.0}]}))
     assert again.elsewhere == {"tracks": other}
     assert not list(tmp_path.glob(".*"))

@@ -3,7 +3,6 @@
 import pickle
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +14,8 @@ from sklearn.base import clone
 from sklearn.metrics import adjusted_rand_score
 from sklearn.utils.estimator_checks import check_estimator
 
+from benchmarks.tables import dirichlet_mixture as bench
 from jacoflow.mixture import DirichletProcessGaussianMixture
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import dirichlet_mixture as bench
 
 
 def case_d1():

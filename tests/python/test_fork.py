@@ -5,22 +5,18 @@ import multiprocessing
 import os
 import select
 import signal
-import sys
 import threading
 import traceback
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import METHODS
 
 import jacoflow
+from benchmarks.scenes import motion3d as motion3d_scenes
+from benchmarks.scenes import stereo as stereo_scenes
+from conftest import METHODS
 from jacoflow import mixture, motion3d, scenes, stereo, track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_scenes
-import stereo_scenes
 
 PATIENCE = 100.0
 """Seconds after which a child that has not answered is ended: a test that fails must end, too."""

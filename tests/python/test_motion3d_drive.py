@@ -1,15 +1,13 @@
 """What a recorded drive says of its own reference; skipped where there is none."""
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_drive as driving
-import motion3d_recordings as recordings
+from benchmarks.tables import motion3d_drive as driving
+from benchmarks.tables import motion3d_recordings as recordings
 
 DATA = Path(os.environ.get("JACOFLOW_DATA", "/nonexistent"))
 

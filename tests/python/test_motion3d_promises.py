@@ -1,16 +1,12 @@
 """Promises of the interface of 3-D motion: which method runs when, what a sideways motion has no answer to, and that Python goes on meanwhile."""
 
-import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.scenes import motion3d as scenes
 from jacoflow import motion3d
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_scenes as scenes
 
 
 @pytest.mark.parametrize(("n", "used"), [(29, "ml"), (30, "efficient")])

@@ -1,14 +1,12 @@
 """3-D motion of recordings with truth, from files; skipped where there are none."""
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_recordings as recordings
+from benchmarks.tables import motion3d_recordings as recordings
 
 DATA = Path(os.environ.get("JACOFLOW_DATA", "/nonexistent"))
 

@@ -7,8 +7,8 @@ import jacoflow
 import motion3d_support  # noqa: F401  the benchmarks' folder
 from jacoflow import motion3d
 
-import motion3d_fields as fields  # isort: skip
-import motion3d_rooms as rooms  # isort: skip
+from benchmarks.tables import motion3d_fields as fields  # isort: skip
+from benchmarks.scenes import rooms  # isort: skip
 
 ROOMS = 12
 

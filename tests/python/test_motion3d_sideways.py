@@ -1,17 +1,13 @@
 """Section 5 of the paper: a translation along the image plane, one unknown angle."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import jacoflow
+from benchmarks.tables import motion3d_published as scores
 from jacoflow import motion3d
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_scores as scores
 
 WEIGHTS = ("shrunk", "ml", "ones")
 

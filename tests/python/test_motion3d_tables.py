@@ -1,18 +1,14 @@
 """The published tables of 3-D motion, row by row: how large errors are beside what is published, predicted and reached by others."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.rivals import motion3d as rivals
+from benchmarks.scenes import motion3d as scenes
+from benchmarks.tables import motion3d_claims as claims
+from benchmarks.tables import motion3d_published as scores
 from jacoflow import motion3d
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import motion3d_claims as claims
-import motion3d_rivals as rivals
-import motion3d_scenes as scenes
-import motion3d_scores as scores
 
 
 @pytest.mark.parametrize("case", range(len(scores.PRACTICAL)))

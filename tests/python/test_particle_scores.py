@@ -1,18 +1,15 @@
 """What the particle tracker's tables measure with: success, overlap, multiple object tracking, recordings."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import particle_recordings
-import particle_rivals
-import particle_scores
-import particle_tracking
-from particle_rivals import Contestant, Sequence
+from benchmarks.rivals import particle as particle_rivals
+from benchmarks.rivals.particle import Contestant, Sequence
+from benchmarks.scenes import particle_recordings
+from benchmarks.scores import particle as particle_scores
+from benchmarks.tables import particle_tracking
 
 
 def walk(frames=50, step=2.0):

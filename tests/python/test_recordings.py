@@ -1,7 +1,6 @@
 """Recordings with a truth: what the coarse-to-fine estimate reaches with one setting for all. Skipped where they are not there (JACOFLOW_DATA names their folder)."""
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import jacoflow
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("JACOFLOW_DATA", ROOT / ".." / "shared" / "data"))
-sys.path.append(str(ROOT / "benchmarks"))
 
 REACHED = {
     "_rubber_whale": (0.128, 0.0146),
@@ -35,9 +33,9 @@ PAIRS = {
 def bench():
     """The modules that read recordings and score them; OpenCV reads the pictures."""
     pytest.importorskip("cv2")
-    import accuracy
-    import contestants
-    import samples
+    from benchmarks import settings as contestants
+    from benchmarks.scenes import recordings as samples
+    from benchmarks.tables import recordings as accuracy
 
     return accuracy, contestants.coarse_to_fine("balanced"), samples
 

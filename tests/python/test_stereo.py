@@ -1,20 +1,16 @@
 """Disparity of edge pixels: arguments, edge cases and the figures of its specification."""
 
 import pickle
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from benchmarks.scenes import stereo as stereo_scenes
+from benchmarks.scores import stereo as stereo_scores
 from jacoflow import stereo
 from jacoflow.track import StereoTracker
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import stereo_scenes
-import stereo_scores
 
 METHODS = ("classes", "sgm")
 RANGE = (-20, 12)

@@ -3,18 +3,14 @@
 import io
 import json
 import pickle
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.scenes.stereo import curved, small
+from benchmarks.scores.stereo_tracking import Truth
 from jacoflow import video
 from jacoflow.track import StereoTracker, TrackGraph
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from stereo_scenes import curved, small
-from stereo_tracking_scores import Truth
 
 SMALL = {"disparity_range": (-8, 8), "grid": (30, 40, None), "row_offset": 0.0}
 

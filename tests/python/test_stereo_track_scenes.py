@@ -1,21 +1,22 @@
 """The stereo tracker on drawn scenes with exact truth: the specification's figures, identities, exposure."""
 
-import sys
 from dataclasses import replace
 from functools import cache, lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.scenes.stereo import Layer, Scene, cart, crossing, curved, passing, pillar, small, tiny, wall
+from benchmarks.scores.stereo_tracking import gross
+from benchmarks.tables.stereo_tracking import follow
+from benchmarks.tables.stereo_tracking_chance import (
+    comings_back,
+    crossing_by_chance,
+    labels,
+    passing_by_chance,
+)
+from benchmarks.tables.stereo_tracking_chance import scored as chance
 from jacoflow.track import StereoTracker
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from stereo_scenes import Layer, Scene, cart, crossing, curved, passing, pillar, small, tiny, wall
-from stereo_tracking import follow
-from stereo_tracking_chance import comings_back, crossing_by_chance, labels, passing_by_chance
-from stereo_tracking_chance import scored as chance
-from stereo_tracking_scores import gross
 
 
 @pytest.mark.parametrize(("seed", "label"), [(101, 2), (103, 1)])

@@ -1,19 +1,14 @@
 """The gradient tracker: what it reaches on scenes with exact truth, its edge cases, and its parts."""
 
 import pickle
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from benchmarks.scenes import tracking as tracking_scenes
+from benchmarks.scenes import tracking_hard as tracking_hard_scenes
 from jacoflow import track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import tracking_hard_scenes
-import tracking_scenes
 
 PUBLISHED = {scene.name: scene for scene in tracking_scenes.published()}
 HARD = {scene.name: scene for scene in (*tracking_hard_scenes.table(), *tracking_hard_scenes.further())}
@@ -192,7 +187,7 @@ def test_later_frames_have_the_size_of_the_first():
 
 def test_one_step_has_the_published_gain_and_refining_removes_it():
     """Texture of 2 px correlation length; order 4 nearly right in one step, order 2 too large."""
-    import tracking_flow
+    from benchmarks.tables import tracking_parts as tracking_flow
 
     for step, four, two in zip(tracking_flow.STEPS, *(tracking_flow.GAINS[order] for order in (4, 2)), strict=True):
         first, second = tracking_flow.shifted_texture(step)

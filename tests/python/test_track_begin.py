@@ -1,21 +1,16 @@
 """How the gradient tracker begins: boxes round what is no square, faint targets at rest, frames that show nothing, and options and numbers that it does not take."""
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from jacoflow import track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import tracking_scenes
 from test_track import follow, overlap, success
-from tracking_begin import outlined
-from tracking_pictures import background
-from tracking_scenes import Plane, Scene, circle, square
+
+from benchmarks.scenes import tracking as tracking_scenes
+from benchmarks.scenes.textures import background
+from benchmarks.scenes.tracking import Plane, Scene, circle, square
+from benchmarks.scenes.tracking_begin import outlined
+from jacoflow import track
 
 KINDS = ("fractal:1,90,30", "smooth:4,90,20")
 

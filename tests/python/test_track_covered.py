@@ -1,17 +1,12 @@
 """Small targets that go behind a bar: what is left of one at the bar's edge is not all of it, whatever its shape, contrast and growth."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.scenes.tracking import TIMES, Plane, Scene, figure, line
+from benchmarks.scores import tracking as tracking_scores
 from jacoflow import track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import tracking_scores
-from tracking_scenes import TIMES, Plane, Scene, figure, line
 
 SIDE = 13.0
 

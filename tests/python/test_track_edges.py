@@ -1,20 +1,15 @@
 """Edge cases of the gradient tracker: wrong boxes, starts beside the target, windows larger than the frame, targets that stop, crawl, leave and return."""
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from jacoflow import track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import tracking_hard_scenes
-import tracking_scenes
 from test_track import follow, overlap, success
-from tracking_scenes import TIMES, Plane, Scene, circle, figure
+
+from benchmarks.scenes import tracking as tracking_scenes
+from benchmarks.scenes import tracking_hard as tracking_hard_scenes
+from benchmarks.scenes.tracking import TIMES, Plane, Scene, circle, figure
+from jacoflow import track
 
 HARD = {scene.name: scene for scene in tracking_hard_scenes.further()}
 SIMULATION = {scene.name: scene for scene in tracking_scenes.simulations()}

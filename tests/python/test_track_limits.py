@@ -1,21 +1,16 @@
 """Where the gradient tracker used to go wrong: large targets that turn, weak texture, boxes much too small, jumps of brightness, a camera that moves, sizes that change unseen."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-from jacoflow import track
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-import tracking_hard_scenes
-import tracking_pictures
-import tracking_scenes
-import tracking_scores
 from test_track import follow, success
-from tracking_scenes import Plane, Scene, circle, disc, line, square
+
+from benchmarks.scenes import textures as tracking_pictures
+from benchmarks.scenes import tracking as tracking_scenes
+from benchmarks.scenes import tracking_hard as tracking_hard_scenes
+from benchmarks.scenes.tracking import Plane, Scene, circle, disc, line, square
+from benchmarks.scores import tracking as tracking_scores
+from jacoflow import track
 
 FRACTAL = "fractal:1,90,30"
 

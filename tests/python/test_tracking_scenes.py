@@ -1,19 +1,16 @@
 """What trackers are measured on and with: drawn figures, paths, truth and scores (no rival is needed here)."""
 
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import trackers
-import tracking_flow
-import tracking_hard_scenes as hard_scenes
-import tracking_pictures as pictures
-import tracking_scenes as scenes
-from tracking_scores import Truth, overlap, scores
+from benchmarks.rivals import trackers
+from benchmarks.scenes import textures as pictures
+from benchmarks.scenes import tracking as scenes
+from benchmarks.scenes import tracking_hard as hard_scenes
+from benchmarks.scores.tracking import Truth, overlap, scores
+from benchmarks.tables import tracking_parts as tracking_flow
 
 
 def drawn(figure, t=0):

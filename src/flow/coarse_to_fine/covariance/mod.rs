@@ -17,7 +17,7 @@
 //!   share of the acceleration.
 //!
 //! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs
-//! and triples) and checked on others; `benchmarks/coverage.py` measures what they hold.
+//! and triples) and checked on others; `benchmarks/tables/coverage.py` measures what they hold.
 
 mod bending;
 mod carry;

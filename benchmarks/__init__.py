@@ -1,0 +1,1 @@
+"""Accuracy, speed and memory beside the usual tools; see README.md here."""

@@ -1,0 +1,1 @@
+"""Synthetic scenes and recordings: frames or points together with their truth."""

@@ -1,0 +1,78 @@
+"""Colour recordings with boxes of their targets, for the particle tracker."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.rivals.particle import Array, Sequence
+
+try:
+    import cv2
+except ImportError:
+    cv2 = None
+
+CAMPUS, OTB = "TUD-Campus", "track_otb"
+"""The recording of several people, and the folder of those of the tracking benchmark by Wu, Lim and Yang."""
+
+
+def campus(data: Path) -> Sequence | None:
+    """Eight people who hide each other before a still camera: folder `track_mot15/TUD-Campus`, 640 x 480; None where it is missing."""
+    folder = data / "track_mot15" / CAMPUS
+    if cv2 is None or not (folder / "gt" / "gt.txt").exists():
+        return None
+    frames = _read_video(folder / f"{CAMPUS}.mp4")
+    with (folder / "gt" / "gt.txt").open(newline="") as file:
+        lines = [[float(each) for each in row[:6]] for row in csv.reader(file)]
+    boxes = np.full((len(frames), int(max(line[1] for line in lines)), 4), np.nan)
+    for frame, target, *box in lines:
+        boxes[int(frame) - 1, int(target) - 1] = box
+    return Sequence(CAMPUS, frames, _from_corner_1(boxes))
+
+
+def halved(sequence: Sequence) -> Sequence:
+    """At half the size, each pixel the mean of four."""
+    height, width = sequence.frames.shape[1:3]
+    frames = [cv2.resize(frame, (width // 2, height // 2), interpolation=cv2.INTER_AREA) for frame in sequence.frames]
+    # Pixel centres lie at integers: the corner of the first pixel, at -0.5, stays where it is.
+    boxes = np.concatenate([(sequence.boxes[..., :2] + 0.5) / 2 - 0.5, sequence.boxes[..., 2:] / 2], axis=-1)
+    return Sequence(sequence.name, np.stack(frames), boxes)
+
+
+def single(data: Path) -> Iterator[Sequence]:
+    """The recordings in `track_otb`: a folder of pictures each, and a file of boxes for each target."""
+    if cv2 is None:
+        return
+    for folder in sorted(data.glob(f"{OTB}/*/")):
+        pictures = sorted((folder / "img").glob("[0-9]*.jpg"))
+        tracks = [_read_boxes(path)[: len(pictures)] for path in sorted(folder.glob("groundtruth_rect*.txt"))]
+        if pictures and tracks:
+            frames = np.stack([cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB) for path in pictures])
+            count = min(len(frames), *(len(track) for track in tracks))
+            yield Sequence(folder.name, frames[:count], _from_corner_1(np.stack([track[:count] for track in tracks], axis=1)))
+
+
+def _read_boxes(path: Path) -> Array:
+    """Lines x, y, width, height, with commas or blanks."""
+    return np.array([line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()], float)
+
+
+def _from_corner_1(boxes: Array) -> Array:
+    """Boxes whose corner is a pixel counted from 1, as ours: the side of the first pixel is at -0.5."""
+    return boxes - (1.5, 1.5, 0.0, 0.0)
+
+
+def _read_video(path: Path) -> NDArray[np.uint8]:
+    """Colour frames (T, H, W, 3)."""
+    video = cv2.VideoCapture(str(path))
+    frames: list[NDArray[np.uint8]] = []
+    while (read := video.read())[0]:
+        frames.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
+    video.release()
+    if not frames:
+        raise FileNotFoundError(path)
+    return np.stack(frames)

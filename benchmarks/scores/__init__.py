@@ -1,0 +1,1 @@
+"""Measures: pure functions of estimates and their truth."""

@@ -1,0 +1,93 @@
+"""Peak of resident memory during one estimate, over that before it, in planes of one 4-byte number per pixel.
+
+    python -m benchmarks.tables.memory [--width 1920] [--height 1080]
+
+Each estimate runs in a process of its own, which has made one on small frames before: what libraries take once is not counted. The result is counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+import jacoflow
+from benchmarks import report
+
+PRESETS = ("fast", "balanced", "accurate")
+WARM_UP = 64
+"""Side of the small frames, px."""
+
+
+def frames(width: int, height: int) -> np.ndarray:
+    """Three 8-bit frames of one moving surface that passes in front of another: motion boundaries take the most memory."""
+    camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
+    surfaces = [
+        jacoflow.scenes.Scene("waves", width=width, height=height, random_state=seed, speed=2.0, wavelength=256.0) for seed in (1, 2)
+    ]
+    pictures = []
+    for t in range(3):
+        behind, before = (surface.frame(t - 1.0) for surface in surfaces)
+        edge = width // 2 + 4 * t
+        behind[:, edge:] = before[:, edge:]
+        pictures.append(camera.apply_u8(behind, index=t))
+    return np.stack(pictures)
+
+
+def highest() -> float:
+    """The most memory that this process has held so far, bytes."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024.0
+    except (OSError, StopIteration):
+        # May be that of the process that started this one.
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
+
+
+def measure(file: str, preset: str, count: int, covariance: bool) -> float:
+    """Planes that the estimate from the last `count` frames of the file needs, in this process."""
+    given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
+    settings = {"method": "coarse_to_fine", "preset": preset, "covariance": covariance, "time_scheme": "pair" if count == 2 else None}
+    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], **settings)
+    before = highest()
+    jacoflow.estimate(given, **settings)
+    return (highest() - before) / (4.0 * given[0].size)
+
+
+def rows(width: int, height: int) -> Iterator[dict[str, object]]:
+    """One row a preset and number of frames: planes without and with covariance, the result's among them."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "frames.npy"
+        np.save(file, frames(width, height))
+        for preset, count in product(PRESETS, (2, 3)):
+            row: dict[str, object] = {"preset": preset, "frames": count}
+            for covariance in (False, True):
+                child = [sys.executable, "-m", "benchmarks.tables.memory", "--child", str(file), preset, str(count), str(int(covariance))]
+                found = subprocess.run(child, check=True, capture_output=True, text=True)
+                row["planes_with_covariance" if covariance else "planes"] = float(found.stdout)
+            yield row
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--width", type=int, default=1920)
+    parser.add_argument("--height", type=int, default=1080)
+    parser.add_argument("--child", nargs=4, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child is not None:
+        file, preset, count, covariance = options.child
+        print(measure(file, preset, int(count), covariance == "1"))
+        return
+    print("\n".join(report.table_lines(list(rows(options.width, options.height)))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""Errors of flow and Jacobian on recordings with known truth, against OpenCV's flows and against no motion at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.rivals import flow as rivals
+from benchmarks.scenes import recordings as samples
+from benchmarks.scenes.recordings import Sample
+from benchmarks.scores.flow import (
+    BORDER,
+    differences,
+    end_point_error,
+    inside,
+    jacobian_error,
+    root_mean_square,
+    usable,
+)
+from benchmarks.settings import RECORDINGS, Setting
+
+Array = NDArray[np.floating]
+Row = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What one setting for all recordings should attain: mean end-point error in px and error of the Jacobian in 1/frame."""
+
+    reach: tuple[float, float]
+    aim: tuple[float, float]
+
+    def columns(self, which: int) -> Row:
+        """Both figures of the flow (0) or of the Jacobian (1)."""
+        what = ("end_point_error", "jacobian_error")[which]
+        return {f"{what}_reach": self.reach[which], f"{what}_aim": self.aim[which]}
+
+
+ASKED = {
+    "RubberWhale": Asked((0.18, 0.020), (0.14, 0.017)),
+    "Dimetrodon": Asked((0.13, 0.0175), (0.11, 0.015)),
+    "Yosemite without sky": Asked((0.085, 0.0123), (0.07, 0.010)),
+    "Sintel alley_1 clean": Asked((0.34, 0.038), (0.28, 0.030)),
+    "PIV DNS_turbulence_00001": Asked((0.072, 0.016), (0.055, 0.013)),
+    "PIV backstep_Re800_00001": Asked((0.038, 0.0034), (0.030, 0.0020)),
+}
+
+
+def score(sample: Sample, flow: Array, jacobian: Array) -> Row:
+    """Mean end-point error (px) over the pixels with a truth, share of them that have an estimate, error of the Jacobian's entries (1/frame)."""
+    mean, share = end_point_error(flow, sample.truth)
+    asked = ASKED.get(sample.name)
+    wrong = jacobian_error(jacobian, differences(sample.truth), usable(sample.truth))
+    return {
+        "share": share,
+        "end_point_error": mean,
+        **(asked.columns(0) if asked else {}),
+        "jacobian_error": wrong,
+        **(asked.columns(1) if asked else {}),
+    }
+
+
+def rival_rows(sample: Sample) -> list[Row]:
+    """OpenCV's flows as they are, with the Jacobian after the Gaussian that suits it best."""
+    truth, where = differences(sample.truth), usable(sample.truth)
+    rows: list[Row] = []
+    for method, run in rivals.RIVALS.items():
+        flow = run(*sample.pair())
+        setting, _, jacobian = rivals.best(rivals.gaussian_fits(flow), lambda _, j: jacobian_error(j, truth, where))
+        rows.append({"sample": sample.name, "method": method, **score(sample, flow, jacobian), "best_sigma": setting["sigma"]})
+    return rows
+
+
+def frames_for(sample: Sample, setting: Setting) -> list[samples.Picture]:
+    """All frames of the sample, or its pair."""
+    return sample.pair() if setting.frames == 2 else sample.frames
+
+
+def table(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
+    """One row for each recording and method, reached beside asked; recordings that are not there get a row that says so."""
+    if samples.cv2 is None:
+        return [{"sample": "all", "method": "skipped: OpenCV, which reads the pictures, is missing"}]
+    rows: list[Row] = []
+    found, missing = samples.read_all(samples.FLOWS, data)
+    for sample in found:
+        zero = np.zeros_like(sample.truth)
+        rows.append({"sample": sample.name, "method": "no motion", **score(sample, zero, np.zeros((*zero.shape, 2)))})
+        rows += rival_rows(sample)
+        for setting in ours:
+            rows.append({"sample": sample.name, "method": setting.name, **score(sample, *setting.estimate(frames_for(sample, setting)))})
+    return rows + [{"sample": line, "method": "skipped"} for line in missing]
+
+
+def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
+    """Image correlation: root-mean-square error of u (px, all pixels) and of u_x (1/frame, 12 px from the edge) against the commanded ones.
+
+    OpenCV's rows have the Gaussians that suit u and u_x best, each chosen with the truth. Asked of ours: below both of them (`reach`), half of the better (`aim`).
+    """
+    if samples.cv2 is None:
+        return []
+    try:
+        sample, slope = samples.read_strain(data)
+    except (OSError, ImportError) as problem:
+        return [{"sample": "DIC", "method": f"skipped: {problem!r}"}]
+    along, where = sample.truth[..., 0], inside(sample.truth.shape[:2], BORDER)
+
+    def of_u(flow: Array, _jacobian: Array) -> float:
+        return root_mean_square((flow[..., 0] - along)[np.isfinite(flow[..., 0])])
+
+    def of_slope(_flow: Array, jacobian: Array) -> float:
+        return root_mean_square((jacobian[..., 0, 0] - slope)[where & np.isfinite(jacobian[..., 0, 0])])
+
+    rows: list[Row] = [{"sample": sample.name, "method": "no motion", "u_error": root_mean_square(along), "u_x_error": root_mean_square(np.where(where, slope, 0.0)[where])}]
+    peers: list[Row] = []
+    for method, run in rivals.RIVALS.items():
+        flow = run(*sample.pair())
+        fits = list(rivals.gaussian_fits(flow))
+        (u_setting, *u_fit), (slope_setting, *slope_fit) = (rivals.best(iter(fits), error) for error in (of_u, of_slope))
+        peers.append({"sample": sample.name, "method": method, "u_error": of_u(*u_fit), "u_x_error": of_slope(*slope_fit), "u_error_unsmoothed": of_u(flow, flow)})
+        peers[-1] |= {"best_sigma_u": u_setting["sigma"], "best_sigma": slope_setting["sigma"]}
+    for setting in ours:
+        estimate = setting.estimate(frames_for(sample, setting))
+        row: Row = {"sample": sample.name, "method": setting.name, "share": float(np.isfinite(estimate[0]).all(axis=-1).mean())}
+        for name, error in (("u_error", of_u), ("u_x_error", of_slope)):
+            reach = min(float(str(peer[name])) for peer in peers)
+            row |= {name: error(*estimate), f"{name}_reach": reach, f"{name}_aim": reach / 2}
+        rows.append(row)
+    return rows[:1] + peers + rows[1:]
