@@ -3,8 +3,9 @@
 use super::baseline::{HornSchunck, LucasKanade};
 use super::coarse_to_fine::CoarseToFine;
 use super::instantaneous::Instantaneous;
+use super::methods::Method;
 use super::model::{ModelKind, Parameter};
-use super::options::{EstimatorOptions, Method};
+use super::options::EstimatorOptions;
 use super::windowed::Windowed;
 use crate::error::{Error, Result};
 use crate::simd::{SimdReal, same, same_mut};
@@ -212,16 +213,15 @@ impl Estimator {
         } else {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
-        let chooses = self.common.diagnostics && matches!(self.engine, Engine::CoarseToFine(_));
-        field.window = chooses.then(|| {
+        let info = self.method.info();
+        field.window = (self.common.diagnostics && info.chooses_window).then(|| {
             let mut plane = field.window.take().unwrap_or_default();
             plane.resize(n, T::nan());
             plane
         });
-        let knows = matches!(self.engine, Engine::Windowed(_) | Engine::CoarseToFine(_));
-        let tells = self.common.covariance && self.common.systematic && knows;
+        let has_systematic = self.common.covariance && self.common.systematic && info.has_systematic;
         let entries = field.covariance.as_ref().map_or(0, Vec::len);
-        field.systematic = tells.then(|| {
+        field.systematic = has_systematic.then(|| {
             let mut planes = field.systematic.take().unwrap_or_default();
             planes.resize(entries, T::nan());
             planes

@@ -22,6 +22,7 @@ pub mod derived;
 mod estimator;
 pub mod instantaneous;
 mod least_squares;
+mod methods;
 pub mod model;
 mod observability;
 mod options;
@@ -31,5 +32,6 @@ pub mod windowed;
 
 pub use advect::{Advected, PointCovariance, advect};
 pub use estimator::Estimator;
+pub use methods::{METHODS, Method, MethodInfo, MethodSettings, PAIR};
 pub use observability::{Condition, Observability, ObservabilityMap, classify, observability};
-pub use options::{EstimatorOptions, Method, RankPolicy};
+pub use options::{EstimatorOptions, RankPolicy};

@@ -1,9 +1,5 @@
-//! What every estimator of this room is told.
+//! Options that all estimators share.
 
-use super::baseline::{HornSchunckOptions, LucasKanadeOptions, Window};
-use super::coarse_to_fine::{CoarseToFineOptions, correlation_length};
-use super::instantaneous::InstantaneousOptions;
-use super::windowed::WindowedOptions;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::simd::Level;
@@ -111,73 +107,5 @@ impl EstimatorOptions {
     /// The instruction set to use.
     pub fn level(&self) -> Level {
         self.simd.unwrap_or_else(Level::detect)
-    }
-}
-
-/// The ways to estimate flow from two or three frames.
-#[derive(Debug, Clone)]
-pub enum Method {
-    /// Affine flow from coarse to fine: large motions, edges, untextured areas; the method for everyday
-    /// frames.
-    CoarseToFine(CoarseToFineOptions),
-    /// Per pixel, (34): flow and Jacobian from a 3x3x3 block of brightness.
-    Instantaneous(InstantaneousOptions),
-    /// The same equations summed over a window in which the motion is affine.
-    Windowed(WindowedOptions),
-    /// Baseline: flow constant in a window.
-    LucasKanade(LucasKanadeOptions),
-    /// Baseline: globally smooth flow.
-    HornSchunck(HornSchunckOptions),
-}
-
-impl Method {
-    /// The method called `name` (`coarse_to_fine`, `windowed`, `instantaneous`, `lucas_kanade`,
-    /// `horn_schunck`) with its default options.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `method` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        match name {
-            "coarse_to_fine" => Ok(Self::CoarseToFine(CoarseToFineOptions::default())),
-            "instantaneous" => Ok(Self::Instantaneous(InstantaneousOptions::default())),
-            "windowed" => Ok(Self::Windowed(WindowedOptions::default())),
-            "lucas_kanade" => Ok(Self::LucasKanade(LucasKanadeOptions::default())),
-            "horn_schunck" => Ok(Self::HornSchunck(HornSchunckOptions::default())),
-            other => Err(Error::argument(
-                "method",
-                "coarse_to_fine, windowed, instantaneous, lucas_kanade or horn_schunck",
-                other,
-            )),
-        }
-    }
-
-    /// The method's name, as [`Method::parse`] takes it.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::CoarseToFine(_) => "coarse_to_fine",
-            Self::Instantaneous(_) => "instantaneous",
-            Self::Windowed(_) => "windowed",
-            Self::LucasKanade(_) => "lucas_kanade",
-            Self::HornSchunck(_) => "horn_schunck",
-        }
-    }
-
-    /// How far errors of neighbouring estimates go together, px (see
-    /// [`FieldLayout::correlation_length`](crate::types::FieldLayout)): the standard deviation of everything
-    /// that an estimate is a weighted sum over.
-    pub fn correlation_length(&self) -> f64 {
-        match self {
-            Self::CoarseToFine(options) => correlation_length(options.frames),
-            Self::Instantaneous(o) => o.neighbourhood.spread(),
-            Self::Windowed(o) => {
-                let smoothing = o.presmooth.or(o.already_smoothed).unwrap_or(0.0);
-                o.sigma.hypot(o.neighbourhood.spread()).hypot(smoothing)
-            }
-            Self::LucasKanade(o) => match o.window {
-                Window::Gaussian(sigma) => sigma,
-                Window::Box(side) => ((side * side - 1) as f64 / 12.0).sqrt(),
-            },
-            Self::HornSchunck(_) => 0.0,
-        }
     }
 }
