@@ -8,9 +8,9 @@ CI := --profile ci
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test demo format clippy rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare clean
+.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare clean
 
-test: format clippy rustdoc rust-test guide pytest stubtest typing examples
+test: format clippy features rustdoc rust-test guide pytest stubtest typing examples
 	@echo "everything passed"
 
 # The main job on an embedded example.
@@ -24,6 +24,11 @@ format:
 clippy:
 	cargo clippy -q $(CI) --all-targets --features python -- -D warnings
 	cargo clippy -q $(CI) --lib --bins -- -D warnings
+
+# Rooms on their own.
+features:
+	@for room in filter mixture motion3d flow segment stereo io temporal track synth; do \
+		cargo check -q $(CI) --no-default-features --features $$room || exit 1; done
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps

@@ -3,14 +3,14 @@
 //! Errors stay data until the edge: the binary prints them, the Python binding maps each variant to
 //! one exception class. Every message names the argument, what was expected and what came.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong, by the kind of mending it asks for.
-#[derive(Debug, thiserror::Error)]
+/// What can go wrong, by what the caller has to change.
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// An argument has an unusable value, shape or combination (Python: `ValueError`).
-    #[error("{argument}: expected {expected}, got {got}")]
     Argument {
         /// Name of the argument as the user wrote it.
         argument: &'static str,
@@ -20,7 +20,6 @@ pub enum Error {
         got: String,
     },
     /// An argument has an unusable type (Python: `TypeError`).
-    #[error("{argument}: expected {expected}, got {got}")]
     Type {
         /// Name of the argument as the user wrote it.
         argument: &'static str,
@@ -30,15 +29,13 @@ pub enum Error {
         got: String,
     },
     /// The operating system refused a file operation (Python: `OSError`).
-    #[error("{path}: {source}", path = .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// The system's own words.
+        /// The system's message.
         source: std::io::Error,
     },
     /// A file's content is not what its format demands (Python: `jacoflow.FormatError`).
-    #[error("{path}: {message}", path = .path.display())]
     Format {
         /// The file.
         path: PathBuf,
@@ -46,17 +43,39 @@ pub enum Error {
         message: String,
     },
     /// A combination that theory rules out (Python: `jacoflow.NotObservableError`).
-    #[error("not observable: {0}")]
     NotObservable(String),
     /// A computation lost its numerical footing (Python: `jacoflow.NumericalError`).
-    #[error("numerical failure: {0}")]
     Numerical(String),
     /// A program or optional part that is not there (Python: `jacoflow.MissingDependencyError`).
-    #[error("{0}")]
     Missing(String),
-    /// The user asked to stop (Ctrl-C; Python: `KeyboardInterrupt`).
-    #[error("interrupted")]
+    /// The user stopped the work (Ctrl-C; Python: `KeyboardInterrupt`).
     Interrupted,
+}
+
+// Written out: a macro for it would be the only reason why users of the filters compile a parser of Rust.
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Argument { argument, expected, got } | Self::Type { argument, expected, got } => {
+                write!(f, "{argument}: expected {expected}, got {got}")
+            }
+            Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
+            Self::Format { path, message } => write!(f, "{}: {message}", path.display()),
+            Self::NotObservable(reason) => write!(f, "not observable: {reason}"),
+            Self::Numerical(reason) => write!(f, "numerical failure: {reason}"),
+            Self::Missing(what) => f.write_str(what),
+            Self::Interrupted => f.write_str("interrupted"),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
 }
 
 /// Shorthand for results of this crate.
@@ -91,9 +110,9 @@ pub(crate) fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     format!("({})", words.join(", "))
 }
 
-/// A value of hundreds of digits tells nothing that its beginning does not.
+/// Cuts values of hundreds of digits: their beginning says as much.
 fn shortened(text: String) -> String {
-    const MOST: usize = 160;
+    const MAX_LENGTH: usize = 160;
     // More digits than a number has: zeros before or behind them.
     const DIGITS: usize = 24;
     if text.len() > DIGITS
@@ -101,7 +120,7 @@ fn shortened(text: String) -> String {
     {
         return number(value);
     }
-    match text.char_indices().nth(MOST) {
+    match text.char_indices().nth(MAX_LENGTH) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text,
     }

@@ -12,26 +12,43 @@
 //! Level by level, a module imports only from lower levels: [`types`], [`math`], [`parallel`], [`simd`] (0);
 //! [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`], [`mixture`], [`motion3d`],
 //! [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5); the binary and the Python
-//! binding (6).
+//! binding (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name; `default-features =
+//! false, features = ["filter"]` gives the filters alone.
+
+// A choice of rooms uses a choice of what the lower ones offer.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 #[doc(hidden)]
 pub mod ablation;
 pub mod error;
+#[cfg(feature = "filter")]
 pub mod filter;
+#[cfg(feature = "flow")]
 pub mod flow;
+#[cfg(feature = "image")]
 pub mod image;
+#[cfg(feature = "io")]
 pub mod io;
+#[cfg(feature = "image")]
 pub mod jet;
 pub mod math;
+#[cfg(feature = "mixture")]
 pub mod mixture;
+#[cfg(feature = "motion3d")]
 pub mod motion3d;
 pub mod parallel;
+#[cfg(feature = "pipeline")]
 pub mod pipeline;
+#[cfg(feature = "segment")]
 pub mod segment;
 pub mod simd;
+#[cfg(feature = "stereo")]
 pub mod stereo;
+#[cfg(feature = "synth")]
 pub mod synth;
+#[cfg(feature = "temporal")]
 pub mod temporal;
+#[cfg(feature = "track")]
 pub mod track;
 pub mod types;
 

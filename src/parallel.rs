@@ -20,7 +20,8 @@ const VARIABLE: &str = "JACOFLOW_THREADS";
 pub const USEFUL: usize = 4;
 
 /// How many threads a computation may use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Threads(Option<usize>);
 
 impl Threads {

@@ -3,7 +3,6 @@
 
 use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::Result;
-use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 
 /// A batch of extended Kalman filters: `x' = f(x) + w`, `z = h(x) + v`.
@@ -12,7 +11,8 @@ use std::ops::{Deref, DerefMut};
 /// callbacks receive the `B` means and fill `(B, n, n)` or `(B, m, n)`. Errors of a callback are passed on
 /// and leave the filter unchanged. The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...)
 /// are reached directly.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ExtendedFilter {
     /// The batch of Gaussians and the noise.
     pub state: GaussianState,

@@ -3,13 +3,13 @@
 use super::state::{GaussianState, check_matrix, check_measurement, expect, shared};
 use crate::error::Result;
 use crate::math::dense::multiply;
-use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 
 /// A batch of linear Kalman filters: `x' = F x + w`, `z = H x + v`, `w ~ N(0, Q)`, `v ~ N(0, R)`.
 ///
 /// The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KalmanFilter {
     /// The batch of Gaussians and the noise.
     pub state: GaussianState,

@@ -2,7 +2,6 @@
 //! state-space models", 2004).
 
 use crate::error::{Error, Result};
-use serde::{Deserialize, Serialize};
 
 /// The constants of the scaled unscented transform, with a Cholesky factor as matrix square root.
 ///
@@ -12,7 +11,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// The default, `alpha = 1, beta = 2, kappa = 0`, gives the points `x +- sqrt(n) column_k(L)` and, in the
 /// mean, no weight to the centre.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SigmaPoints {
     /// Spread of the points around the mean, > 0.
     pub alpha: f64,

@@ -4,11 +4,11 @@ use crate::error::{Error, Result};
 use crate::math::dense::{
     cholesky, covariance_fault, factor, forward, mend, multiply, multiply_transposed, solve, symmetrise,
 };
-use serde::{Deserialize, Serialize};
 
 /// A batch of `B` independent Gaussian states with `n` dimensions, measured by `m` numbers each. Row-major
 /// arrays.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GaussianState {
     /// `B`, the number of states.
     pub batch: usize,

@@ -4,7 +4,6 @@ use super::sigma_points::SigmaPoints;
 use super::state::{GaussianState, check_measurement, expect, finite, shared};
 use crate::error::{Error, Result};
 use crate::math::dense::{cholesky, solve, symmetrise};
-use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 
 /// A batch of unscented Kalman filters: `x' = f(x) + w` (or `f(x, w)`), `z = h(x) + v`.
@@ -13,7 +12,8 @@ use std::ops::{Deref, DerefMut};
 /// mean first, then `+`, then `-` in the order of the Cholesky factor's columns; it fills as many rows of `n`
 /// or `m` values. Errors of a callback are passed on and leave `x` and `P` as they were. The fields of
 /// [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UnscentedFilter {
     /// The batch of Gaussians and the noise.
     pub state: GaussianState,

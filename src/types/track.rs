@@ -2,7 +2,8 @@
 
 /// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that
 /// its centre is `(x + width / 2, y + height / 2)`.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TargetBox {
     /// Left side, px.
     pub x: f64,
@@ -35,7 +36,8 @@ impl TargetBox {
 }
 
 /// How well the target is in hand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum TrackStatus {
     /// Seen and measured.
@@ -74,7 +76,8 @@ impl TrackStatus {
 
 /// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is
 /// NaN or `None`.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrackState {
     /// Which frame, counted from the one the tracker began with (0).
     pub frame: usize,
@@ -82,7 +85,7 @@ pub struct TrackState {
     pub status: TrackStatus,
     /// Why the status is what it is, in a few words; empty where there is nothing to be said.
     /// Not part of a serialised state: these are words of the program.
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub reason: &'static str,
     /// Whether this is the first measurement after the target was lost or out of the picture.
     pub reacquired: bool,

@@ -5,10 +5,10 @@
 
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
-use serde::{Deserialize, Serialize};
 
 /// How particles are selected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Resampling {
     /// Independent draws: the largest variance, `count w (1 - w)`.
     Multinomial,

@@ -7,11 +7,11 @@ use crate::filter::state::{check_covariances, check_dimension, check_mean, expec
 use crate::math::dense::multiply_transposed;
 use crate::math::random::CounterRng;
 use crate::parallel::{Threads, for_each_band_of};
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// `B` independent particle sets of `N` particles with `n` components each. Row-major arrays.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ParticleFilter {
     /// `B`, the number of sets.
     pub batch: usize,
@@ -37,7 +37,7 @@ pub struct ParticleFilter {
     /// Number of selections since the last prediction: each has random numbers of its own.
     pub selections: u64,
     /// Number of threads; results do not depend on it.
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub threads: Threads,
 }
 
