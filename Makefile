@@ -8,7 +8,7 @@ CI := --profile ci
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare clean
+.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare ablation clean
 
 test: format clippy features rustdoc rust-test guide pytest stubtest typing examples
 	@echo "everything passed"
@@ -75,6 +75,16 @@ compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 	$(BIN)/python -m benchmarks.compare $(if $(DATA),--data $(DATA))
 
+# What each heuristic buys: a build with the feature `ablation` in a virtual environment of its own.
+# ARGUMENTS are those of `python -m benchmarks.ablation`.
+ablation: $(BIN)/maturin
+	$(PYTHON) -m venv $(VENV)-ablation
+	rm -rf target/wheels-ablation
+	$(BIN)/maturin build -q $(CI) --features ablation --out target/wheels-ablation -i $(BIN)/python
+	$(VENV)-ablation/bin/python -m pip install -q --force-reinstall --no-deps target/wheels-ablation/jacoflow-*.whl
+	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
+	$(VENV)-ablation/bin/python -m benchmarks.ablation $(ARGUMENTS)
+
 # API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python); and README's picture.
 docs: rustdoc install
 	$(BIN)/python -m pip install -q "pdoc>=15"
@@ -82,4 +92,4 @@ docs: rustdoc install
 	$(BIN)/python docs/overview_picture.py
 
 clean:
-	rm -rf target $(VENV) dist
+	rm -rf target $(VENV) $(VENV)-ablation dist

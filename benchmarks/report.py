@@ -5,8 +5,11 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import platform
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 Rows = list[dict[str, object]]
 
@@ -89,6 +92,15 @@ def describe_machine(simd: str) -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             machine[package] = "missing"
     return machine
+
+
+def mean_and_error(values: Iterable[float]) -> tuple[float, float]:
+    """Mean of the finite values and its standard error; the error is NaN for fewer than two values."""
+    known = np.asarray([value for value in values if np.isfinite(value)], float)
+    if known.size == 0:
+        return float("nan"), float("nan")
+    error = known.std(ddof=1) / np.sqrt(known.size) if known.size > 1 else float("nan")
+    return float(known.mean()), float(error)
 
 
 def table_lines(rows: Rows) -> list[str]:

@@ -3,6 +3,8 @@
 #![allow(clippy::too_many_arguments, reason = "keyword options of Python functions")]
 #![allow(clippy::type_complexity, reason = "what __reduce__ must return")]
 
+#[cfg(feature = "ablation")]
+mod ablation;
 mod arrays;
 mod colour_arrays;
 mod command;
@@ -37,6 +39,9 @@ use pyo3::prelude::*;
 /// The compiled part of jacoflow. Import `jacoflow` instead.
 #[pymodule(gil_used = false)]
 mod _jacoflow {
+    #[cfg(feature = "ablation")]
+    #[pymodule_export]
+    use super::ablation::heuristics;
     #[pymodule_export]
     use super::command::run_command_line;
     #[pymodule_export]
