@@ -9,15 +9,15 @@ use std::sync::{Arc, Mutex};
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
 
-/// Values of a buffer up to which work outside every pool is not handed to one: waking its threads takes
+/// Largest buffer, values, that work outside every pool keeps on the caller's thread: waking a pool takes
 /// longer than the work.
-const SMALL: usize = 1 << 16;
+const MAX_SERIAL: usize = 1 << 16;
 
 /// The environment variable that sets the number of threads.
 const VARIABLE: &str = "JACOFLOW_THREADS";
 
-/// Most threads for each processor.
-pub const USEFUL: usize = 4;
+/// Maximum number of threads for each processor.
+pub const MAX_PER_PROCESSOR: usize = 4;
 
 /// How many threads a computation may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,8 +38,7 @@ impl Threads {
         Self(count).check()
     }
 
-    /// The same, once it is certain that the environment does not ask for nonsense: a mistake there must not
-    /// go unnoticed.
+    /// Checks the environment variable where it decides: a mistake there must not go unnoticed.
     ///
     /// # Errors
     /// As [`Threads::new`].
@@ -50,15 +49,15 @@ impl Threads {
         Ok(self)
     }
 
-    /// The number of threads this resolves to: what was asked for, but never more than [`USEFUL`] for each
-    /// processor.
+    /// The number of threads this resolves to: the requested number, at most [`MAX_PER_PROCESSOR`] for
+    /// each processor.
     ///
     /// More would only cost memory, and thousands can bring a machine to its knees.
     pub fn count(self) -> usize {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         self.0
             .or_else(|| from_environment(std::env::var_os(VARIABLE)).ok()?)
-            .map_or(processors, |asked| asked.min(USEFUL * processors))
+            .map_or(processors, |requested| requested.min(MAX_PER_PROCESSOR * processors))
     }
 
     /// Runs `work` where rayon's parallel iterators use exactly this many threads.
@@ -67,7 +66,7 @@ impl Threads {
     }
 }
 
-/// The number that the value of [`VARIABLE`] asks for; nothing when it is unset or empty.
+/// The number of threads in the value of [`VARIABLE`]; `None` when it is unset or empty.
 fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
     let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(None) };
     let number = value.to_str().and_then(|text| text.trim().parse().ok()).filter(|&n: &usize| n > 0);
@@ -76,7 +75,7 @@ fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
 
 /// The shared pool of `count` threads; made on first use and kept.
 ///
-/// Nothing here may use rayon's global pool: it cannot be made anew in a forked process.
+/// Nothing here may use rayon's global pool: a forked process cannot replace it.
 fn pool(count: usize) -> Arc<rayon::ThreadPool> {
     type Pools = Vec<(usize, Arc<rayon::ThreadPool>)>;
     static POOLS: PerProcess<Mutex<Pools>> = PerProcess::new();
@@ -94,7 +93,7 @@ fn pool(count: usize) -> Arc<rayon::ThreadPool> {
     pool
 }
 
-/// A static value that a forked process makes anew instead of inheriting it.
+/// A static value that a forked process makes for itself instead of inheriting it.
 ///
 /// Of all threads only the one that called `fork` lives on in the child. A pool there has no threads, and a
 /// lock that another thread held is never released. So the parent's value is left alone, never locked and
@@ -169,7 +168,7 @@ pub(crate) fn for_each_band_of<T: Send>(
         work(band, start..(start + band_rows).min(rows), slice);
     };
     let outside = rayon::current_thread_index().is_none();
-    if outside && buffer.len() <= SMALL {
+    if outside && buffer.len() <= MAX_SERIAL {
         buffer.chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
         return;
     }
@@ -177,7 +176,7 @@ pub(crate) fn for_each_band_of<T: Send>(
     if outside { Threads::default().install(|| bands.for_each(one_band)) } else { bands.for_each(one_band) }
 }
 
-/// Told how far long work has come; may stop it.
+/// Receives the progress of long work; may stop it.
 ///
 /// The binary draws a bar, the Python binding looks for signals.
 pub trait Progress: Sync {
@@ -188,7 +187,7 @@ pub trait Progress: Sync {
     fn step(&self, done: usize, total: usize) -> Result<()>;
 }
 
-/// Says nothing and never stops.
+/// Reports nothing and never stops.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
@@ -221,9 +220,11 @@ mod tests {
 
     #[test]
     fn large_buffers_outside_every_pool_stay_out_of_the_global_one() {
-        let mut named = vec![false; 2 * SMALL];
+        let mut named = vec![false; 2 * MAX_SERIAL];
         let own = |name: &str| name.starts_with("jacoflow-");
-        for_each_band(&mut named, SMALL / 16, |_, _, band| band.fill(std::thread::current().name().is_some_and(own)));
+        for_each_band(&mut named, MAX_SERIAL / 16, |_, _, band| {
+            band.fill(std::thread::current().name().is_some_and(own))
+        });
         assert!(named.iter().all(|&named| named));
     }
 
@@ -252,7 +253,7 @@ mod tests {
     #[test]
     fn a_million_threads_are_not_started() {
         let processors = std::thread::available_parallelism().unwrap().get();
-        assert_eq!(Threads::new(Some(1_000_000)).unwrap().count(), USEFUL * processors);
+        assert_eq!(Threads::new(Some(1_000_000)).unwrap().count(), MAX_PER_PROCESSOR * processors);
         assert_eq!(Threads::new(Some(1)).unwrap().count(), 1);
     }
 

@@ -10,6 +10,7 @@
 mod exponential;
 mod lanes;
 mod precision;
+mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

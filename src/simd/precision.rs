@@ -1,8 +1,8 @@
-//! Doors that are generic over the precision, rooms that are not.
+//! The choice of an instance that is compiled once for each precision.
 //!
 //! A generic function is compiled again in every crate that calls it: each test, bench and user would compile
-//! all kernels anew. A public generic door therefore hands over to an instance for `f32` or `f64` that is
-//! compiled once, in this crate.
+//! all kernels. Public generic functions therefore call an instance for `f32` or `f64` that is compiled once,
+//! in this crate.
 
 use std::any::Any;
 
