@@ -41,7 +41,7 @@ impl ForegroundMaps {
 
 impl ParticleSink for ForegroundMaps {
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
-        let map = step.tracker.foreground()?;
+        let map = step.tracker.record().foreground()?;
         self.album.add_grey(step.frame_index, map.map(|share| (255.0 * share).round() as u8))
     }
 

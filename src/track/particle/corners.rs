@@ -11,9 +11,9 @@ const MAX_CORNERS: f64 = 1600.0;
 /// Score of the weakest corner over that of the best.
 const QUALITY: f64 = 0.005;
 /// Distance between corners in a picture of 480 rows, px.
-const MIN_DISTANCE: f64 = 6.0;
-/// Distance between corners in any picture, px.
-const LEAST_DISTANCE: f64 = 3.0;
+const CORNER_DISTANCE: f64 = 6.0;
+/// Smallest distance between corners in any picture, px.
+const MIN_CORNER_DISTANCE: f64 = 3.0;
 /// Largest side of the window of the point flow, px.
 const MAX_WINDOW: usize = 255;
 /// Levels of the pyramid of the point flow.
@@ -66,7 +66,7 @@ impl Corners {
         let selection = CornerOptions {
             max_count: (MAX_CORNERS * scale).round().max(1.0) as usize,
             quality: QUALITY,
-            min_distance: LEAST_DISTANCE.max(MIN_DISTANCE * scale),
+            min_distance: MIN_CORNER_DISTANCE.max(CORNER_DISTANCE * scale),
             ..CornerOptions::default()
         };
         let window = (2 * (8.0 * scale).ceil() as usize + 3).min(MAX_WINDOW);

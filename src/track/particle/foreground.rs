@@ -8,8 +8,8 @@ use super::noise::near_radius;
 use super::options::{ForegroundModel, ParticleOptions};
 use crate::error::Result;
 use crate::mixture::{CovariancePrior, DirichletMixture, DirichletOptions, Points, fit_dirichlet};
-use crate::segment::Labels;
-use crate::types::Frame;
+use crate::segment::{Labels, felzenszwalb};
+use crate::types::{ColourFrame, Frame};
 use rayon::prelude::*;
 
 /// Components of each mixture, at most.
@@ -146,11 +146,24 @@ pub(super) struct ForegroundMap {
 }
 
 impl ForegroundMap {
+    /// The map of the tracks' foreground probabilities on a frame in grey levels.
+    ///
+    /// # Errors
+    /// As [`fit_dirichlet`] and [`felzenszwalb`].
+    pub fn of_frame(
+        tracks: &[Track],
+        colour: &ColourFrame<f32>,
+        scale: f64,
+        options: &ParticleOptions,
+    ) -> Result<Self> {
+        Self::new(tracks, felzenszwalb(colour, &options.segmentation(scale))?, scale, options)
+    }
+
     /// The map of the tracks' foreground probabilities on a segmented frame.
     ///
     /// # Errors
     /// As [`fit_dirichlet`].
-    pub fn new(tracks: &[Track], labels: Labels, scale: f64, options: &ParticleOptions) -> Result<Self> {
+    fn new(tracks: &[Track], labels: Labels, scale: f64, options: &ParticleOptions) -> Result<Self> {
         let (mut places, mut weights) = (Vec::new(), Vec::new());
         for track in tracks.iter().filter(|track| track.residual.is_some() && track.foreground > MIN_FOREGROUND) {
             places.extend(track.position);

@@ -14,7 +14,7 @@ const FULL_TRACKS: f64 = 20.0;
 /// Half sides of the part of a box whose tracks count, over its sides.
 const INNER: [f64; 2] = [0.45, 0.48];
 /// Standard deviation of a track's motion about its target's, px/frame in a picture of 480 rows.
-const TRACK_SIGMA: f64 = 1.2;
+const TRACK_NOISE_STD: f64 = 1.2;
 /// Density of motions that belong to no target, 1/(px/frame)^2 in a picture of 480 rows.
 const CLUTTER_DENSITY: f64 = 0.012;
 /// Added to the foreground map, so that an empty region does not end a filter.
@@ -71,9 +71,14 @@ pub(super) struct TrackEvidence {
 
 /// Density of a track's motion given a target's velocity, 1/(px/frame)^2.
 pub(super) fn motion_density(residual: [f64; 2], velocity: [f64; 2], scale: f64) -> f64 {
-    let variance = (TRACK_SIGMA * scale).powi(2);
+    let variance = (TRACK_NOISE_STD * scale).powi(2);
+    motion_ratio(residual, velocity, variance) / (std::f64::consts::TAU * variance)
+}
+
+/// That density over its maximum.
+fn motion_ratio(residual: [f64; 2], velocity: [f64; 2], variance: f64) -> f64 {
     let square = (residual[0] - velocity[0]).powi(2) + (residual[1] - velocity[1]).powi(2);
-    (-0.5 * square / variance).exp() / (std::f64::consts::TAU * variance)
+    (-0.5 * square / variance).exp()
 }
 
 /// Density of motions that belong to no target, 1/(px/frame)^2.
@@ -102,13 +107,12 @@ impl TrackFactor {
 
     fn log(&self, [x, y, u, v, w, h]: &Particle) -> f64 {
         let (across, down) = (INNER[0] * w, INNER[1] * h);
-        let variance = (TRACK_SIGMA * self.scale).powi(2);
+        let variance = (TRACK_NOISE_STD * self.scale).powi(2);
         let peak = 0.5 / (std::f64::consts::TAU * variance * clutter_density(self.scale));
         let mut sum = 0.0;
         for track in &self.evidence {
             if (track.position[0] - x).abs() < across && (track.position[1] - y).abs() < down {
-                let square = (track.residual[0] - u).powi(2) + (track.residual[1] - v).powi(2);
-                let ratio = 0.5 + peak * (-0.5 * square / variance).exp();
+                let ratio = 0.5 + peak * motion_ratio(track.residual, [*u, *v], variance);
                 sum += track.probability * ratio.ln().max(0.0) - track.penalty;
             }
         }

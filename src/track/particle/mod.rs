@@ -6,14 +6,15 @@
 //! * [`view`]: colour bins ([`bins`]) and brightness;
 //! * [`corners`]: corner tracks;
 //! * [`camera`] or, in paper mode, [`foreground`]: motion of the background;
-//! * [`seeing`]: predictions, near and hidden targets ([`labels`], [`presence`]);
-//! * [`target`], for each target: particles ([`cloud`]), [`recovery`], colours ([`appearance`],
+//! * [`prediction`]: predictions, near and hidden targets ([`labels`], [`presence`]);
+//! * [`advance`], for each [`target`]: particles ([`cloud`]), [`recovery`], colours ([`appearance`],
 //!   [`colour_table`]), [`evidence`] of tracks, [`likelihood`];
 //! * [`report`]: the result ([`step`]).
 //!
 //! [`record`] keeps a step, [`persist`] serialises it and the tracker. Model and limits:
 //! `docs/particle_tracker.md`.
 
+mod advance;
 mod appearance;
 mod bins;
 mod camera;
@@ -28,11 +29,11 @@ mod likelihood;
 mod noise;
 mod options;
 mod persist;
+mod prediction;
 mod presence;
 mod record;
 mod recovery;
 mod report;
-mod seeing;
 mod step;
 mod target;
 mod tracker;

@@ -1,6 +1,6 @@
 //! Noise of the transition, and the other numbers in which the modes differ.
 
-use super::options::ParticleMode;
+use super::options::{ParticleMode, ParticleOptions};
 
 /// Radius within which targets are near each other, in standard deviations of the position along each axis
 /// (equation (7) of the paper).
@@ -28,6 +28,12 @@ impl Noise {
                 Self { position: 4.0 * scale, velocity: 0.35 * scale, size: 0.01, aspect: Some(0.003) }
             }
         }
+    }
+
+    /// The noise that options ask for at a length scale.
+    pub fn of_options(options: &ParticleOptions, scale: f64) -> Self {
+        let noise = Self::of(options.mode, scale);
+        if options.used_parts().aspect { noise } else { Self { aspect: None, ..noise } }
     }
 
     /// All of it multiplied by a factor.

@@ -1,6 +1,5 @@
 //! Options of the particle tracker, and the lengths that go with the size of the picture.
 
-use super::noise::Noise;
 use crate::error::{Error, Result};
 use crate::filter::particle::Resampling;
 use crate::parallel::Threads;
@@ -268,12 +267,6 @@ impl ParticleOptions {
             quick_start: p.quick_start && crate::ablation::keeps("particle.quick_start"),
             recovery: p.recovery && crate::ablation::keeps("particle.recovery"),
         }
-    }
-
-    /// Noise of the transition at a length scale.
-    pub(super) fn noise(&self, scale: f64) -> Noise {
-        let noise = Noise::of(self.mode, scale);
-        if self.used_parts().aspect { noise } else { Noise { aspect: None, ..noise } }
     }
 
     /// Factor of all lengths for a picture of this many rows.

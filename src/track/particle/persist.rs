@@ -276,12 +276,12 @@ mod tests {
         let record = one.record();
         let copy = StepRecord::from_bytes(&record.to_bytes()).unwrap();
         assert_eq!(copy.to_bytes(), record.to_bytes());
-        assert_eq!(copy.foreground().unwrap(), one.foreground().unwrap());
-        assert_eq!(copy.segments().unwrap().labels, one.segments().unwrap().labels);
+        assert_eq!(copy.foreground().unwrap(), record.foreground().unwrap());
+        assert_eq!(copy.segments().unwrap().labels, record.segments().unwrap().labels);
     }
 
     #[test]
-    fn damage_is_told() {
+    fn damage_is_refused() {
         let bytes = tracker().to_bytes();
         for at in (0..bytes.len()).step_by(1 + bytes.len() / 97) {
             let mut damaged = bytes.clone();

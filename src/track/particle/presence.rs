@@ -37,7 +37,7 @@ pub(super) struct Presence {
     /// Frames that the running means are of.
     count: usize,
     /// Frames since the target became hidden; 0: it is not.
-    pub hidden: usize,
+    hidden: usize,
     /// Whether it was hidden since it was last clear.
     was_hidden: bool,
     /// Whether the last similarity was low.
@@ -58,6 +58,11 @@ impl Presence {
             is_low: false,
             clear_place: place,
         }
+    }
+
+    /// Frames since it became hidden; 0: it is not.
+    pub fn hidden_frames(&self) -> usize {
+        self.hidden
     }
 
     /// Whether it is hidden.
@@ -102,6 +107,11 @@ impl Presence {
         self.was_hidden = true;
     }
 
+    /// The target is not hidden any more, or nobody judges it.
+    pub fn show(&mut self) {
+        self.hidden = 0;
+    }
+
     /// The place where it was last clear, one frame on.
     pub fn moved_on(&self, camera: &CameraMotion) -> [f64; 2] {
         camera.carry(self.clear_place, self.velocity)
@@ -144,7 +154,7 @@ mod tests {
 
     const ESTIMATE: Particle = [10.0, 20.0, 2.0, 0.0, 5.0, 10.0];
 
-    fn usual() -> Presence {
+    fn settled() -> Presence {
         let mut presence = Presence::new([0.0; 2]);
         for _ in 0..20 {
             presence.judge(0.8);
@@ -163,7 +173,7 @@ mod tests {
             (0, 0.3, true, 6, false),
             (0, 0.3, true, 5, true),
         ] {
-            let mut presence = usual();
+            let mut presence = settled();
             presence.judge(similarity);
             assert_eq!(presence.decide(labelled, covered, returning), hidden);
             assert_eq!(presence.is_hidden(), hidden);
@@ -173,7 +183,7 @@ mod tests {
     #[test]
     fn a_new_look_is_learned_and_a_cover_is_not() {
         for (labelled, learned) in [(14, true), (13, false)] {
-            let mut presence = usual();
+            let mut presence = settled();
             for _ in 0..200 {
                 presence.judge(0.5);
                 presence.learn(0.5, labelled, &ESTIMATE);
@@ -185,7 +195,7 @@ mod tests {
 
     #[test]
     fn noise_grows_while_hidden() {
-        let mut presence = usual();
+        let mut presence = settled();
         presence.judge(0.1);
         let mut before = 0.0;
         for _ in 0..40 {

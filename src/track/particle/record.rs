@@ -7,7 +7,7 @@ use super::step::{CornerTrack, ParticleStep};
 use super::tracker::ParticleTracker;
 use crate::error::{Error, Result};
 use crate::segment::{Labels, felzenszwalb};
-use crate::types::{AnyColourFrame, Frame};
+use crate::types::{AnyColourFrame, ColourFrame, Frame};
 use std::sync::Arc;
 
 /// Particles of a target, N x 6 (centre x, y, velocity u, v, width, height), and their weights.
@@ -80,10 +80,12 @@ impl StepRecord {
     /// # Errors
     /// [`Error::Argument`] named `frame` where it was not kept.
     pub fn segments(&self) -> Result<Labels> {
-        self.options.threads.install(|| self.segment())
+        let options = self.options.segmentation(self.scale);
+        self.options.threads.install(|| felzenszwalb(&self.colour()?, &options))
     }
 
-    /// Foreground, 0 to 1, as [`ParticleTracker::foreground`].
+    /// Foreground of the frame, 0 to 1: density of the corners that are not background, averaged over
+    /// segments, over its maximum; all zero where there are no such corners.
     ///
     /// # Errors
     /// As [`StepRecord::segments`].
@@ -100,14 +102,12 @@ impl StepRecord {
         let tracks: Vec<Track> = self.step.tracks.iter().map(track).collect();
         self.options
             .threads
-            .install(|| Ok(ForegroundMap::new(&tracks, self.segment()?, self.scale, &self.options)?.picture()))
+            .install(|| Ok(ForegroundMap::of_frame(&tracks, &self.colour()?, self.scale, &self.options)?.picture()))
     }
 
-    fn segment(&self) -> Result<Labels> {
-        let frame = self
-            .frame
-            .as_ref()
-            .ok_or_else(|| Error::argument("frame", "a step that keeps its frame", "one that does not"))?;
-        felzenszwalb(&frame.scaled(self.gain), &self.options.segmentation(self.scale))
+    /// The frame in grey levels.
+    fn colour(&self) -> Result<ColourFrame<f32>> {
+        let missing = || Error::argument("frame", "a step that keeps its frame", "one that does not");
+        Ok(self.frame.as_ref().ok_or_else(missing)?.scaled(self.gain))
     }
 }

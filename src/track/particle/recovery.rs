@@ -3,7 +3,8 @@
 use super::corners::Track;
 use super::geometry::{covered_share, distance, holds};
 use super::labels::median_residual;
-use super::target::{Moment, Target};
+use super::prediction::{FrameContext, Prediction};
+use super::target::Target;
 
 /// Frames that a target must have been hidden for.
 const HIDDEN_FRAMES: usize = 4;
@@ -33,36 +34,39 @@ pub(super) struct Recovery {
 }
 
 /// Looks for the target in the densest group of tracks without an owner.
-pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Option<Recovery> {
-    let seeing = &moment.seeing[own];
-    let on = moment.factors.tracks && moment.factors.colour && moment.options.used_parts().recovery;
-    if seeing.hidden < HIDDEN_FRAMES || !on {
+pub(super) fn recover(target: &Target, own: usize, context: &FrameContext<'_>) -> Option<Recovery> {
+    let prediction = &context.predictions[own];
+    let on = context.factors.tracks && context.factors.colour && context.options.used_parts().recovery;
+    if prediction.hidden < HIDDEN_FRAMES || !on {
         return None;
     }
     // Two hidden targets in one place cannot be distinguished.
-    let twin = |l: &super::seeing::Seeing| {
-        l.id != seeing.id && !l.is_out && l.hidden > 0 && covered_share(seeing.bounds, l.bounds) > 0.0
+    let twin = |other: &Prediction| {
+        other.id != prediction.id
+            && !other.is_out
+            && other.hidden > 0
+            && covered_share(prediction.bounds, other.bounds) > 0.0
     };
-    if crate::ablation::keeps("particle.recovery_twin") && moment.seeing.iter().any(twin) {
+    if crate::ablation::keeps("particle.recovery_twin") && context.predictions.iter().any(twin) {
         return None;
     }
-    let group = densest_group(&free_tracks(own, moment), seeing.bounds, moment.scale);
+    let group = densest_group(&free_tracks(own, context), prediction.bounds, context.scale);
     if (group.len() as f64) < MIN_GROUP.0.max(MIN_GROUP.1 * target.presence.tracks) {
         return None;
     }
     let velocity = median_residual(&group)?;
     let middle = [0, 1].map(|i| group.iter().map(|track| track.position[i]).sum::<f64>() / group.len() as f64);
-    if crate::ablation::keeps("particle.recovery_other") && belongs_to_other(middle, velocity, own, moment) {
+    if crate::ablation::keeps("particle.recovery_other") && belongs_to_other(middle, velocity, own, context) {
         return None;
     }
-    let [_, _, w, h] = seeing.bounds;
+    let [_, _, w, h] = prediction.bounds;
     let (steps, range) = TRIALS;
     let mut best: Option<(f64, [f64; 2])> = None;
     for j in -steps..=steps {
         for i in -steps..=steps {
             let offset = |k: i32, share: f64, side: f64| f64::from(k) / f64::from(steps) * share * side;
             let place = [middle[0] + offset(i, range[0], w), middle[1] + offset(j, range[1], h)];
-            let similarity = target.appearance.similarity(moment.bins, [place[0], place[1], w, h]);
+            let similarity = target.appearance.similarity(context.bins, [place[0], place[1], w, h]);
             if best.is_none_or(|(most, _)| similarity > most) {
                 best = Some((similarity, place));
             }
@@ -74,10 +78,10 @@ pub(super) fn recover(target: &Target, own: usize, moment: &Moment<'_>) -> Optio
 }
 
 /// Tracks without an owner within reach of a hidden target, outside the boxes of those that are seen.
-fn free_tracks<'a>(own: usize, moment: &'a Moment<'_>) -> Vec<&'a Track> {
-    let seeing = &moment.seeing[own];
-    let [x, y, w, h] = seeing.bounds;
-    let grown = w + REACH_GROWTH * moment.scale * seeing.hidden as f64;
+fn free_tracks<'a>(own: usize, context: &'a FrameContext<'_>) -> Vec<&'a Track> {
+    let prediction = &context.predictions[own];
+    let [x, y, w, h] = prediction.bounds;
+    let grown = w + REACH_GROWTH * context.scale * prediction.hidden as f64;
     let reach = [grown.min(REACH[0] * w) + 0.5 * w, (REACH[1] + 0.5) * h];
     let is_free = |track: &&Track| {
         track.owner.is_none()
@@ -85,12 +89,14 @@ fn free_tracks<'a>(own: usize, moment: &'a Moment<'_>) -> Vec<&'a Track> {
             && track.foreground > MIN_FOREGROUND
             && (track.position[0] - x).abs() <= reach[0]
             && (track.position[1] - y).abs() <= reach[1]
-            && !moment
-                .seeing
-                .iter()
-                .any(|l| l.id != seeing.id && !l.is_out && l.hidden == 0 && holds(l.bounds, track.position, 1.0, 0.0))
+            && !context.predictions.iter().any(|other| {
+                other.id != prediction.id
+                    && !other.is_out
+                    && other.hidden == 0
+                    && holds(other.bounds, track.position, 1.0, 0.0)
+            })
     };
-    moment.tracks.iter().filter(is_free).collect()
+    context.tracks.iter().filter(is_free).collect()
 }
 
 /// The most tracks that lie within half a box of one of them and move with it.
@@ -104,11 +110,11 @@ fn densest_group<'a>(tracks: &[&'a Track], [_, _, w, h]: [f64; 4], scale: f64) -
 }
 
 /// Whether a group lies near another target whose usual velocity it fits better.
-fn belongs_to_other(middle: [f64; 2], velocity: [f64; 2], own: usize, moment: &Moment<'_>) -> bool {
-    let seeing = &moment.seeing[own];
-    moment.seeing.iter().filter(|l| l.id != seeing.id && !l.is_out).any(|other| {
-        let more = REACH_GROWTH * moment.scale * other.hidden as f64;
+fn belongs_to_other(middle: [f64; 2], velocity: [f64; 2], own: usize, context: &FrameContext<'_>) -> bool {
+    let prediction = &context.predictions[own];
+    context.predictions.iter().filter(|other| other.id != prediction.id && !other.is_out).any(|other| {
+        let more = REACH_GROWTH * context.scale * other.hidden as f64;
         let near = (0..2).all(|i| (middle[i] - other.place[i]).abs() < OTHER_REACH[i] * other.bounds[2 + i] + more);
-        near && distance(velocity, other.usual_velocity) < distance(velocity, seeing.usual_velocity)
+        near && distance(velocity, other.usual_velocity) < distance(velocity, prediction.usual_velocity)
     })
 }

@@ -2,10 +2,10 @@
 
 use super::appearance::CentredBox;
 use super::camera::CameraMotion;
-use super::seeing::Seeing;
+use super::corners::Track;
+use super::prediction::Prediction;
 use super::step::{CornerTrack, ParticleStep, ParticleTarget};
 use super::target::Target;
-use super::tracker::ParticleTracker;
 use crate::types::{TargetBox, TrackState, TrackStatus};
 
 // Reasons of a status.
@@ -24,7 +24,7 @@ pub(super) const REASONS: [&str; 10] =
 
 /// Cause of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Occasion {
+pub(super) enum StepCause {
     /// Targets were given.
     Begin,
     /// A frame showed nothing.
@@ -35,27 +35,36 @@ pub(super) enum Occasion {
     Cut,
 }
 
-/// The step at the tracker's frame.
+/// State of the tracker in a frame.
+pub(super) struct Tracked<'a> {
+    pub frame: usize,
+    pub targets: &'a [Target],
+    pub tracks: &'a [Track],
+    /// The targets of the step before.
+    pub before: &'a [ParticleTarget],
+}
+
+/// Assembles the step of a frame.
 pub(super) fn report(
-    tracker: &ParticleTracker,
+    tracked: &Tracked<'_>,
     camera: &CameraMotion,
-    seeing: &[Seeing],
-    occasion: Occasion,
+    predictions: &[Prediction],
+    cause: StepCause,
 ) -> ParticleStep {
-    let count = tracker.targets.len();
+    let count = tracked.targets.len();
     let mut near = vec![false; count * count];
-    for (own, seeing) in seeing.iter().enumerate() {
-        for &other in &seeing.near {
+    for (own, prediction) in predictions.iter().enumerate() {
+        for &other in &prediction.near {
             near[own * count + other] = true;
         }
     }
     let target = |(own, target): (usize, &Target)| {
-        let n_tracks = tracker.corners.tracks.iter().filter(|track| track.owner == Some(target.id)).count();
-        let (status, reason) = status_of(target, seeing.get(own), occasion);
-        let before = tracker.step.targets.iter().find(|before| before.id == target.id);
+        let n_tracks = tracked.tracks.iter().filter(|track| track.owner == Some(target.id)).count();
+        let (status, reason) = status_of(target, predictions.get(own), cause);
+        let before = tracked.before.iter().find(|before| before.id == target.id);
         ParticleTarget {
             id: target.id,
-            state: state_of(target, tracker.frame, camera, (status, reason), before),
+            state: state_of(target, tracked.frame, camera, (status, reason), before),
             size: [target.estimate[4], target.estimate[5]],
             covariance: target.cloud.covariance(&target.cloud.mean()),
             effective_sample_size: target.effective_sample_size,
@@ -64,18 +73,18 @@ pub(super) fn report(
             degenerate: target.degenerate,
         }
     };
-    let looked = matches!(occasion, Occasion::Frame | Occasion::Cut);
-    let tracks = if looked { tracker.corners.tracks.iter().filter_map(corner).collect() } else { Vec::new() };
+    let measured = matches!(cause, StepCause::Frame | StepCause::Cut);
+    let tracks = if measured { tracked.tracks.iter().filter_map(corner).collect() } else { Vec::new() };
     ParticleStep {
-        frame: tracker.frame,
-        targets: tracker.targets.iter().enumerate().map(target).collect(),
+        frame: tracked.frame,
+        targets: tracked.targets.iter().enumerate().map(target).collect(),
         near,
         camera: camera.to_affine(),
         tracks,
     }
 }
 
-fn corner(track: &super::corners::Track) -> Option<CornerTrack> {
+fn corner(track: &Track) -> Option<CornerTrack> {
     Some(CornerTrack {
         id: track.id,
         position: track.position,
@@ -86,16 +95,16 @@ fn corner(track: &super::corners::Track) -> Option<CornerTrack> {
 }
 
 /// Status and its reason.
-fn status_of(target: &Target, seeing: Option<&Seeing>, occasion: Occasion) -> (TrackStatus, &'static str) {
+fn status_of(target: &Target, prediction: Option<&Prediction>, cause: StepCause) -> (TrackStatus, &'static str) {
     let presence = &target.presence;
-    let is_covered = seeing.is_some_and(|seeing| !seeing.near.is_empty() && seeing.is_covered);
+    let is_covered = prediction.is_some_and(|prediction| !prediction.near.is_empty() && prediction.is_covered);
     if target.is_out {
         (TrackStatus::Out, LEFT)
     } else if presence.is_lost() {
         (TrackStatus::Lost, LOST)
-    } else if occasion == Occasion::Nothing {
+    } else if cause == StepCause::Nothing {
         (TrackStatus::Coasting, NOTHING_SHOWN)
-    } else if occasion == Occasion::Cut {
+    } else if cause == StepCause::Cut {
         (TrackStatus::Coasting, CUT)
     } else if presence.is_hidden() {
         (TrackStatus::Coasting, if is_covered { HIDDEN_BY_TARGET } else { HIDDEN })

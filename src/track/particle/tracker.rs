@@ -2,20 +2,20 @@
 
 use super::appearance::{CentredBox, visible_share};
 use super::camera::{CameraMotion, fit_background};
-use super::corners::Corners;
+use super::corners::{Corners, Track};
 use super::foreground::{ForegroundMap, background_flow};
 use super::geometry::centred;
-use super::labels::{Labelled, assign};
+use super::labels::assign;
+use super::likelihood::is_inside;
 use super::options::{ForegroundModel, ParticleMode, ParticleOptions};
-use super::report::{Occasion, report};
-use super::seeing::{Seeing, look};
+use super::prediction::{FrameContext, Prediction, predict_targets};
+use super::report::{StepCause, Tracked, report};
 use super::step::ParticleStep;
-use super::target::{Moment, Target};
+use super::target::{Target, labelled};
 use super::view::{View, level_gain};
 use crate::error::{Error, Result};
 use crate::flow::points::PointPyramid;
 use crate::math::random::CounterRng;
-use crate::segment::{Labels, felzenszwalb};
 use crate::types::{AnyColourFrame, Frame, TargetBox};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -157,7 +157,7 @@ impl ParticleTracker {
 
     /// Adds a new target, near nothing, to the step of the last frame.
     fn insert_into_step(&mut self, at: usize) {
-        let new = report(self, &CameraMotion::NONE, &[], Occasion::Begin).targets.swap_remove(at);
+        let new = self.report(&CameraMotion::NONE, &[], StepCause::Begin).targets.swap_remove(at);
         let (before, count) = (self.step.targets.len(), self.targets.len());
         let place = |k: usize| k - usize::from(k > at);
         let near =
@@ -209,36 +209,6 @@ impl ParticleTracker {
         &self.options
     }
 
-    /// Particles of a target, N x 6 (centre x, y, velocity u, v, width, height), and their weights.
-    pub fn particles(&self, id: u64) -> Option<(&[[f64; 6]], &[f64])> {
-        let target = self.targets.iter().find(|target| target.id == id)?;
-        Some((&target.cloud.particles, &target.cloud.weights))
-    }
-
-    /// Segments of the last frame.
-    ///
-    /// # Errors
-    /// As [`felzenszwalb`].
-    pub fn segments(&self) -> Result<Labels> {
-        self.options.threads.install(|| self.segment(&self.last))
-    }
-
-    /// Foreground of the last frame, 0 to 1: density of the corners that are not background, averaged over
-    /// segments, over its maximum; all zero where there are no such corners.
-    ///
-    /// # Errors
-    /// As [`felzenszwalb`].
-    pub fn foreground(&self) -> Result<Frame<f32>> {
-        self.options.threads.install(|| {
-            let map = ForegroundMap::new(&self.corners.tracks, self.segment(&self.last)?, self.scale, &self.options)?;
-            Ok(map.picture())
-        })
-    }
-
-    fn segment(&self, frame: &AnyColourFrame) -> Result<Labels> {
-        felzenszwalb(&frame.scaled(self.gain), &self.options.segmentation(self.scale))
-    }
-
     fn check_box(&self, bounds: TargetBox) -> Result<CentredBox> {
         let TargetBox { x, y, width, height } = bounds;
         let finite = [x, y, width, height].iter().all(|value| value.is_finite());
@@ -249,6 +219,12 @@ impl ParticleTracker {
         let (w, h) = self.size;
         let expected = format!("left, top, width and height of a box with an area inside the {w} x {h} picture");
         Err(Error::argument("box", expected, crate::error::numbers(&[x, y, width, height])))
+    }
+
+    fn report(&self, camera: &CameraMotion, predictions: &[Prediction], cause: StepCause) -> ParticleStep {
+        let (targets, tracks) = (&self.targets[..], &self.corners.tracks[..]);
+        let tracked = Tracked { frame: self.frame, targets, tracks, before: &self.step.targets };
+        report(&tracked, camera, predictions, cause)
     }
 
     /// One frame.
@@ -272,14 +248,15 @@ impl ParticleTracker {
         if was_cut {
             self.corners.tracks.iter_mut().for_each(|track| track.owner = None);
         }
-        let seeing = look(&mut self.targets, &mut self.corners.tracks, &camera, (&self.options, self.scale));
+        let predictions =
+            predict_targets(&mut self.targets, &mut self.corners.tracks, &camera, (&self.options, self.scale));
         if was_cut {
             self.targets
                 .iter_mut()
                 .filter(|target| !target.presence.is_hidden())
                 .for_each(|target| target.presence.hide());
         }
-        let moment = Moment {
+        let context = FrameContext {
             options: &self.options,
             factors: self.options.factors(),
             scale: self.scale,
@@ -288,12 +265,12 @@ impl ParticleTracker {
             camera,
             tracks: &self.corners.tracks,
             foreground: map.as_ref(),
-            seeing: &seeing,
+            predictions: &predictions,
         };
         let active = self.targets.par_iter_mut().enumerate().filter(|(_, target)| !target.is_out);
-        active.for_each(|(own, target)| target.advance(own, &moment));
-        self.learn(&seeing, &camera, was_cut);
-        self.step = report(self, &camera, &seeing, if was_cut { Occasion::Cut } else { Occasion::Frame });
+        active.for_each(|(own, target)| target.advance(own, &context));
+        self.learn(&predictions, &camera, was_cut);
+        self.step = self.report(&camera, &predictions, if was_cut { StepCause::Cut } else { StepCause::Frame });
         self.corners.top_up(&view.grey)?;
         self.pyramid = pyramid;
         self.bins = view.bins;
@@ -303,7 +280,7 @@ impl ParticleTracker {
 
     /// Motion of the background. Sets each track's residual motion and its probability of foreground.
     fn measure_background(&mut self, known: Option<CameraMotion>) -> Result<CameraMotion> {
-        let points: Vec<[f64; 2]> = self.corners.tracks.iter().map(super::corners::Track::previous).collect();
+        let points: Vec<[f64; 2]> = self.corners.tracks.iter().map(Track::previous).collect();
         let flow: Vec<[f64; 2]> = self.corners.tracks.iter().map(|track| track.flow).collect();
         let by_mixture = self.options.mode == ParticleMode::Paper && self.options.foreground != ForegroundModel::Affine;
         let (camera, foreground, relative) = if by_mixture && known.is_none() {
@@ -330,49 +307,37 @@ impl ParticleTracker {
         if !self.options.factors().foreground || self.targets.is_empty() {
             return Ok(None);
         }
-        let labels = felzenszwalb(&view.colour, &self.options.segmentation(self.scale))?;
-        ForegroundMap::new(&self.corners.tracks, labels, self.scale, &self.options).map(Some)
+        ForegroundMap::of_frame(&self.corners.tracks, &view.colour, self.scale, &self.options).map(Some)
     }
 
     /// The frame shows nothing: targets move on, nothing is learned.
     fn coast(&mut self) {
         for target in self.targets.iter_mut().filter(|target| !target.is_out) {
             target.coast(&self.options, self.scale, self.frame);
-            target.is_out = !super::likelihood::is_inside(target.place(), self.size);
+            target.is_out = !is_inside(target.place(), self.size);
         }
-        self.step = report(self, &CameraMotion::NONE, &[], Occasion::Nothing);
+        self.step = self.report(&CameraMotion::NONE, &[], StepCause::Nothing);
     }
 
     /// Updates usual values, labels of tracks and who has left.
-    fn learn(&mut self, seeing: &[Seeing], camera: &CameraMotion, was_cut: bool) {
-        for (target, seeing) in self.targets.iter_mut().zip(seeing).filter(|(target, _)| !target.is_out) {
+    fn learn(&mut self, predictions: &[Prediction], camera: &CameraMotion, was_cut: bool) {
+        for (target, prediction) in self.targets.iter_mut().zip(predictions).filter(|(target, _)| !target.is_out) {
             if self.options.factors().colour {
                 target.presence.judge(target.similarity);
             }
-            let is_alone = seeing.near.is_empty() && !target.presence.is_hidden() && !was_cut;
-            if !(is_alone && target.presence.learn(target.similarity, seeing.labelled, &target.estimate)) {
+            let is_alone = prediction.near.is_empty() && !target.presence.is_hidden() && !was_cut;
+            if !(is_alone && target.presence.learn(target.similarity, prediction.labelled, &target.estimate)) {
                 target.presence.clear_place = target.presence.moved_on(camera);
             }
             // The particles stay inside: only where they are going shows that the target leaves.
             let next = camera.carry(target.place(), target.velocity());
-            target.is_out = !super::likelihood::is_inside(next, self.size);
+            target.is_out = !is_inside(next, self.size);
         }
         if !(self.options.factors().tracks && self.options.used_parts().labels) || was_cut {
             return;
         }
-        let labelled: Vec<Labelled> = self
-            .targets
-            .iter()
-            .filter(|target| !target.is_out)
-            .map(|target| Labelled {
-                id: target.id,
-                bounds: target.bounds(),
-                velocity: target.velocity(),
-                is_hidden: target.presence.is_hidden(),
-                is_unlike: target.presence.is_low,
-            })
-            .collect();
-        assign(&mut self.corners.tracks, &labelled, self.scale);
+        let targets = labelled(&self.targets, |_, target| target.bounds());
+        assign(&mut self.corners.tracks, &targets, self.scale);
     }
 }
 

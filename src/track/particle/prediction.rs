@@ -3,12 +3,14 @@
 use super::appearance::CentredBox;
 use super::camera::CameraMotion;
 use super::corners::Track;
+use super::foreground::ForegroundMap;
 use super::geometry::{covered_share, distance, holds};
-use super::labels::{Labelled, review};
+use super::labels::review;
 use super::noise::near_radius;
-use super::options::{ParticleMode, ParticleOptions};
+use super::options::{Likelihoods, ParticleMode, ParticleOptions};
 use super::presence::COVER;
-use super::target::Target;
+use super::target::{Target, labelled};
+use crate::types::Frame;
 
 /// Targets are near each other, too, if their boxes shrunk to this overlap.
 const NEAR_BOXES: f64 = 0.9;
@@ -21,7 +23,7 @@ const RETURN_DIFFERENCE: f64 = 2.4;
 
 /// Prediction of one target in a frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Seeing {
+pub(super) struct Prediction {
     pub id: u64,
     /// Predicted centre, px.
     pub place: [f64; 2],
@@ -46,65 +48,66 @@ pub(super) struct Seeing {
     pub labelled: usize,
 }
 
+/// Input that all targets share in one frame.
+pub(super) struct FrameContext<'a> {
+    pub options: &'a ParticleOptions,
+    pub factors: Likelihoods,
+    pub scale: f64,
+    pub frame: usize,
+    pub bins: &'a Frame<u8>,
+    pub camera: CameraMotion,
+    pub tracks: &'a [Track],
+    pub foreground: Option<&'a ForegroundMap>,
+    pub predictions: &'a [Prediction],
+}
+
 /// Predicts all targets. With the track factor, labels are reviewed and hidden targets recognised.
-pub(super) fn look(
+pub(super) fn predict_targets(
     targets: &mut [Target],
     tracks: &mut [Track],
     camera: &CameraMotion,
     (options, scale): (&ParticleOptions, f64),
-) -> Vec<Seeing> {
-    let mut seeing: Vec<Seeing> = targets.iter().map(|target| predicted(target, camera)).collect();
-    find_near(&mut seeing, targets, options, scale);
+) -> Vec<Prediction> {
+    let mut predictions: Vec<Prediction> = targets.iter().map(|target| predicted(target, camera)).collect();
+    find_near(&mut predictions, targets, options, scale);
     let judges_hidden = options.factors().tracks && options.used_parts().hidden;
     if !judges_hidden {
         // A cut hides every target for one frame, in every mode.
         for target in targets.iter_mut() {
-            target.presence.hidden = 0;
+            target.presence.show();
         }
     }
     if !options.factors().tracks {
-        return seeing;
+        return predictions;
     }
-    let labelled: Vec<Labelled> = targets
-        .iter()
-        .zip(&seeing)
-        .filter(|(target, _)| !target.is_out)
-        .map(|(target, seeing)| Labelled {
-            id: target.id,
-            bounds: seeing.bounds,
-            velocity: seeing.velocity,
-            is_hidden: target.presence.is_hidden(),
-            is_unlike: target.presence.is_low,
-        })
-        .collect();
-    review(tracks, &labelled, scale);
+    review(tracks, &labelled(targets, |own, _| predictions[own].bounds), scale);
     for own in 0..targets.len() {
         let target = &mut targets[own];
         let count = tracks.iter().filter(|track| track.owner == Some(target.id)).count();
-        seeing[own].labelled = count;
+        predictions[own].labelled = count;
         if target.is_out || !judges_hidden {
             continue;
         }
-        let returning = returning_tracks(tracks, &seeing, own, scale);
-        let entered = target.presence.decide(count, seeing[own].is_covered, returning);
-        seeing[own].entered_low = entered && target.presence.is_low;
-        seeing[own].hidden = target.presence.hidden;
+        let returning = returning_tracks(tracks, &predictions, own, scale);
+        let entered = target.presence.decide(count, predictions[own].is_covered, returning);
+        predictions[own].entered_low = entered && target.presence.is_low;
+        predictions[own].hidden = target.presence.hidden_frames();
     }
-    seeing
+    predictions
 }
 
 /// Prediction of a target from its last estimate.
-fn predicted(target: &Target, camera: &CameraMotion) -> Seeing {
+fn predicted(target: &Target, camera: &CameraMotion) -> Prediction {
     let velocity = target.velocity();
     let place = camera.carry(target.place(), velocity);
     let growth = camera.growth();
-    Seeing {
+    Prediction {
         id: target.id,
         place,
         bounds: [place[0], place[1], target.estimate[4] * growth, target.estimate[5] * growth],
         velocity,
         usual_velocity: target.presence.velocity,
-        hidden: target.presence.hidden,
+        hidden: target.presence.hidden_frames(),
         is_out: target.is_out,
         near: Vec::new(),
         likeness: 0.0,
@@ -119,11 +122,11 @@ fn boxes_touch(a: CentredBox, b: CentredBox) -> bool {
     (0..2).all(|i| (a[i] - b[i]).abs() < 0.5 * NEAR_BOXES * (a[2 + i] + b[2 + i]))
 }
 
-fn find_near(seeing: &mut [Seeing], targets: &[Target], options: &ParticleOptions, scale: f64) {
+fn find_near(predictions: &mut [Prediction], targets: &[Target], options: &ParticleOptions, scale: f64) {
     let radius = near_radius(scale);
-    for own in 0..seeing.len() {
-        for other in 0..seeing.len() {
-            let (a, b) = (&seeing[own], &seeing[other]);
+    for own in 0..predictions.len() {
+        for other in 0..predictions.len() {
+            let (a, b) = (&predictions[own], &predictions[other]);
             if own == other || a.is_out || b.is_out {
                 continue;
             }
@@ -133,20 +136,20 @@ fn find_near(seeing: &mut [Seeing], targets: &[Target], options: &ParticleOption
             let covered = covered_share(a.bounds, b.bounds) >= COVER;
             if distance(a.place, b.place) <= radius || touch {
                 let likeness = targets[own].appearance.likeness(&targets[other].appearance);
-                let own = &mut seeing[own];
+                let own = &mut predictions[own];
                 own.near.push(other);
                 own.likeness = own.likeness.max(likeness.min(1.0));
             }
-            seeing[own].is_covered |= covered;
+            predictions[own].is_covered |= covered;
         }
     }
 }
 
 /// How many tracks at a target's place, outside the others' boxes, move as it does.
-fn returning_tracks(tracks: &[Track], seeing: &[Seeing], own: usize, scale: f64) -> usize {
-    let target = &seeing[own];
+fn returning_tracks(tracks: &[Track], predictions: &[Prediction], own: usize, scale: f64) -> usize {
+    let target = &predictions[own];
     let outside = |track: &&Track| {
-        !seeing.iter().any(|l| l.id != target.id && !l.is_out && holds(l.bounds, track.position, 1.0, 0.0))
+        !predictions.iter().any(|l| l.id != target.id && !l.is_out && holds(l.bounds, track.position, 1.0, 0.0))
     };
     let moves_alike =
         |track: &&Track| track.residual.is_some_and(|r| distance(r, target.velocity) < RETURN_DIFFERENCE * scale);
