@@ -1,5 +1,8 @@
 //! The middle one of some numbers.
 
+/// Standard deviation of a normal distribution over the median of its absolute deviations.
+pub(crate) const MAD_TO_STD: f64 = 1.4826;
+
 /// The middle one, of an even number the upper of the two in the middle; `None` of none. The numbers are
 /// reordered. NaN counts as greater than every number.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {

@@ -7,5 +7,5 @@ mod real;
 pub mod special;
 mod ziggurat;
 
-pub(crate) use median::median;
+pub(crate) use median::{MAD_TO_STD, median};
 pub use real::Real;

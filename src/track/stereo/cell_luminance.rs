@@ -60,7 +60,7 @@ impl CellLuminance {
         Self { columns, rows, means, scale, levels }
     }
 
-    /// The same picture under another exposure.
+    /// The view under another exposure.
     pub fn exposed(&self, exposure: &Exposure) -> Self {
         let means = self.means.iter().map(|mean| exposure.gain * mean + exposure.offset).collect();
         Self::of_means((self.columns, self.rows), means, self.scale)

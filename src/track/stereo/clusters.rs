@@ -1,13 +1,12 @@
 //! Voxels and edge pixels by the component that they belong to.
 
-use super::succession::reordered;
 use super::voxels::{EdgePoints, Lattice, Voxels};
 use crate::math::median;
 
-/// Label of a place that no cluster is at.
+/// Label of a voxel without a cluster.
 const NOBODY: u16 = u16::MAX;
 
-/// The clusters of a step; those of the components that nothing belongs to are empty.
+/// The clusters of a step; components without voxels are empty.
 #[derive(Debug, Clone)]
 pub(super) struct Clusters {
     pub voxels: Voxels,
@@ -39,7 +38,7 @@ impl Clusters {
         Self { voxels, points, members, pixels, of_point, dense }
     }
 
-    /// The same with the components called otherwise.
+    /// Renumbers the components.
     pub fn renamed(mut self, names: &[usize]) -> Self {
         self.members = reordered(self.members, names);
         self.pixels = reordered(self.pixels, names);
@@ -86,13 +85,20 @@ impl Clusters {
     }
 }
 
+/// Puts the value of each component at its new number.
+fn reordered<T>(values: Vec<T>, names: &[usize]) -> Vec<T> {
+    let mut named: Vec<(usize, T)> = names.iter().copied().zip(values).collect();
+    named.sort_by_key(|(name, _)| *name);
+    named.into_iter().map(|(_, value)| value).collect()
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::voxels::tests::lattice;
     use super::*;
 
     /// One edge pixel in each given voxel of the default grid, with its cluster.
-    pub fn made_up(cells: &[([u16; 3], u32)], components: usize) -> Clusters {
+    pub fn synthetic_clusters(cells: &[([u16; 3], u32)], components: usize) -> Clusters {
         let points = EdgePoints {
             columns: cells.iter().map(|(cell, _)| 8 * u32::from(cell[0]) + 4).collect(),
             rows: cells.iter().map(|(cell, _)| 8 * u32::from(cell[1]) + 4).collect(),
@@ -108,7 +114,8 @@ pub(super) mod tests {
 
     #[test]
     fn voxels_and_pixels_know_their_cluster() {
-        let clusters = made_up(&[([1, 2, 3], 0), ([1, 2, 9], 2), ([1, 2, 9], 2), ([4, 2, 9], 2), ([4, 2, 8], 2)], 4);
+        let clusters =
+            synthetic_clusters(&[([1, 2, 3], 0), ([1, 2, 9], 2), ([1, 2, 9], 2), ([4, 2, 9], 2), ([4, 2, 8], 2)], 4);
         assert_eq!((clusters.at([1, 2, 3]), clusters.at([1, 2, 9]), clusters.at([0, 0, 0])), (Some(0), Some(2), None));
         assert_eq!(clusters.of_point, [0, 2, 2, 2, 2]);
         assert_eq!((clusters.members[2].len(), clusters.pixels[2].len(), clusters.pixels[1].len()), (3, 4, 0));
@@ -117,5 +124,10 @@ pub(super) mod tests {
         assert_eq!((renamed.at([1, 2, 3]), renamed.at([1, 2, 9]), renamed.at([0, 0, 0])), (Some(0), Some(1), None));
         assert_eq!(renamed.of_point, [0, 1, 1, 1, 1]);
         assert_eq!((&renamed.members[1], &renamed.pixels[1]), (&clusters.members[2], &clusters.pixels[2]));
+    }
+
+    #[test]
+    fn what_belongs_to_components_goes_with_their_names() {
+        assert_eq!(reordered(vec!['a', 'b', 'c'], &[2, 0, 1]), ['b', 'c', 'a']);
     }
 }

@@ -23,13 +23,11 @@ pub struct Node {
     pub mean: [f64; 3],
     /// Covariance of `(x, y, d)`, px^2.
     pub covariance: [[f64; 3]; 3],
-    /// Motion `(u, v, w)` since the last step, medians over its pixels then, px/step and disparity/step; none
-    /// where it was not measured.
+    /// Motion `(u, v, w)` since the last step, at `middle`, px/step and disparity/step; none if not measured.
     pub velocity: Option<[f64; 3]>,
-    /// Motion `(u, v, w)` to the next step, medians over its pixels, as soon as that is known.
+    /// Motion `(u, v, w)` to the next step, known one step later.
     pub next_velocity: Option<[f64; 3]>,
-    /// Medians of its pixels along x and y, px; in the improved mode of those that show its own surface,
-    /// neither strays nor those of its outline that are beyond it.
+    /// Medians of its pixels along x and y, px; in improved mode of those on its own surface.
     pub middle: [f64; 2],
     /// Motion in the picture to here as `(u, v, u_x, v_x, u_y, v_y)` at the middle.
     pub affine: Option<[f64; 6]>,
@@ -75,7 +73,7 @@ pub struct TrackGraph {
     arcs: BTreeMap<(usize, usize, usize), Arc>,
 }
 
-/// A graph as it is written.
+/// Serialised form of a graph.
 #[derive(Serialize, Deserialize)]
 struct Written {
     format: String,
@@ -83,19 +81,19 @@ struct Written {
     arcs: Vec<Arc>,
 }
 
-/// What a written graph calls itself.
+/// Format name of a serialised graph.
 const FORMAT: &str = "jacoflow track graph 1";
 
 impl TrackGraph {
-    /// Puts a node in, in place of one with the same time and index.
+    /// Inserts a node, replacing one with the same time and index.
     pub fn insert(&mut self, node: Node) {
         self.nodes.insert((node.time, node.index), node);
     }
 
-    /// Puts an arc in between nodes that are there.
+    /// Inserts an arc between existing nodes.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `arc` where one of its nodes is missing or a share is not between 0 and 1.
+    /// [`Error::Argument`] named `arc` if a node is missing or a share is not between 0 and 1.
     pub fn connect(&mut self, arc: Arc) -> Result<()> {
         for node in [(arc.time, arc.from), (arc.time + 1, arc.to)] {
             if !self.nodes.contains_key(&node) {
@@ -125,7 +123,7 @@ impl TrackGraph {
         self.nodes.get(&(time, index))
     }
 
-    /// The same, to be changed.
+    /// The cluster, mutable.
     pub(super) fn node_mut(&mut self, time: usize, index: usize) -> Option<&mut Node> {
         self.nodes.get_mut(&(time, index))
     }
@@ -185,11 +183,11 @@ impl TrackGraph {
         serde_json::to_string(&written).map_err(|error| Error::Numerical(format!("track graph: {error}")))
     }
 
-    /// From [`TrackGraph::to_json`], number for number.
+    /// Reads [`TrackGraph::to_json`], number for number.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `json` for text that is no graph or tells a cluster or an arc twice, `arc`
-    /// for arcs between clusters that are missing.
+    /// [`Error::Argument`] named `json` for other text or a repeated cluster or arc, `arc` for arcs between
+    /// missing clusters.
     pub fn from_json(json: &str) -> Result<Self> {
         let refuse = |got: String| Error::argument("json", "a graph as to_json writes it", got);
         let written: Written = serde_json::from_str(json).map_err(|error| refuse(error.to_string()))?;

@@ -28,15 +28,13 @@ impl GroupMotion {
     }
 }
 
-/// The least member of each cluster's group: joins clusters no farther apart in the picture than the reach
-/// whose affine motions differ, in the median over the pixels of both, by no more than asked, and whose
-/// motions in depth agree, as they are or as those of one thing that comes nearer. Clusters without a motion
-/// stay alone.
+/// Smallest member of each cluster's group. Joins clusters within reach whose affine motions differ, in the
+/// median over the pixels of both, by no more than the limit, and whose depth motions agree, directly or as
+/// parts of one approaching object. Clusters without a motion stay alone.
 ///
-/// What comes nearer grows, at a rate `g = D c` for a disparity `D` from that at infinity and a constant `c`
-/// of the thing, and its disparity changes by `w = D^2 c`. So of two of its parts `w_a - w_b = (D_a +
-/// D_b)(D_a - D_b) c = (g_a + g_b)(d_a - d_b)`: nearer parts come nearer faster, by what the growth of both
-/// says, wherever infinity is.
+/// An approaching object grows at a rate `g = D c`, with disparity `D` from that at infinity and a constant
+/// `c`, and its disparity changes by `w = D^2 c`. Two of its parts have `w_a - w_b = (D_a + D_b)(D_a - D_b) c
+/// = (g_a + g_b)(d_a - d_b)`, independent of the disparity at infinity.
 pub(super) fn groups(clusters: &Clusters, motions: &[Option<GroupMotion>], limits: &Grouping) -> Vec<usize> {
     let count = clusters.components();
     let mut parent: Vec<usize> = (0..count).collect();
@@ -71,7 +69,7 @@ fn root(parent: &[usize], mut k: usize) -> usize {
 fn neighbours(clusters: &Clusters, reach: f64) -> Vec<(usize, usize)> {
     let grid = clusters.lattice().grid;
     let count = clusters.components();
-    // Who is in each cell of the picture.
+    // Clusters in each cell of the picture.
     let mut there: Vec<Vec<u16>> = vec![vec![]; grid.columns * grid.rows];
     for k in 0..count {
         for [x, y] in clusters.template(k) {
@@ -121,7 +119,7 @@ fn median_difference(clusters: &Clusters, both: [usize; 2], motions: [&GroupMoti
 
 #[cfg(test)]
 mod tests {
-    use super::super::clusters::tests::made_up;
+    use super::super::clusters::tests::synthetic_clusters;
     use super::*;
 
     fn moving(u: f64, depth: f64) -> GroupMotion {
@@ -132,7 +130,7 @@ mod tests {
     fn neighbours_that_move_alike_are_one() {
         // In a row, 3 cells apart but for the last, which is 5 apart.
         let cells = [([10, 5, 9], 0), ([13, 5, 30], 1), ([16, 5, 9], 2), ([19, 5, 9], 3), ([24, 5, 9], 4)];
-        let clusters = made_up(&cells, 6);
+        let clusters = synthetic_clusters(&cells, 6);
         let moved =
             [(3.0, 0.0), (3.9, 0.1), (5.5, 0.0), (5.4, 0.3), (5.4, 0.3)].map(|(u, depth)| Some(moving(u, depth)));
         let motions = [&moved[..], &[None]].concat();
@@ -145,7 +143,7 @@ mod tests {
 
     #[test]
     fn affine_motions_are_compared_where_the_pixels_are() {
-        let clusters = made_up(&[([10, 5, 9], 0), ([12, 5, 9], 1)], 2);
+        let clusters = synthetic_clusters(&[([10, 5, 9], 0), ([12, 5, 9], 1)], 2);
         // Both x - 90 about different centres.
         let growing = |centre: f64| {
             Some(GroupMotion { affine: [centre - 90.0, 0.0, 1.0, 0.0, 0.0, 0.0], centre: [centre, 0.0], depth: 0.0 })
@@ -154,9 +152,9 @@ mod tests {
     }
     #[test]
     fn nearer_parts_of_what_comes_nearer_come_faster() {
-        // Disparities -30 and -10, 40 and 60 px nearer than infinity at -70: parts of one thing that grows by
-        // a fiftieth and by three hundredths a step.
-        let clusters = made_up(&[([10, 5, 10], 0), ([12, 5, 30], 1)], 2);
+        // Disparities -30 and -10, 40 and 60 px from infinity at -70: parts of one object that grow by a
+        // fiftieth and by three hundredths a step.
+        let clusters = synthetic_clusters(&[([10, 5, 10], 0), ([12, 5, 30], 1)], 2);
         let part = |growth: f64, depth: f64| {
             let affine = [growth * -92.0, growth * -44.0, growth, 0.0, 0.0, growth];
             Some(GroupMotion { affine, centre: [0.0, 0.0], depth })

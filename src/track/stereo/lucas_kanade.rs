@@ -1,5 +1,5 @@
 //! Affine motion of a cluster on its edge pixels (B. Lucas and T. Kanade, 1981), coarse to fine, robustly
-//! weighted; section 6.4 of the stereo tracker's design.
+//! weighted.
 
 mod task;
 mod visible;
@@ -7,94 +7,70 @@ mod visible;
 pub(super) use visible::visible_motion;
 
 use self::task::Task;
+use super::cluster_motion::PlaneMotion;
 use super::exposure::Exposure;
 use crate::image::GaussianSmoother;
-use crate::math::median;
-use crate::types::{AffineFlow, Frame};
+use crate::types::Frame;
 
-/// Deviations of the Gaussians, coarse to fine, px.
-const SIGMAS: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
-/// Ways to the finest level: steps with a translation, and after those with an affine map, at each level
-/// before it. Of what grows the rim moves farther than a fine level can follow: the map has to be affine from
-/// the coarsest one on. Of what is about to leave the picture too little is seen there, and less says more.
+/// Standard deviations of the Gaussians, coarse to fine, px.
+const LEVEL_SIGMAS: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Iterations (translation, affine) at each level before the finest, for two schedules. The rim of a growing
+/// cluster moves farther than a fine level can follow, so the map is affine from the coarsest level on. A
+/// cluster that leaves the view has too few pixels at coarse levels, so the second schedule begins finer.
 const WAYS: [[[usize; 2]; FINE]; 2] = [[[4, 4], [3, 3], [3, 3]], [[0, 0], [4, 0], [3, 3]]];
-/// Those at the finest level.
+/// Iterations (translation, affine) at the finest level.
 const FINE_STEPS: [usize; 2] = [1, 6];
-/// Most pixels that vote at each level: neighbours say the same in coarse pictures.
-const VOTERS: [usize; 4] = [200, 400, 800, usize::MAX];
-/// A step shorter than this, px, is the last one at its level.
-const SETTLED: f64 = 1e-3;
-/// Least deviation of the residual, grey levels: frames are rounded.
-const LEAST_DEVIATION: f64 = 0.3;
-/// Mean absolute deviation from the median, to the deviation of a normal distribution.
-const MAD: f64 = 1.4826;
-/// Deviation beforehand of a translation from its start, px, and of what the derivatives change within the
-/// cluster's radius over that radius.
-const PRIOR: [f64; 2] = [16.0, 0.15];
-/// Pixels that an affine map needs.
-const AFFINE_PIXELS: usize = 40;
+/// Largest number of pixels at each level: neighbours are redundant in coarse views.
+const MAX_VOTERS: [usize; 4] = [200, 400, 800, usize::MAX];
+/// Convergence tolerance at a level, px.
+const MIN_STEP: f64 = 1e-3;
+/// Floor of the standard deviation of the residual, grey levels: frames are rounded.
+const MIN_NOISE_STD: f64 = 0.3;
+/// Prior standard deviations: of the translation from its start, px, and of the derivatives times the cluster
+/// radius over that radius.
+const PRIOR_STD: [f64; 2] = [16.0, 0.15];
+/// Smallest number of pixels for an affine map.
+const MIN_AFFINE_PIXELS: usize = 40;
 /// The finest level.
-const FINE: usize = SIGMAS.len() - 1;
-/// Where residuals are truncated for comparison, grey levels.
-const TRUNCATED: f64 = 30.0;
+const FINE: usize = LEVEL_SIGMAS.len() - 1;
+/// Truncation of residuals in comparisons, grey levels.
+const MAX_RESIDUAL: f64 = 30.0;
 
 /// A frame smoothed at every level.
 #[derive(Debug, Clone)]
-pub(super) struct SmoothedLevels([Frame<f32>; SIGMAS.len()]);
+pub(super) struct SmoothedLevels([Frame<f32>; LEVEL_SIGMAS.len()]);
 
 impl SmoothedLevels {
     /// Smooths a frame in grey levels.
     pub fn new(frame: &Frame<f32>) -> Self {
-        // Deviations of this size are always taken; each level is smoothed from the frame itself, so that NaN
-        // stays where it reaches.
-        Self(SIGMAS.map(|sigma| {
+        // Each level is smoothed from the frame itself, so that NaN does not spread farther than the kernel.
+        Self(LEVEL_SIGMAS.map(|sigma| {
             GaussianSmoother::with(f64::from(sigma), 3.0, crate::image::Border::Reflect)
                 .map_or_else(|_| frame.clone(), |smoother| smoother.apply(frame))
         }))
     }
 
-    /// The same frame under another exposure.
+    /// The frame under another exposure.
     pub fn exposed(&self, exposure: &Exposure) -> Self {
         Self(self.0.each_ref().map(|frame| exposure.applied(frame)))
     }
 
-    /// The frame with all its edges, as at the finest level.
+    /// The frame at the finest level.
     pub fn sharpest(&self) -> &Frame<f32> {
         &self.0[FINE]
     }
 
-    /// The frame with what noise there is averaged out, but not yet the edges.
+    /// The frame at the level before the finest: less noise, edges kept.
     pub fn smooth(&self) -> &Frame<f32> {
         &self.0[FINE - 1]
     }
 }
 
-/// A motion in the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PlaneMotion {
-    /// Flow and derivatives at the centre.
-    pub flow: AffineFlow<f64>,
-    /// Medians of the pixels along x and y, px.
-    pub centre: [f64; 2],
-    /// Truncated mean absolute difference left, grey levels.
-    pub residual: f64,
-    /// Deviation of the difference left, from its median, grey levels.
-    pub deviation: f64,
-}
-
-impl PlaneMotion {
-    /// Where a pixel goes, px.
-    pub fn moved(&self, x: f64, y: f64) -> [f64; 2] {
-        let (u, v) = self.flow.at_offset(x - self.centre[0], y - self.centre[1]);
-        [x + u, y + v]
-    }
-}
-
-/// Finds the motion of pixels `(x, y)` between two smoothed frames from the best of some first guesses of the
-/// translation, px.
+/// Estimates the motion of pixels `(x, y)` between two smoothed frames from several starts of the
+/// translation, px; the smallest truncated residual wins.
 ///
-/// `None` where fewer than half of the pixels stay in the picture, there are fewer than three, or the
-/// equations have no solution.
+/// `None` for fewer than three pixels, if fewer than half of them stay in the view, or for singular
+/// equations.
 pub(super) fn affine_motion(
     before: &SmoothedLevels,
     after: &SmoothedLevels,
@@ -115,15 +91,7 @@ pub(super) fn affine_motion(
     let (mut map, _) = best?;
     let start = [map[0], map[1]];
     task.descend(FINE, FINE_STEPS, &mut map, &start)?;
-    task.told(&map)
-}
-
-/// Medians of the pixels along x and y: unlike their mean, stray pixels hardly move them.
-pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
-    [0, 1].map(|i| {
-        let mut along: Vec<f64> = pixels.iter().map(|pixel| pixel[i]).collect();
-        median(&mut along).unwrap_or(f64::NAN)
-    })
+    task.motion_of(&map)
 }
 
 #[cfg(test)]

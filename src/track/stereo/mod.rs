@@ -1,31 +1,37 @@
 //! Moving objects in stereo sequences, from disparity and luminance fused in a mixture of Gaussians.
 //!
 //! Source: the stereo paper, "tracking of moving objects in stereo sequences by fusing disparity and
-//! luminance" (variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x,
-//! y, d); a mixture clusters the voxels, weighted by their counts; each cluster is followed to the next step
-//! in the picture and in depth; overlaps in both directions of time are arcs of a graph of clusters, whose
-//! chains are the tracks. Cameras may move, nothing is learnt beforehand.
+//! luminance" (variational mixture of Gaussians). A pair of views passes the files in this order:
 //!
-//! Everything is told in the left view: positions `(x, y)` px, disparity `d = x_left - x_right` (near is
-//! large), motion `(u, v)` px/step and `w` disparity/step. [`StereoMode::Paper`] is the paper's text;
-//! [`StereoMode::Improved`] measures motion to fractions of a pixel first and carries the clusters along.
+//! * [`voxels`]: edge pixels with a disparity, counted in voxels of (x, y, d);
+//! * [`cell_luminance`], [`lucas_kanade`]: the left view reduced to cells, and smoothed at four levels;
+//! * [`measured_motion`]: [`cluster_motion`] of the last step's clusters, under the [`exposure`] of this one,
+//!   and its [`depth_change`] (paper mode: [`cell_motion`]);
+//! * [`warm_start`]: the mixture carried to this step, new seeds, split and merge;
+//! * [`clusters`]: voxels and pixels of each component; [`overlap`] with the last step; [`succession`];
+//! * [`association`]: which track each component is, over time gaps of the [`clock`];
+//! * [`own_pixels`], [`grouping`], [`graph`], [`step`]: middles, objects, arcs and the result.
+//!
+//! [`tracker`] calls them. All results refer to the left view: positions `(x, y)` px, disparity
+//! `d = x_left - x_right` (near is large), motion `(u, v)` px/step and `w` disparity/step.
+//! [`StereoMode::Paper`] is the paper's text; [`StereoMode::Improved`] measures motion to fractions of a pixel
+//! first and carries the clusters along. Model and limits: `docs/stereo_tracker.md`.
 
+mod association;
 mod cell_luminance;
+mod cell_motion;
+mod clock;
+mod cluster_motion;
 mod clusters;
-mod disparity_change;
+mod depth_change;
 mod exposure;
-mod fine_motion;
 mod graph;
 mod grouping;
-mod identity;
 mod lucas_kanade;
 mod measured_motion;
-mod moment;
-mod motion;
 mod options;
 mod overlap;
 mod own_pixels;
-mod settings;
 mod step;
 mod succession;
 mod tracker;

@@ -1,15 +1,16 @@
-//! How the stereo tracker works.
+//! Options of the stereo tracker.
 
 mod check;
 
+use crate::mixture::{CovariancePrior, MixtureOptions};
 use crate::parallel::Threads;
-use crate::stereo::Method;
+use crate::stereo::{EdgeDisparityOptions, Method};
 
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StereoMode {
-    /// Motion is measured first, by affine Lucas-Kanade, and carries the mixture to the next step; what is
-    /// hidden is recognised. The default.
+    /// Motion is measured by affine Lucas-Kanade and carries the mixture to the next step; hidden objects are
+    /// recognised. The default.
     #[default]
     Improved,
     /// The stereo paper's text: a new mixture each step, template matching in cells, overlaps in both
@@ -37,8 +38,8 @@ pub struct VoxelGrid {
     pub columns: usize,
     /// Cells along y; default 60.
     pub rows: usize,
-    /// Layers of one disparity each; default 64. The disparity after the last layer's is counted in it, and
-    /// so is what refinement led at most 1.5 px farther; anything else is left out.
+    /// Layers of one disparity each; default 64. The greatest disparity is counted in the last layer, as is
+    /// what refinement moved up to 1.5 px beyond; other disparities are left out.
     pub layers: usize,
     /// Disparity of the first layer, px; default -40.
     pub first_disparity: i32,
@@ -76,22 +77,21 @@ impl StereoCamera {
     }
 }
 
-/// When and how far lost tracks are waited for (`improved`).
+/// Recognition of lost tracks (`improved`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recognition {
-    /// A component that covers less of its moved self loses its track; default 0.2.
+    /// Overlap of a component with its moved self below which it loses its track; default 0.2.
     pub least_overlap: f64,
-    /// Ordinary steps that a lost track is waited for; default 10.
+    /// Ordinary steps that a lost track is kept; default 10.
     pub patience: usize,
-    /// How far from where it is expected a new component may be to be the lost one, cells along x, y and
-    /// disparity; default (3, 4, 1).
+    /// Tolerance of the position of a recognised track, cells along x, y and disparity; default (3, 4, 1).
     pub tolerance: [f64; 3],
-    /// How much farther for each ordinary step since it was lost; default (0.5, 0.5, 0.2).
+    /// Growth of the tolerance per ordinary step; default (0.5, 0.5, 0.2).
     pub tolerance_per_step: [f64; 3],
-    /// Steps of like motion after which a track is steady; default 2.
+    /// Steps without a jump after which a track is steady; default 2.
     pub steady: usize,
-    /// Most ordinary steps that a steady track coasts through a jump behind which less than 0.6 of its pixels
-    /// are seen; default 3.
+    /// Largest number of ordinary steps that a steady track coasts through a jump with a support below 0.6;
+    /// default 3.
     pub coast: usize,
     /// A jump in the picture: change of the motion, px per ordinary step; default 24.
     pub jump: f64,
@@ -114,15 +114,14 @@ impl Default for Recognition {
     }
 }
 
-/// When clusters belong together (`improved`).
+/// Grouping of clusters (`improved`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
-    /// Farthest that clusters which touch are apart in the picture, cells; default 3.5.
+    /// Largest distance of grouped clusters, cells; default 3.5.
     pub reach: f64,
-    /// Most that their affine motions differ, median over the pixels of both, px per ordinary step; default
-    /// 1.
+    /// Largest median difference of their affine motions, px per ordinary step; default 1.
     pub motion: f64,
-    /// Most that their motions in depth differ, disparity per ordinary step; default 0.15.
+    /// Largest difference of their depth motions, disparity per ordinary step; default 0.15.
     pub depth_motion: f64,
 }
 
@@ -140,12 +139,12 @@ pub struct StereoTrackerOptions {
     pub mode: StereoMode,
     /// Grid of the voxels.
     pub grid: VoxelGrid,
-    /// Least and greatest disparity looked for, px; default (-40, 24).
+    /// Smallest and largest disparity, px; default (-40, 24).
     pub disparity_range: [i32; 2],
-    /// Least and greatest offset of rows looked for, px; default (-4, 4).
+    /// Smallest and largest row offset, px; default (-4, 4).
     pub row_range: [i32; 2],
     /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated
-    /// at the first step that shows enough and kept as long as the views agree with it (`SemiGlobal`).
+    /// at the first suitable step and monitored (`SemiGlobal`).
     pub row_offset: Option<f64>,
     /// How views are matched; default classes (`paper`), semi-global (`improved`).
     pub matching: Method,
@@ -159,9 +158,9 @@ pub struct StereoTrackerOptions {
     pub degrees_of_freedom_prior: f64,
     /// Diagonal of `W_0^-1` of (9), cells^2; default 0.1.
     pub covariance_prior: f64,
-    /// Most rounds of the mixture from a cold start; default 100.
+    /// Most iterations of a cold start; default 100.
     pub max_iter: usize,
-    /// Most rounds from where the last step's components moved to (`improved`); default 30.
+    /// Most iterations from carried components (`improved`); default 30.
     pub warm_max_iter: usize,
     /// The mixture stops when its lower bound grows by less than this for each pixel; none: never. Default
     /// none (`paper`), 1e-4 (`improved`).
@@ -170,28 +169,26 @@ pub struct StereoTrackerOptions {
     pub n_init: usize,
     /// Components with fewer pixels are dropped while fitting; default 0, which drops none.
     pub prune_weight: f64,
-    /// Seed of the cold starts; default 0.
+    /// Seed of cold starts; default 0.
     pub random_state: u64,
-    /// How far templates and depths are searched from one ordinary step to the next, cells and disparities;
-    /// default 8. Over a gap farther in proportion, at most 64.
+    /// Search reach from one ordinary step to the next, cells and disparities; default 8. Grows with the gap,
+    /// at most to 64.
     pub search: usize,
     /// Levels of the reduced luminance; default 64.
     pub luminance_levels: usize,
-    /// Least score of an arc that tracks follow, 0 to 2; default 0.4.
+    /// Smallest score of an arc that continues a track, 0 to 2; default 0.4.
     pub arc_threshold: f64,
-    /// Components with fewer pixels after moving are seeded anew, and a start from seeds is looked over for
-    /// pieces of one surface and for small things that share a component (`improved`); 0: neither; default
-    /// 20.
+    /// Components with fewer pixels are seeded again, and cold starts are split and merged (`improved`); 0:
+    /// neither; default 20.
     pub reseed_below: f64,
-    /// Whether lost tracks are waited for (`improved`).
+    /// Recognition of lost tracks (`improved`).
     pub recognition: Option<Recognition>,
-    /// Whether clusters that move alike are put together (`improved`).
+    /// Grouping of clusters (`improved`).
     pub grouping: Option<Grouping>,
     /// The cameras, if depths are wanted.
     pub camera: Option<StereoCamera>,
-    /// Time between ordinary steps, in the unit that times are told and velocities are counted in; default 1,
-    /// a step. Everything here that is counted in steps means these; 1/30 where times are in seconds and
-    /// every frame is taken of 30 a second.
+    /// Duration of an ordinary step, in the unit of times and velocities; default 1. Every number of steps in
+    /// these options means ordinary steps; 1/30 for times in seconds and 30 frames a second.
     pub step_time: f64,
     /// Number of threads; results do not depend on it.
     pub threads: Threads,
@@ -237,14 +234,49 @@ impl StereoTrackerOptions {
         }
     }
 
-    /// The same for another range of disparities, with a layer of the grid for each but the greatest, which
-    /// is counted with the one before it.
+    /// Sets the range of disparities, with one layer of the grid each; the greatest one shares the layer
+    /// before it.
     pub fn with_disparities(mut self, range: [i32; 2]) -> Self {
         let [least, greatest] = range;
         self.disparity_range = range;
         self.grid.first_disparity = least;
         self.grid.layers = greatest.saturating_sub(least).max(1) as usize;
         self
+    }
+}
+
+impl StereoTrackerOptions {
+    /// Options of the matching.
+    pub(super) fn matching_options(&self, row_offset: Option<f64>) -> EdgeDisparityOptions {
+        let ([least, greatest], [first_row, last_row]) = (self.disparity_range, self.row_range);
+        EdgeDisparityOptions {
+            method: self.matching,
+            disparity_range: (least, greatest),
+            row_range: (first_row, last_row),
+            row_offset,
+            threads: self.threads,
+            ..EdgeDisparityOptions::default()
+        }
+    }
+
+    /// Options of the mixture, from carried components or from seeds.
+    pub(super) fn mixture_options(&self, carried: bool, step: usize) -> MixtureOptions {
+        MixtureOptions {
+            components: self.components,
+            weight_concentration_prior: self.weight_concentration_prior,
+            mean_precision_prior: self.mean_precision_prior,
+            mean_prior: None,
+            degrees_of_freedom_prior: Some(self.degrees_of_freedom_prior),
+            covariance_prior: CovariancePrior::Isotropic(self.covariance_prior),
+            max_iter: if carried { self.warm_max_iter } else { self.max_iter },
+            tol: self.tol,
+            n_init: self.n_init,
+            // Carried components keep their numbers.
+            prune_weight: if carried { 0.0 } else { self.prune_weight },
+            random_state: self.random_state.wrapping_add(step as u64),
+            threads: self.threads,
+            ..MixtureOptions::default()
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::clusters::Clusters;
 /// Shares of a cluster's voxels that the clusters of another step occupy, once it is moved.
 pub(super) type Row = Vec<f64>;
 
-/// How far a cluster went in depth, and whom it meets there.
+/// Motion of a cluster in depth, and its overlaps there.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Depth {
     /// Layers, disparity.
@@ -51,8 +51,8 @@ pub(super) fn depth_motion(
     Depth { shift, overlaps: counts.into_iter().map(|n| f64::from(n) / all).collect() }
 }
 
-/// Shares of a cluster's voxels that each cluster of `other` meets once every edge pixel is moved by itself:
-/// `moved` tells where pixel `i` is then, `(x, y, d)`, px. As (32), for motions that are not whole cells.
+/// Shares of a cluster's voxels that meet each cluster of `other`, after pixel `i` moved to `moved(i)`, `(x,
+/// y, d)`, px: (32) for motions that are not whole cells.
 pub(super) fn moved_overlaps(
     clusters: &Clusters,
     cluster: usize,
@@ -70,8 +70,7 @@ pub(super) fn moved_overlaps(
             row[met] += 1.0;
         }
     }
-    // What left the picture counts as not met: the cluster's own number of voxels is the least that there
-    // are.
+    // Voxels outside the view count as not met.
     let all = cells.len().max(clusters.members[cluster].len()).max(1) as f64;
     for share in &mut row {
         *share /= all;
@@ -81,7 +80,7 @@ pub(super) fn moved_overlaps(
 
 #[cfg(test)]
 mod tests {
-    use super::super::clusters::tests::made_up;
+    use super::super::clusters::tests::synthetic_clusters;
     use super::*;
 
     /// A block of voxels of one cluster.
@@ -91,35 +90,35 @@ mod tests {
 
     #[test]
     fn the_shift_in_depth_is_where_most_voxels_meet() {
-        let before = made_up(&[block([10, 10, 30], 0), block([40, 10, 30], 1)].concat(), 2);
-        let after = made_up(&[block([12, 9, 33], 1), block([40, 10, 30], 0)].concat(), 2);
+        let before = synthetic_clusters(&[block([10, 10, 30], 0), block([40, 10, 30], 1)].concat(), 2);
+        let after = synthetic_clusters(&[block([12, 9, 33], 1), block([40, 10, 30], 0)].concat(), 2);
         let depth = depth_motion(&before, 0, &after, [2, -1], 8);
         assert_eq!(depth, Depth { shift: 3, overlaps: vec![0.0, 1.0] });
         // Half of it is beyond: still 3, with half of the overlap.
-        let half = made_up(&block([14, 9, 33], 1), 2);
+        let half = synthetic_clusters(&block([14, 9, 33], 1), 2);
         assert_eq!(depth_motion(&before, 0, &half, [2, -1], 8).overlaps, [0.0, 0.5]);
     }
 
     #[test]
     fn voxels_count_whatever_they_hold() {
-        // Of two voxels one holds nine pixels; who meets it alone meets half.
-        let before = made_up(&[vec![([10, 10, 30], 0); 9], vec![([11, 10, 30], 0)]].concat(), 1);
-        let after = made_up(&[([10, 10, 30], 0), ([11, 10, 30], 1)], 2);
+        // Of two voxels one holds nine pixels; each counts as half.
+        let before = synthetic_clusters(&[vec![([10, 10, 30], 0); 9], vec![([11, 10, 30], 0)]].concat(), 1);
+        let after = synthetic_clusters(&[([10, 10, 30], 0), ([11, 10, 30], 1)], 2);
         assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8).overlaps, [0.5, 0.5]);
         assert_eq!(moved_overlaps(&before, 0, &after, |i| before.points.at(i)), [0.5, 0.5]);
     }
 
     #[test]
     fn whom_nobody_meets_stays_and_overlaps_nothing() {
-        let before = made_up(&block([10, 10, 30], 0), 1);
-        let after = made_up(&block([60, 40, 5], 0), 1);
+        let before = synthetic_clusters(&block([10, 10, 30], 0), 1);
+        let after = synthetic_clusters(&block([60, 40, 5], 0), 1);
         assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8), Depth { shift: 0, overlaps: vec![0.0] });
     }
 
     #[test]
     fn pixels_moved_by_themselves_meet_the_same() {
-        let before = made_up(&block([10, 10, 30], 0), 1);
-        let after = made_up(&block([12, 9, 33], 2), 3);
+        let before = synthetic_clusters(&block([10, 10, 30], 0), 1);
+        let after = synthetic_clusters(&block([12, 9, 33], 2), 3);
         let moved = |i: usize| {
             let [x, y, d] = before.points.at(i);
             [x + 16.0, y - 8.0, d + 3.2]

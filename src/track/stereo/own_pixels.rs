@@ -1,46 +1,43 @@
-//! Which pixels of a cluster show its own surface.
+//! Pixels of a cluster that show its own surface.
 //!
-//! An edge is located to a pixel: along the outline of a thing half of its edge pixels lie just beyond the
-//! line, on what is behind it, and which half differs from side to side. They move with the thing, and have
-//! its disparity, but medians over the cluster's pixels shift by rows where they are many on one side; of
-//! what grows or shrinks the motion there is another. A pixel shows what it has the brightness of.
+//! Half of the edge pixels along an outline lie just beyond it, on the background. They have the object's
+//! motion and disparity, but bias medians of positions. Their brightness is that of the background.
 
+use super::cluster_motion::middle;
+use super::cluster_motion::places;
 use super::clusters::Clusters;
-use super::fine_motion::places;
-use super::lucas_kanade::middle;
 use crate::image::Interpolation;
 use crate::types::Frame;
 
 /// Side of the squares that pixels are sorted into, px.
-const SQUARE: f64 = 8.0;
-/// How many squares about its own belong to a pixel's neighbourhood on every side.
+const CELL_SIDE: f64 = 8.0;
+/// Neighbouring squares on every side.
 const RINGS: i64 = 3;
 /// Radius of the neighbourhood, px.
-const RADIUS: f64 = SQUARE * RINGS as f64;
-/// Farther along the gradient than this, px, a neighbour is on one side of the edge and not on it.
+const RADIUS: f64 = CELL_SIDE * RINGS as f64;
+/// Distance along the gradient above which a neighbour is off the edge, px.
 const ON_EDGE: f64 = 2.0;
-/// Farther along the edge than so many times the distance from it, a neighbour may be on it as well: the
-/// gradient is not known better.
-const ALONG: f64 = 2.5;
-/// Neighbours that make a side of an edge one that the cluster is on.
-const LEAST_NEIGHBOURS: usize = 3;
-/// Distances, px, at which the brightness on both sides of an edge is taken.
+/// Distance along the edge over that from it, above which a neighbour may be on the edge: the gradient
+/// direction is uncertain.
+const MIN_ASPECT: f64 = 2.5;
+/// Smallest number of neighbours on the cluster's side of an edge.
+const MIN_NEIGHBOURS: usize = 3;
+/// Distances from the edge at which brightness is sampled, px.
 const SIDES: [f64; 3] = [2.0, 2.5, 3.0];
-/// Least share of the way from the brightness beyond an edge to that before it of a pixel that is before it:
-/// half, and what makes those exactly on the line, which are on neither side, not go by the noise.
-const BEFORE: f64 = 0.55;
-/// Share of the neighbours of pixels in general below which a pixel is a stray one.
-const STRAY: f64 = 0.1;
+/// Smallest share of the contrast above the background of an own pixel: half, and a margin for noise.
+const MIN_BRIGHTNESS_SHARE: f64 = 0.55;
+/// Density over the median density below which a pixel is an outlier.
+const MIN_DENSITY_RATIO: f64 = 0.1;
 
-/// A view: as it is, and with so little smoothing that its gradient is told.
+/// A view, and its slightly smoothed version for gradients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View<'a> {
     pub plain: &'a Frame<f32>,
     pub smooth: &'a Frame<f32>,
 }
 
-/// Medians along x and y, px, of the pixels of a cluster that show its own surface: neither stray ones, nor
-/// those of its outline that are beyond it. Of all where hardly half would be left.
+/// Medians along x and y, px, of the pixels on the cluster's own surface, without outliers; of all pixels if
+/// fewer than half remain.
 pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64; 2] {
     let all = places(clusters, k);
     if !crate::ablation::keeps("stereo.own_pixels") {
@@ -56,7 +53,7 @@ fn own_places(all: &[[f64; 2]], view: View<'_>) -> Vec<[f64; 2]> {
     let crowds = squares.crowds(all);
     let mut sorted = crowds.clone();
     sorted.sort_unstable();
-    let least = sorted.get(sorted.len() / 2).map_or(0.0, |usual| STRAY * *usual as f64);
+    let least = sorted.get(sorted.len() / 2).map_or(0.0, |usual| MIN_DENSITY_RATIO * *usual as f64);
     let own = |&(&place, &crowd): &(&[f64; 2], &usize)| crowd as f64 >= least && !is_beyond(place, &squares, view);
     all.iter().zip(&crowds).filter(own).map(|(place, _)| *place).collect()
 }
@@ -72,7 +69,7 @@ fn is_beyond([x, y]: [f64; 2], squares: &Squares<'_>, view: View<'_>) -> bool {
     let mean = |sign: f64| SIDES.iter().map(|distance| at(sign * distance)).sum::<f64>() / SIDES.len() as f64;
     let (before, beyond) = (mean(1.0), mean(-1.0));
     let contrast = before - beyond;
-    (at(0.0) - beyond) * contrast < BEFORE * contrast * contrast
+    (at(0.0) - beyond) * contrast < MIN_BRIGHTNESS_SHARE * contrast * contrast
 }
 
 /// Direction of the gradient at a pixel; `None` beside the border and where there is none.
@@ -144,7 +141,7 @@ impl<'a> Squares<'a> {
         for other in self.about(square_of(x), square_of(y)).flatten() {
             let (dx, dy) = (other[0] - x, other[1] - y);
             let (from, along) = (dx * normal[0] + dy * normal[1], dy * normal[0] - dx * normal[1]);
-            let aside = from.abs() > ON_EDGE && along.abs() <= ALONG * from.abs();
+            let aside = from.abs() > ON_EDGE && along.abs() <= MIN_ASPECT * from.abs();
             if !aside || dx * dx + dy * dy > RADIUS * RADIUS {
                 continue;
             }
@@ -154,23 +151,22 @@ impl<'a> Squares<'a> {
             }
         }
         match counts {
-            [before, 0] if before >= LEAST_NEIGHBOURS => Some(1.0),
-            [0, before] if before >= LEAST_NEIGHBOURS => Some(-1.0),
+            [before, 0] if before >= MIN_NEIGHBOURS => Some(1.0),
+            [0, before] if before >= MIN_NEIGHBOURS => Some(-1.0),
             _ => None,
         }
     }
 }
 
 fn square_of(along: f64) -> i64 {
-    (along / SQUARE) as i64
+    (along / CELL_SIDE) as i64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A bright thing from `left` to `left + 40` px and as high, on black; its outline is as wide as that of
-    /// a picture is, and what it shows has edges within.
+    /// A bright square from `left` to `left + 40` px on black, with a blurred outline and inner edges.
     fn square(left: f64) -> Frame<f32> {
         let ramp = |along: f64| (along / 1.4 + 0.5).clamp(0.0, 1.0);
         Frame::from_fn(120, 120, |x, y| {

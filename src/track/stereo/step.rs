@@ -1,4 +1,4 @@
-//! What the tracker says of a step, and of a track.
+//! Result of a step, and a track.
 
 use super::graph::Node;
 
@@ -25,10 +25,10 @@ pub struct Step {
     /// How many rows lower the right view shows a point, px, as the views were matched; none where
     /// disparities were given.
     pub row_offset: Option<f64>,
-    /// Whether that was searched and the views hardly agree with it, see
+    /// Whether it was searched and the views disagree with it, see
     /// [`EdgeDisparity`](crate::stereo::EdgeDisparity::rows_doubtful).
     pub rows_doubtful: bool,
-    /// Rounds of the mixture; 0 where there was nothing to cluster.
+    /// Iterations of the mixture; 0 without edge pixels.
     pub rounds: usize,
 }
 

@@ -1,19 +1,15 @@
-//! Which component of a step goes on for which one of the last: a component is the object that most of it
-//! moves with.
+//! Renumbers components so that each keeps the object that most of it moves with.
 //!
-//! Two components may lie in one flat thing, a large one and a few pixels at its rim. Both explain it, the
-//! sharper one wins, and once in a while that is the small one: it takes the thing over, and the large one is
-//! left with the rim.
+//! Two components may share a flat object, a large one and a few pixels at its rim. Both explain it, the
+//! sharper one wins; if that is the small one, it takes the object over.
 
 use super::overlap::Row;
 
-/// What each component is called from now on: as the one of the last step with which it shares most voxels,
-/// where that is true of both and their arc is of at least `least`. The others keep their names as far as
-/// these are free, and else get what is left over.
+/// New number of each component: that of the component of the last step with which it shares most voxels, if
+/// mutual and with an arc of at least `least`. The others keep their numbers if free, or get a remaining one.
 ///
-/// `forward` and `backward` are the overlaps of every component of the last step with every one of this step,
-/// and the other way round; `sizes` are the voxels of both steps' components. Shares alone would do for none:
-/// all of a few pixels goes into whatever takes them over, and so does all of a large thing.
+/// `forward` and `backward`: overlaps of the components of both steps; `sizes`: their voxels. Shares alone do
+/// not suffice: all of a few pixels, and all of a large object, go into the component that takes them over.
 pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2], least: f64) -> Vec<usize> {
     let count = backward.len();
     if forward.len() != count {
@@ -44,13 +40,6 @@ pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2]
     }
     let mut free = (0..count).filter(|k| !taken[*k]).collect::<Vec<_>>().into_iter();
     names.into_iter().map(|name| name.or_else(|| free.next()).expect("as many names as components")).collect()
-}
-
-/// Puts what belongs to each component where its name says.
-pub(super) fn reordered<T>(values: Vec<T>, names: &[usize]) -> Vec<T> {
-    let mut named: Vec<(usize, T)> = names.iter().copied().zip(values).collect();
-    named.sort_by_key(|(name, _)| *name);
-    named.into_iter().map(|(_, value)| value).collect()
 }
 
 #[cfg(test)]
@@ -90,10 +79,5 @@ mod tests {
         // 0 goes into 1, which has been there all along.
         assert_eq!(named([[0.0, 0.6, 0.0], [0.0, 0.9, 0.0], [0.0; 3]]), [0, 1, 2]);
         assert_eq!(successors(&[], &[vec![], vec![]], [&[], &[0, 0]], 0.4), [0, 1]);
-    }
-
-    #[test]
-    fn what_belongs_to_components_goes_with_their_names() {
-        assert_eq!(reordered(vec!['a', 'b', 'c'], &[2, 0, 1]), ['b', 'c', 'a']);
     }
 }

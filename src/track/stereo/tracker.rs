@@ -6,11 +6,11 @@ mod expected;
 mod meeting;
 mod record;
 
+use super::association::TrackAssociation;
 use super::cell_luminance::CellLuminance;
+use super::cell_motion::ObservedStep;
+use super::clock::{Clock, GAP_RANGE};
 use super::graph::TrackGraph;
-use super::identity::Identities;
-use super::moment::{GAPS, Moment};
-use super::motion::Seen;
 use super::options::{StereoMode, StereoTrackerOptions};
 use super::step::{Step, Track};
 use super::voxels::{EdgePoints, Lattice, Voxels};
@@ -20,29 +20,29 @@ use crate::stereo::{EdgeDisparity, FilmRows};
 use crate::types::Frame;
 use std::collections::BTreeMap;
 
-/// Follows everything that moves before a pair of cameras, which may move too.
+/// Tracks all moving objects before a pair of cameras, which may move.
 ///
-/// It is deterministic: the same steps give the same result, bit for bit, on any number of threads. Memory
-/// grows with the graph only.
+/// Deterministic: the same steps give the same result, bit for bit, on any number of threads. Only the graph
+/// grows with time.
 #[derive(Debug)]
 pub struct StereoTracker {
     options: StereoTrackerOptions,
     lattice: Option<Lattice>,
     time: usize,
-    /// When the step that is being taken is, or the last one was.
-    moment: Moment,
-    /// Time from the last step to the next, where that was told.
+    /// Time of the current or last step.
+    clock: Clock,
+    /// Given time from the last step to the next.
     waited: Option<f64>,
     /// Offset of the right view's rows.
     rows: FilmRows,
-    last: Option<Seen>,
+    last: Option<ObservedStep>,
     posterior: Option<Posterior>,
-    identities: Identities,
+    association: TrackAssociation,
     graph: TrackGraph,
     tracks: BTreeMap<u64, Track>,
 }
 impl StereoTracker {
-    /// A tracker that has seen nothing yet.
+    /// A tracker before its first step.
     ///
     /// # Errors
     /// [`Error::Argument`] naming an option out of range.
@@ -50,14 +50,14 @@ impl StereoTracker {
         options.check()?;
         Ok(Self {
             rows: FilmRows::new(options.row_offset),
-            moment: Moment { now: 0.0, gap: 1.0, step_time: options.step_time },
+            clock: Clock { now: 0.0, gap: 1.0, step_time: options.step_time },
             waited: None,
             options,
             lattice: None,
             time: 0,
             last: None,
             posterior: None,
-            identities: Identities::default(),
+            association: TrackAssociation::default(),
             graph: TrackGraph::default(),
             tracks: BTreeMap::new(),
         })
@@ -68,8 +68,7 @@ impl StereoTracker {
         &self.options
     }
 
-    /// How many rows lower the right view shows a point, px, where that is given or was found and the views
-    /// still agree with it.
+    /// Row offset of the right view, px, if given or estimated and still valid.
     pub fn row_offset(&self) -> Option<f64> {
         self.rows.known()
     }
@@ -89,16 +88,14 @@ impl StereoTracker {
         &self.tracks
     }
 
-    /// Says how long after the last step the next one is, in the unit of [`StereoTrackerOptions::step_time`]:
-    /// 2 where a frame is missing. Without it, an ordinary step. Velocities are for the unit of time, motions
-    /// are predicted and limits that are counted in steps hold over the time that went by. Of the first step
-    /// it means nothing.
+    /// Sets the time from the last step to the next one, in the unit of [`StereoTrackerOptions::step_time`]:
+    /// 2 where a frame is missing; default: an ordinary step. Predictions and limits in steps refer to the
+    /// elapsed time. No effect on the first step.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `dt` unless it is a time above 0, from a millionth of an ordinary step to a
-    /// million of them.
+    /// [`Error::Argument`] named `dt` unless it is from a millionth to a million of an ordinary step.
     pub fn after(&mut self, dt: f64) -> Result<&mut Self> {
-        if !GAPS.contains(&(dt / self.options.step_time)) {
+        if !GAP_RANGE.contains(&(dt / self.options.step_time)) {
             return Err(Error::argument("dt", "a time above 0, from a millionth to a million of step_time", dt));
         }
         self.waited = Some(dt);
@@ -131,14 +128,14 @@ impl StereoTracker {
     }
 
     fn check(&self, left: &Frame<f32>, points: &EdgePoints) -> Result<Lattice> {
-        let told = |(width, height): (usize, usize)| format!("({height}, {width})");
+        let shape = |(width, height): (usize, usize)| format!("({height}, {width})");
         let lattice = Lattice { grid: self.options.grid, size: left.size() };
         if let Some(known) = self.lattice.filter(|known| known.size != lattice.size) {
-            let expected = format!("a view as large as before, {}", told(known.size));
-            return Err(Error::argument("left", expected, told(lattice.size)));
+            let expected = format!("a view as large as before, {}", shape(known.size));
+            return Err(Error::argument("left", expected, shape(lattice.size)));
         }
         if left.data().is_empty() {
-            return Err(Error::argument("left", "a view (H, W) with pixels", told(lattice.size)));
+            return Err(Error::argument("left", "a view (H, W) with pixels", shape(lattice.size)));
         }
         let count = points.len();
         if points.rows.len() != count || points.columns.len() != count {
@@ -152,7 +149,7 @@ impl StereoTracker {
         };
         match (0..count).find(|i| !usable(i)) {
             Some(i) => {
-                let expected = format!("pixels of the view {} with a finite disparity", told(lattice.size));
+                let expected = format!("pixels of the view {} with a finite disparity", shape(lattice.size));
                 Err(Error::argument("points", expected, format!("{:?}", points.at(i))))
             }
             None => Ok(lattice),
@@ -160,15 +157,15 @@ impl StereoTracker {
     }
 
     /// When the next step is.
-    fn next_moment(&self) -> Moment {
-        let Moment { now, step_time, .. } = self.moment;
+    fn next_moment(&self) -> Clock {
+        let Clock { now, step_time, .. } = self.clock;
         let gap = self.waited.map_or(1.0, |dt| dt / step_time);
         let now = if self.time == 0 { 0.0 } else { now + gap };
-        Moment { now, gap, step_time }
+        Clock { now, gap, step_time }
     }
 
     fn advance(&mut self, left: &Frame<f32>, points: EdgePoints, lattice: Lattice) -> Result<Step> {
-        self.moment = self.next_moment();
+        self.clock = self.next_moment();
         let (points, left_out) = points.within(&lattice);
         let voxels = Voxels::count(&points, lattice);
         let luminance = CellLuminance::new(left, &lattice, self.options.luminance_levels);

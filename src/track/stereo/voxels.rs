@@ -5,9 +5,8 @@ use crate::types::Frame;
 
 /// Mark of a voxel that nothing is in.
 const EMPTY: u32 = u32::MAX;
-/// Farthest from a whole disparity that its refinement leads: half a pixel by the fit between candidates, one
-/// by Lucas-Kanade, px.
-const REFINED: f64 = 1.5;
+/// Largest change of a disparity by refinement, px: half a pixel between candidates, one by Lucas-Kanade.
+const MAX_REFINEMENT: f64 = 1.5;
 
 /// Edge pixels of the left view with their disparities: points `(x, y, d)`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -93,7 +92,7 @@ impl Lattice {
     /// a pixel may lead from a whole disparity that was looked for.
     pub fn holds(&self, disparity: f64) -> bool {
         let from_first = disparity - f64::from(self.grid.first_disparity);
-        (-REFINED..=self.grid.layers as f64 + REFINED).contains(&from_first)
+        (-MAX_REFINEMENT..=self.grid.layers as f64 + MAX_REFINEMENT).contains(&from_first)
     }
 
     /// Layer of a disparity: `round(d)` less the first, the ends taken in.
@@ -222,8 +221,8 @@ impl Voxels {
         [f64::from(x), f64::from(y), self.depths[n]]
     }
 
-    /// Places in cells, row-major (N, 3). Layers cut flat things where nothing is: a component of centres is
-    /// as thin as its layer, and knows nothing of those of its own points whose noise rounds to the next one.
+    /// Places in cells, row-major (N, 3). Depths are means: whole layers would make components as thin as a
+    /// layer, and those of flat objects would not explain their own noise.
     pub fn places(&self) -> Vec<f64> {
         (0..self.cells.len()).flat_map(|n| self.place(n)).collect()
     }

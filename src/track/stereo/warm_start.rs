@@ -1,39 +1,37 @@
-//! Components carried to the next step, and new seeds for those that lost their pixels; section 6.5 of the
-//! stereo tracker's design.
+//! Components carried to the next step, and new seeds for those without pixels.
 
 mod blobs;
-mod rearranged;
+mod split_merge;
 
 use self::blobs::{Blob, blobs, log_density};
-pub(super) use self::rearranged::rearrange;
+pub(super) use self::split_merge::split_and_merge;
 use super::options::StereoTrackerOptions;
 use super::voxels::Voxels;
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use nalgebra::Matrix3;
 
-/// Coordinates of a voxel.
+/// Dimensions of a voxel.
 const D: usize = 3;
 /// Standard deviations of a typical seed, cells along x, y and disparity.
-const SEED_SPREAD: [f64; D] = [2.0, 2.0, 0.7];
-/// Share of the pixels above which what is not explained is another scene.
-const ANOTHER_SCENE: f64 = 0.5;
+const SEED_STD: [f64; D] = [2.0, 2.0, 0.7];
+/// Share of unexplained pixels above which the scene counts as a new one.
+const MAX_UNEXPLAINED_SHARE: f64 = 0.5;
 
-/// How far off a moved component may be, cells along x, y and disparity: half a voxel, by which counting in
-/// whole cells of the picture alone moves one.
-const UNCERTAINTY: [f64; D] = [0.5, 0.5, 0.5];
+/// Uncertainty of a moved component, cells along x, y and disparity: half a voxel.
+const MOTION_STD: [f64; D] = [0.5, 0.5, 0.5];
 
-/// The components with their means moved, cells, and as much wider as the motion is uncertain; those without
-/// a motion stay.
+/// Moves the means by the motions, cells, and widens the components by the uncertainty; those without a
+/// motion stay.
 ///
-/// A flat component is as thin as what its pixels' disparities are told with. Moved by more than that,
-/// wrongly, it would explain few of its own voxels; its shape is found again in the first round.
+/// A flat component is as thin as the noise of disparity; after a wrong motion it would explain few of its
+/// own voxels. Its shape is recovered in the first iteration.
 pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Posterior {
     let mut out = posterior.clone();
     for (matrix, nu) in out.scale_inverses.chunks_exact_mut(D * D).zip(&out.degrees_of_freedom) {
         for i in 0..D {
             matrix[i * D + i] +=
-                if crate::ablation::keeps("stereo.widened") { 1.0 } else { 0.0 } * nu * UNCERTAINTY[i] * UNCERTAINTY[i];
+                if crate::ablation::keeps("stereo.widened") { 1.0 } else { 0.0 } * nu * MOTION_STD[i] * MOTION_STD[i];
         }
     }
     for (mean, motion) in out.means.chunks_exact_mut(D).zip(motions) {
@@ -44,16 +42,12 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components to which fewer than `reseed_below` pixels belong, or which are spread so thinly over
-/// whatever is left that they explain none, each at a blob of as many neighbouring pixels that such a seed
-/// would explain better than the others do, the largest blobs first. Tells which were seeded anew, and what
-/// is neither explained nor in such a blob; `None` where that and such blobs are most of the pixels: another
-/// scene.
+/// Seeds components with fewer than `reseed_below` pixels, or spread so thinly that they explain none, at the
+/// largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels outside of such
+/// blobs; `None` if most pixels are unexplained: a new scene.
 ///
-/// One seed a blob, with the blob's extent: several in what has just come to light would share it for a step
-/// or two, and then one of them, whichever, would take it over and with it the identity. Pixels that are
-/// explained already do not count: a seed beside a flat component could take that over, as the sharper of the
-/// two.
+/// One seed a blob: several would compete for it over the next steps and exchange tracks. Explained pixels do
+/// not count, because a seed beside a flat component could take that over.
 ///
 /// # Errors
 /// Those of the mixture.
@@ -69,16 +63,16 @@ pub(super) fn reseed(
     let least = options.reseed_below.max(1.0);
     let explained = explaining(all, options);
     let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
-    let (mut blobs, strays): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained).into_iter().partition(|blob| {
+    let (mut blobs, outliers): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained).into_iter().partition(|blob| {
         blob.pixels >= least && (!crate::ablation::keeps("stereo.thin_blobs") || blob.explains_itself(all, explained))
     });
     if crate::ablation::keeps("stereo.another_scene")
-        && unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > ANOTHER_SCENE * all
+        && unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > MAX_UNEXPLAINED_SHARE * all
     {
         return Ok(None);
     }
-    let strays = strays.into_iter().flat_map(|blob| blob.members).collect();
-    // The order of those alike is that of the voxels.
+    let outliers = outliers.into_iter().flat_map(|blob| blob.members).collect();
+    // Ties keep the order of the voxels.
     blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
     let mut pixels = vec![0.0; components];
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
@@ -90,11 +84,11 @@ pub(super) fn reseed(
         blob.place(posterior, k, options);
         seeds[k] = true;
     }
-    Ok(Some(Seeded { seeds, strays }))
+    Ok(Some(Seeded { seeds, outliers }))
 }
 
 /// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains
-/// none: what others left over.
+/// none.
 pub(super) fn is_left_over(
     posterior: &Posterior,
     k: usize,
@@ -104,11 +98,11 @@ pub(super) fn is_left_over(
     pixels < options.reseed_below || log_density(pixels / all, &covariance(posterior, k)) < explaining(all, options)
 }
 
-/// Logarithm of the density from which on a voxel counts as explained: what a typical seed with the fewest
-/// pixels would make of it, one standard deviation off.
+/// Log-density from which a voxel counts as explained: that of a typical seed with the fewest pixels at one
+/// standard deviation.
 fn explaining(all: f64, options: &StereoTrackerOptions) -> f64 {
     let least = options.reseed_below.max(1.0);
-    log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_SPREAD.map(|s| s * s).into()))
+    log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_STD.map(|s| s * s).into()))
 }
 
 /// Covariance of a component, cells^2.
@@ -116,19 +110,19 @@ fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
     Matrix3::from_row_slice(&posterior.scale_inverses[k * D * D..][..D * D]) / posterior.degrees_of_freedom[k]
 }
 
-/// What seeding did.
+/// Result of seeding.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seeded {
-    /// Which components were seeded anew.
+    /// Which components were seeded.
     pub seeds: Vec<bool>,
-    /// Voxels that nothing explains and that are too few or too thinly spread to be something: wrong matches,
-    /// which are not to be fitted.
-    pub strays: Vec<usize>,
+    /// Unexplained voxels that are too few or too thinly spread for an object: wrong matches, excluded from
+    /// the fit.
+    pub outliers: Vec<usize>,
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::clusters::tests::made_up;
+    use super::super::clusters::tests::synthetic_clusters;
     use super::*;
 
     /// Two components, one of them where nothing is.
@@ -167,10 +161,10 @@ pub(super) mod tests {
     #[test]
     fn who_has_no_pixels_goes_where_the_others_explain_least() {
         let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
-        // A block that the first explains, one that nobody does, and a single outlier farther off.
+        // A block that the first component explains, one that none does, and a single outlier.
         let cells: Vec<_> =
             block([10, 10, 30], 90).chain(block([40, 20, 20], 45)).chain(block([5, 50, 60], 1)).collect();
-        let voxels = made_up(&cells, 1).voxels;
+        let voxels = synthetic_clusters(&cells, 1).voxels;
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
@@ -194,15 +188,15 @@ pub(super) mod tests {
             .chain(block([40, 20, 20], 12, 72))
             .chain(block([70, 5, 60], 2, 2))
             .collect();
-        let voxels = made_up(&cells, 1).voxels;
+        let voxels = synthetic_clusters(&cells, 1).voxels;
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut three = with_a_third();
         let options = StereoTrackerOptions::default();
-        let told = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
+        let seeded = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
         // The second is the likeliest for all that the first does not explain, and keeps its place.
-        assert_eq!(told.seeds, [false, false, true]);
-        assert_eq!(told.strays.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
+        assert_eq!(seeded.seeds, [false, false, true]);
+        assert_eq!(seeded.outliers.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
         // Moved away from what it explained.
         let mut lost = posterior();
         lost.means[0] = 30.0;
@@ -215,7 +209,7 @@ pub(super) mod tests {
         // of its kind.
         let block = |z: u16, n: u16| (0..n).map(move |i| ([10 + i % 3, 10 + i / 3 % 3, z], 0));
         let cells: Vec<_> = block(30, 90).chain(block(31, 9)).collect();
-        let voxels = made_up(&cells, 1).voxels;
+        let voxels = synthetic_clusters(&cells, 1).voxels;
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();

@@ -1,12 +1,12 @@
-//! Descending to a minimum of what a map leaves, level by level.
+//! Gauss-Newton iterations for one cluster, level by level.
 
-use super::{
-    AFFINE_PIXELS, FINE, LEAST_DEVIATION, MAD, PRIOR, PlaneMotion, SETTLED, SmoothedLevels, TRUNCATED, VOTERS, middle,
-};
+use super::super::cluster_motion::{PlaneMotion, middle};
+use super::{FINE, MAX_RESIDUAL, MAX_VOTERS, MIN_AFFINE_PIXELS, MIN_NOISE_STD, MIN_STEP, PRIOR_STD, SmoothedLevels};
+use crate::math::MAD_TO_STD;
 use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
 
-/// A pixel that votes: its place about the centre, brightness and gradient there.
+/// A sampled pixel: place about the centre, brightness and gradient.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Voter {
     x: f32,
@@ -15,20 +15,20 @@ pub(super) struct Voter {
     gradient: [f32; 2],
 }
 
-/// A sum of a few unknowns at a time.
+/// Normal equations of N unknowns.
 type Normal<const N: usize> = (SMatrix<f64, N, N>, SVector<f64, N>);
 
-/// Mean size of residuals, each no more than [`TRUNCATED`]; NaN outside of the picture is left out.
+/// Mean absolute residual, each at most [`MAX_RESIDUAL`]; NaN (outside the view) is left out.
 fn truncated_mean(residuals: &[f32]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for residual in residuals.iter().filter(|residual| residual.is_finite()) {
-        sum += f64::from(residual.abs()).min(TRUNCATED);
+        sum += f64::from(residual.abs()).min(MAX_RESIDUAL);
         count += 1.0;
     }
     sum / count
 }
 
-/// What all levels share. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.
+/// Data of one cluster. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.
 pub(super) struct Task<'a> {
     before: &'a SmoothedLevels,
     pub(super) after: &'a SmoothedLevels,
@@ -49,8 +49,8 @@ impl<'a> Task<'a> {
         Some(Self { before, after, pixels, centre, radius: spread.sqrt().max(1.0) })
     }
 
-    /// A map as a motion, with what it leaves at the finest level.
-    pub(super) fn told(&self, map: &[f64; 6]) -> Option<PlaneMotion> {
+    /// The motion of a map, with its residual at the finest level.
+    pub(super) fn motion_of(&self, map: &[f64; 6]) -> Option<PlaneMotion> {
         let voters = self.voters(FINE);
         let mut residuals = Vec::with_capacity(voters.len());
         let deviation = self.residuals(&voters, &self.after.0[FINE], map, &mut residuals)?;
@@ -60,8 +60,8 @@ impl<'a> Task<'a> {
         Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
     }
 
-    /// A step of the map's first `N` unknowns, two for a translation and six for an affine map, from
-    /// residuals of some deviation; its length, px.
+    /// One Gauss-Newton step of the first `N` unknowns (2: translation, 6: affine) from residuals with a
+    /// standard deviation. Returns its length, px.
     pub(super) fn step<const N: usize>(
         &self,
         voters: &[Voter],
@@ -71,7 +71,7 @@ impl<'a> Task<'a> {
     ) -> Option<f64> {
         let (mut matrix, mut right) = self.normal::<N>(voters, residuals, deviation);
         for k in 0..N {
-            let (scale, from) = if k < 2 { (PRIOR[0], start[k]) } else { (PRIOR[1] * self.radius, 0.0) };
+            let (scale, from) = if k < 2 { (PRIOR_STD[0], start[k]) } else { (PRIOR_STD[1] * self.radius, 0.0) };
             let prior = (deviation / scale).powi(2);
             matrix[(k, k)] += prior;
             right[k] -= prior * (map[k] - from);
@@ -81,7 +81,7 @@ impl<'a> Task<'a> {
         Some(step.norm())
     }
 
-    /// At most so many steps of the map's first `N` unknowns at one level, with room for the residuals.
+    /// At most `steps` steps of the first `N` unknowns at one level.
     fn settle<const N: usize>(
         &self,
         steps: usize,
@@ -92,20 +92,20 @@ impl<'a> Task<'a> {
     ) -> Option<()> {
         for _ in 0..steps {
             let deviation = self.residuals(voters, after, map, residuals)?;
-            if self.step::<N>(voters, (residuals, deviation), map, start)? < SETTLED {
+            if self.step::<N>(voters, (residuals, deviation), map, start)? < MIN_STEP {
                 break;
             }
         }
         Some(())
     }
 
-    /// Goes a way as far as the level before the finest; the truncated residual there.
+    /// Runs a schedule up to the level before the finest. Returns the truncated residual there.
     pub(super) fn go(&self, way: &[[usize; 2]; FINE], map: &mut [f64; 6], start: &[f64; 2]) -> Option<f64> {
         let mut levels = way.iter().enumerate().filter(|(_, steps)| **steps != [0, 0]);
         levels.try_fold(f64::INFINITY, |_, (level, steps)| self.descend(level, *steps, map, start))
     }
 
-    /// Steps at one level, with a translation and with an affine map; the truncated residual at its end.
+    /// Steps at one level, translation then affine. Returns the truncated residual at the end.
     pub(super) fn descend(
         &self,
         level: usize,
@@ -116,19 +116,18 @@ impl<'a> Task<'a> {
         let voters = self.voters(level);
         let after = &self.after.0[level];
         let mut residuals = Vec::with_capacity(voters.len());
-        let affine = if voters.len() < AFFINE_PIXELS { 0 } else { affine };
+        let affine = if voters.len() < MIN_AFFINE_PIXELS { 0 } else { affine };
         self.settle::<2>(translations, (&voters, after), map, start, &mut residuals)?;
         self.settle::<6>(affine, (&voters, after), map, start, &mut residuals)?;
         self.residuals(&voters, after, map, &mut residuals)?;
         map.iter().all(|value| value.is_finite()).then(|| truncated_mean(&residuals))
     }
 
-    /// Pixels that vote at a level, evenly drawn, those beside the border or anything that is not finite left
-    /// out.
+    /// Evenly sampled pixels of a level, without those beside the border or with samples that are not finite.
     pub(super) fn voters(&self, level: usize) -> Vec<Voter> {
         let frame = &self.before.0[level];
         let (width, height) = frame.size();
-        let stride = self.pixels.len().div_ceil(VOTERS[level]).max(1);
+        let stride = self.pixels.len().div_ceil(MAX_VOTERS[level]).max(1);
         let mut voters = Vec::with_capacity(self.pixels.len() / stride + 1);
         for &[px, py] in self.pixels.iter().step_by(stride) {
             let (x, y) = (px as usize, py as usize);
@@ -146,8 +145,8 @@ impl<'a> Task<'a> {
         voters
     }
 
-    /// Brightness after the motion less that before, NaN outside; the deviation, robustly. `None` unless at
-    /// least half of the pixels are inside.
+    /// Residuals: brightness after the motion less that before, NaN outside. Returns their robust standard
+    /// deviation; `None` unless half of the pixels are inside.
     pub(super) fn residuals(
         &self,
         voters: &[Voter],
@@ -182,7 +181,7 @@ impl<'a> Task<'a> {
         }
         let middle = sizes.len() / 2;
         let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
-        Some((MAD * f64::from(median)).max(LEAST_DEVIATION))
+        Some((MAD_TO_STD * f64::from(median)).max(MIN_NOISE_STD))
     }
 
     /// Weighted normal equations of a step, weights `1 / (1 + (e / 2 s)^2)^2`.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::types::AffineFlow;
 
 /// Smooth waves, as they are at a place of the first frame.
 pub fn waves(x: f64, y: f64) -> f64 {

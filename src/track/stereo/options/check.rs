@@ -1,11 +1,11 @@
 //! Options out of range are refused by name.
 
-use super::super::moment::{MOST_REACH, STEP_TIMES};
+use super::super::clock::{MAX_REACH, STEP_TIME_RANGE};
 use super::{Grouping, StereoCamera, StereoTrackerOptions, VoxelGrid};
 use crate::error::{Error, Result};
 
-/// Most components: far fewer than a mixture may have, as every two of them are compared at each step.
-const MOST_COMPONENTS: usize = 4096;
+/// Largest number of components: every pair is compared at each step.
+const MAX_COMPONENTS: usize = 4096;
 
 impl StereoTrackerOptions {
     /// Checks every option by itself.
@@ -14,8 +14,8 @@ impl StereoTrackerOptions {
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
         self.matching_options(self.row_offset).check()?;
-        if !(1..=MOST_COMPONENTS).contains(&self.components) {
-            let expected = format!("a positive integer up to {MOST_COMPONENTS}");
+        if !(1..=MAX_COMPONENTS).contains(&self.components) {
+            let expected = format!("a positive integer up to {MAX_COMPONENTS}");
             return Err(Error::argument("n_components", expected, self.components));
         }
         self.mixture_options(false, 0).check()?;
@@ -42,7 +42,7 @@ impl StereoTrackerOptions {
             );
             return Err(Error::argument("grid", expected, format!("{layers} from {first}")));
         }
-        if !(1..=MOST_REACH).contains(&self.search) {
+        if !(1..=MAX_REACH).contains(&self.search) {
             return Err(Error::argument("search", "1 to 64 cells", self.search));
         }
         if !(2..=256).contains(&self.luminance_levels) {
@@ -63,7 +63,7 @@ impl StereoTrackerOptions {
             not_negative([reach, motion, depth_motion].into_iter().map(|limit| ("group_limits", limit)))?;
         }
         not_negative([("reseed_below", self.reseed_below)].into_iter())?;
-        if !STEP_TIMES.contains(&self.step_time) {
+        if !STEP_TIME_RANGE.contains(&self.step_time) {
             return Err(Error::argument("step_time", "a time above 0, from 1e-12 to 1e12", self.step_time));
         }
         self.camera.map_or(Ok(()), |camera| camera.check())
@@ -71,10 +71,7 @@ impl StereoTrackerOptions {
 }
 
 impl StereoCamera {
-    /// Checks what is told of the cameras.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the field.
+    /// Checks the camera.
     pub fn check(&self) -> Result<()> {
         for (name, value) in [("focal", self.focal), ("baseline", self.baseline)] {
             if !(value > 0.0 && value.is_finite()) {
@@ -116,7 +113,7 @@ mod tests {
         assert!(with(|o| o.grid.first_disparity = -39).starts_with("grid: "));
         assert!(with(|o| o.disparity_range = [0, 40]).starts_with("grid: "));
         assert!(StereoTrackerOptions::default().with_disparities([3, 3]).check().is_ok());
-        for wrong in [0, MOST_COMPONENTS + 1, 100_000] {
+        for wrong in [0, MAX_COMPONENTS + 1, 100_000] {
             let options = StereoTrackerOptions { components: wrong, ..StereoTrackerOptions::default() };
             let message = options.check().unwrap_err().to_string();
             assert!(message.starts_with("n_components: ") && message.contains("up to 4096"), "{message}");

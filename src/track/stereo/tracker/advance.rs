@@ -1,13 +1,14 @@
 //! From one step to the next, in either mode.
 
+use super::super::association::Carried;
 use super::super::cell_luminance::CellLuminance;
+use super::super::cell_motion::{CellMotion, ObservedStep, cell_motions};
+use super::super::cluster_motion::middle;
+use super::super::cluster_motion::{ClusterMotion, places, voxel_motion};
 use super::super::clusters::Clusters;
-use super::super::fine_motion::{FineMotion, places, voxel_motion};
 use super::super::grouping::{GroupMotion, groups};
-use super::super::identity::Carried;
-use super::super::lucas_kanade::{SmoothedLevels, middle};
+use super::super::lucas_kanade::SmoothedLevels;
 use super::super::measured_motion::NextView;
-use super::super::motion::{CellMotion, Seen, cell_motions};
 use super::super::options::Grouping;
 use super::super::overlap::Row;
 use super::super::own_pixels::{View, own_middle};
@@ -30,11 +31,11 @@ impl StereoTracker {
         points: EdgePoints,
         voxels: Voxels,
         luminance: CellLuminance,
-    ) -> Result<(Step, Seen, Option<Posterior>)> {
+    ) -> Result<(Step, ObservedStep, Option<Posterior>)> {
         let Clustered { clusters, posterior, rounds } = self.cluster(points, voxels)?;
-        let seen = Seen { clusters, luminance, levels: None };
+        let seen = ObservedStep { clusters, luminance, levels: None };
         let cell = seen.clusters.lattice().cell();
-        let reach = self.moment.reach(self.options.search);
+        let reach = self.clock.reach(self.options.search);
         let moved =
             |motion: &CellMotion, sign: f64| std::array::from_fn(|i| sign * f64::from(motion.shift[i]) * cell[i]);
         let (forward, backward) = match &self.last {
@@ -59,7 +60,7 @@ impl StereoTracker {
             .map(|motion| motion.as_ref().map(|motion| Departure { motion: moved(motion, 1.0), affine: None }))
             .collect();
         let arcs = arcs(self.time, &rows(forward), &rows(backward));
-        self.name_by_arcs(&seen.clusters, &arcs);
+        self.associate_by_arcs(&seen.clusters, &arcs);
         let grouped: Vec<usize> = (0..seen.clusters.components()).collect();
         let middles: Vec<_> = (0..seen.clusters.components()).map(|k| middle(&places(&seen.clusters, k))).collect();
         let step = self.record(&seen.clusters, posterior.as_ref(), rounds, (&arrivals, &middles), &grouped);
@@ -67,21 +68,21 @@ impl StereoTracker {
         Ok((step, seen, posterior))
     }
 
-    /// The improved step: motion first, the components carried along, then the rounds (sections 6.4 to 6.7).
+    /// The improved step: motion, carried components, iterations of the mixture.
     pub(super) fn advance_carried(
         &mut self,
         left: &Frame<f32>,
         points: EdgePoints,
         voxels: Voxels,
         luminance: CellLuminance,
-    ) -> Result<(Step, Seen, Option<Posterior>)> {
+    ) -> Result<(Step, ObservedStep, Option<Posterior>)> {
         let levels = SmoothedLevels::new(left);
         let mut map = Frame::filled(left.width(), left.height(), f32::NAN);
         for i in 0..points.len() {
             map.row_mut(points.rows[i] as usize)[points.columns[i] as usize] = points.disparities[i];
         }
         let view = NextView { luminance: &luminance, levels: &levels, disparity: &map };
-        // What stops for a frame has not jumped, and nothing is learnt of its way.
+        // A repeated frame is no jump, and no motion is learned from it.
         let motions = if crate::ablation::keeps("stereo.repeated") && self.is_repeated(&points, &levels) {
             self.stay()
         } else {
@@ -100,15 +101,15 @@ impl StereoTracker {
         };
         let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
-        // Of what is being hidden little meets its moved self, but what is left of it lies there; of what
-        // comes to light it is the other way round.
+        // A cluster that gets hidden meets little of its moved self, but its rest lies there; one that
+        // reappears, the reverse.
         let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
         let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
-        // Who began as a seed where it was going to be anyway goes on.
+        // A seed at the predicted place continues the track.
         let least = self.options.recognition.as_ref().map_or(0.0, |limits| limits.least_overlap);
         let newcomer = |k: usize| seeded.get(k).is_some_and(|seeded| *seeded) && overlap(k) <= least;
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
-        // What is left over of everything else may be anywhere: it needs no new name each time.
+        // A component of leftovers may be anywhere: it needs no new track.
         let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
             (Some(last), Some(before), Some(now)) if crate::ablation::keeps("stereo.left_over") => {
                 self.is_left_over(&last.clusters, before, k)
@@ -118,7 +119,7 @@ impl StereoTracker {
             _ => false,
         };
         let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
-        self.name_by_components(&clusters, &lost);
+        self.associate_components(&clusters, &lost);
         let shown = View { plain: left, smooth: levels.sharpest() };
         let middles: Vec<[f64; 2]> = (0..components).into_par_iter().map(|k| own_middle(&clusters, k, shown)).collect();
         let arrivals: Vec<Arrival> = (0..components)
@@ -141,7 +142,7 @@ impl StereoTracker {
                     .map(|k| {
                         own(k).map(|(motion, _)| {
                             let (flow, [x, y]) = (motion.plane.flow, motion.plane.centre);
-                            // The motion belongs to where the pixels were; the cluster is where they went.
+                            // The motion refers to the old places of the pixels, the cluster to the new ones.
                             GroupMotion {
                                 affine: flow.to_array(),
                                 centre: [x + flow.u, y + flow.v],
@@ -150,7 +151,7 @@ impl StereoTracker {
                         })
                     })
                     .collect();
-                let gap = self.moment.gap;
+                let gap = self.clock.gap;
                 let limits =
                     Grouping { motion: gap * limits.motion, depth_motion: gap * limits.depth_motion, ..*limits };
                 groups(&clusters, &motions, &limits)
@@ -162,11 +163,11 @@ impl StereoTracker {
             motions.iter().enumerate().map(|(k, motion)| self.departure(k, motion.as_ref()?.0)).collect();
         let arcs = arcs(self.time, &forward, &backward);
         self.connect(&departures, arcs)?;
-        Ok((step, Seen { clusters, luminance, levels: Some(levels) }, posterior))
+        Ok((step, ObservedStep { clusters, luminance, levels: Some(levels) }, posterior))
     }
 
-    /// How a cluster of the last step goes on, told of its middle.
-    fn departure(&self, k: usize, motion: FineMotion) -> Option<Departure> {
+    /// Motion of a cluster of the last step, at its middle.
+    fn departure(&self, k: usize, motion: ClusterMotion) -> Option<Departure> {
         let affine = motion.affine_at(self.graph.node(self.time.checked_sub(1)?, k)?.middle);
         Some(Departure { motion: [affine[0], affine[1], motion.depth], affine: Some(affine) })
     }

@@ -1,13 +1,13 @@
-//! Voxels into clusters.
+//! Clusters the voxels of a step.
 
 use super::super::clusters::Clusters;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::{Seeded, rearrange, reseed};
+use super::super::warm_start::{Seeded, reseed, split_and_merge};
 use super::StereoTracker;
 use crate::error::Result;
 use crate::mixture::{Fit, Points, Posterior, Start, fit};
 
-/// What clustering gave.
+/// Result of clustering.
 pub(super) struct Clustered {
     pub clusters: Clusters,
     pub posterior: Option<Posterior>,
@@ -22,12 +22,12 @@ impl Clustered {
         Ok(Self { clusters, rounds: fitted.lower_bounds.len(), posterior: Some(fitted.posterior) })
     }
 
-    /// Of a step that shows nothing.
+    /// A step without voxels.
     fn nothing(points: EdgePoints, voxels: Voxels) -> Self {
         Self { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 }
     }
 
-    /// The same with the components called otherwise.
+    /// Renumbers the components.
     pub fn renamed(self, names: &[usize]) -> Self {
         let posterior = self.posterior.map(|posterior| posterior.renamed(names));
         Self { clusters: self.clusters.renamed(names), posterior, rounds: self.rounds }
@@ -35,7 +35,7 @@ impl Clustered {
 }
 
 impl StereoTracker {
-    /// Clusters voxels from where the components were carried to; which of them were seeded anew.
+    /// Clusters voxels from carried components. Returns which components were seeded.
     pub(super) fn cluster_carried(
         &self,
         points: EdgePoints,
@@ -48,32 +48,32 @@ impl StereoTracker {
         let (values, weights) = (voxels.places(), voxels.weights());
         let weighted = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let carried = self.options.mixture_options(true, self.time);
-        // What is not to be fitted has no weight; it is given to a component all the same.
-        let without = |start: &Posterior, strays: &[usize]| {
+        // Outliers have no weight in the fit, but are labelled.
+        let without = |start: &Posterior, outliers: &[usize]| {
             let mut kept = weights.clone();
-            for &n in strays.iter().filter(|_| crate::ablation::keeps("stereo.outlier_voxels")) {
+            for &n in outliers.iter().filter(|_| crate::ablation::keeps("stereo.outlier_voxels")) {
                 kept[n] = 0.0;
             }
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
         };
         if let Some(mut start) = start
-            && let Some(Seeded { seeds, strays }) = reseed(&mut start, &voxels, &weighted, &self.options)?
+            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, &self.options)?
         {
-            let fitted = without(&start, &strays)?;
+            let fitted = without(&start, &outliers)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
-        // Seeds of the whole scene part what is large, miss what is small, or put two such things into one;
-        // components that explain little are better used there. What was seeded so may turn out to be a piece
-        // of something once it is fitted, and then nothing is seeded in its stead: it would be that piece
-        // again.
+        // A cold start splits large objects, and misses small ones or merges two of them; components that
+        // explain little are better used there. A new seed may turn out to be a piece of a larger object
+        // after the fit; then nothing is seeded again.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
         let mut left_out = vec![];
         for seeding in [true, false] {
             let mut start = fitted.posterior.clone();
-            let mut changed = rearrange(&mut start, &voxels, &weighted, &self.options)?;
-            if seeding && let Some(Seeded { seeds, strays }) = reseed(&mut start, &voxels, &weighted, &self.options)? {
+            let mut changed = split_and_merge(&mut start, &voxels, &weighted, &self.options)?;
+            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, &self.options)?
+            {
                 changed |= seeds.contains(&true);
-                left_out = strays;
+                left_out = outliers;
             }
             if changed {
                 fitted = without(&start, &left_out)?;

@@ -1,25 +1,25 @@
-//! Where the clusters of the last step are expected, and where they are found to have gone.
+//! Expected and measured motions of the last step's clusters.
 
+use super::super::association::{Carried, Measured};
+use super::super::cluster_motion::middle;
+use super::super::cluster_motion::{ClusterMotion, places};
 use super::super::clusters::Clusters;
-use super::super::fine_motion::{FineMotion, places};
-use super::super::identity::{Carried, Measured};
-use super::super::lucas_kanade::{SmoothedLevels, middle};
-use super::super::measured_motion::{Guess, NextView, fine_motions};
+use super::super::lucas_kanade::SmoothedLevels;
+use super::super::measured_motion::{Guess, NextView, measure_motions};
 use super::super::overlap::moved_overlaps;
 use super::super::voxels::EdgePoints;
 use super::StereoTracker;
 use crate::mixture::Points;
 
 impl StereoTracker {
-    /// What the motion of each component over the gap may be: its last one, or that of the component which
-    /// explains it best after itself. A cluster that has just been seeded has few pixels, often along one
-    /// edge, which agree with many motions; what it probably belongs to is the better guess than a template
-    /// of a few cells.
+    /// Guesses of the motion of each component: its last one, and that of the component which explains its
+    /// middle best after itself. A new cluster has few pixels, often along one edge, which agree with many
+    /// motions.
     fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Guess> {
-        let gap = self.moment.gap;
+        let gap = self.clock.gap;
         let known: Vec<(usize, [f64; 3])> = (0..components)
             .filter_map(|k| {
-                let velocity = self.identities.live.get(k)?.as_ref()?.velocity?;
+                let velocity = self.association.live.get(k)?.as_ref()?.velocity?;
                 Some((k, std::array::from_fn(|i| gap * velocity[i] * cell[i])))
             })
             .collect();
@@ -51,16 +51,15 @@ impl StereoTracker {
         Some(others[nearest as usize].1)
     }
 
-    /// How each cluster of the last step moves for its overlaps: as measured, and where nothing could be, as
-    /// it did last or not at all, whichever leads to more of its own component. That it could not be measured
-    /// does not say that it is gone.
+    /// Motion of each cluster for its overlaps: as measured, or its last motion or none, whichever gives the
+    /// larger overlap. A failed measurement does not mean that the object is gone.
     pub(super) fn moves(
         &self,
         before: &Clusters,
         after: &Clusters,
-        motions: &[Option<(FineMotion, Carried)>],
-    ) -> Vec<Option<FineMotion>> {
-        let (cell, gap) = (before.lattice().cell(), self.moment.gap);
+        motions: &[Option<(ClusterMotion, Carried)>],
+    ) -> Vec<Option<ClusterMotion>> {
+        let (cell, gap) = (before.lattice().cell(), self.clock.gap);
         let assumed = |k: usize| {
             if !crate::ablation::keeps("stereo.assumed_motion")
                 || before.pixels[k].is_empty()
@@ -69,12 +68,12 @@ impl StereoTracker {
                 return None;
             }
             let centre = middle(&places(before, k));
-            let last = self.identities.live.get(k).and_then(|identity| identity.as_ref()?.velocity);
+            let last = self.association.live.get(k).and_then(|track| track.as_ref()?.velocity);
             let tried = [Some([0.0; 3]), last].into_iter().flatten().map(|velocity| {
-                let motion = FineMotion::translation(std::array::from_fn(|i| gap * velocity[i] * cell[i]), centre);
+                let motion = ClusterMotion::translation(std::array::from_fn(|i| gap * velocity[i] * cell[i]), centre);
                 (moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i)))[k], motion)
             });
-            let best = tried.fold(None, |best: Option<(f64, FineMotion)>, one| match best {
+            let best = tried.fold(None, |best: Option<(f64, ClusterMotion)>, one| match best {
                 Some(best) if best.0 >= one.0 => Some(best),
                 _ => Some(one),
             });
@@ -83,7 +82,7 @@ impl StereoTracker {
         motions.iter().enumerate().map(|(k, motion)| motion.map(|(motion, _)| motion).or_else(|| assumed(k))).collect()
     }
 
-    /// Whether a pair is the last one again, to the bit, as recordings repeat frames.
+    /// Whether a pair equals the last one bit for bit, as in recordings with repeated frames.
     pub(super) fn is_repeated(&self, points: &EdgePoints, levels: &SmoothedLevels) -> bool {
         self.last.as_ref().is_some_and(|last| {
             let before = last.levels.as_ref().map(|levels| levels.sharpest().data());
@@ -91,23 +90,22 @@ impl StereoTracker {
         })
     }
 
-    /// Every cluster stays where it is. What is known of its way is kept: after a frame that was repeated it
-    /// goes on as before.
-    pub(super) fn stay(&self) -> Vec<Option<(FineMotion, Carried)>> {
+    /// All clusters stay; their velocities are kept.
+    pub(super) fn stay(&self) -> Vec<Option<(ClusterMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
         let still = |k: usize| {
-            let motion = FineMotion::translation([0.0; 3], middle(&places(&last.clusters, k)));
+            let motion = ClusterMotion::translation([0.0; 3], middle(&places(&last.clusters, k)));
             (motion, Carried { motion: [0.0; 3], coasting: false })
         };
         (0..last.clusters.components()).map(|k| (!last.clusters.pixels[k].is_empty()).then(|| still(k))).collect()
     }
 
-    /// How each cluster of the last step gets to the next view.
-    pub(super) fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(FineMotion, Carried)>> {
+    /// Motion of each cluster to the next view.
+    pub(super) fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(ClusterMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
-        let (cell, gap) = (last.clusters.lattice().cell(), self.moment.gap);
-        let looked_for = (self.moment.reach(self.options.search), self.options.reseed_below);
-        let measured = fine_motions(last, view, &self.guesses(cell, last.clusters.components()), looked_for);
+        let (cell, gap) = (last.clusters.lattice().cell(), self.clock.gap);
+        let looked_for = (self.clock.reach(self.options.search), self.options.reseed_below);
+        let measured = measure_motions(last, view, &self.guesses(cell, last.clusters.components()), looked_for);
         let limits = self.options.recognition.as_ref();
         let mut out = Vec::with_capacity(measured.len());
         for (k, measured) in measured.into_iter().enumerate() {
@@ -119,11 +117,11 @@ impl StereoTracker {
                 motion: std::array::from_fn(|i| m.at_centre()[i] / cell[i] / gap),
                 support: m.support,
             });
-            let carried = self.identities.carry(k, (in_cells, gap), cell, limits);
+            let carried = self.association.carry(k, (in_cells, gap), cell, limits);
             out.push(carried.and_then(|carried| {
                 let motion = if carried.coasting {
                     let moved = std::array::from_fn(|i| gap * carried.motion[i] * cell[i]);
-                    FineMotion::translation(moved, middle(&places(&last.clusters, k)))
+                    ClusterMotion::translation(moved, middle(&places(&last.clusters, k)))
                 } else {
                     measured?
                 };

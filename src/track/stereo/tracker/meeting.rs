@@ -1,9 +1,9 @@
-//! Which clusters of two steps meet once they are moved: overlaps, arcs, and who goes on as whom.
+//! Overlaps of the clusters of two steps, arcs, and renumbering.
 
+use super::super::association::Carried;
+use super::super::cluster_motion::ClusterMotion;
 use super::super::clusters::Clusters;
-use super::super::fine_motion::FineMotion;
 use super::super::graph::Arc;
-use super::super::identity::Carried;
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::succession::successors;
 use super::StereoTracker;
@@ -13,14 +13,14 @@ use super::cluster::Clustered;
 type Overlaps = (Vec<Row>, Vec<Row>);
 
 impl StereoTracker {
-    /// What clustering gave, its components called after those that they continue, which of them began as
-    /// seeds (who took over what was there before is no newcomer), and the overlaps of both steps.
+    /// Renumbers the components by succession. Returns the clusters, which of them are new seeds (not those
+    /// that took over an existing object), and the overlaps.
     pub(super) fn succeeding(
         &self,
         before: &Clusters,
         clustered: Clustered,
         seeded: Vec<bool>,
-        motions: &[Option<(FineMotion, Carried)>],
+        motions: &[Option<(ClusterMotion, Carried)>],
     ) -> (Clustered, Vec<bool>, Overlaps) {
         let moves = self.moves(before, &clustered.clusters, motions);
         let (forward, backward) = both_ways(before, &clustered.clusters, &moves);
@@ -38,9 +38,9 @@ impl StereoTracker {
     }
 }
 
-/// Overlaps of moved clusters forwards, and backwards by the same motions: a cluster's own or, where that
-/// leads back to nothing of its own, that of the cluster which covers it most.
-fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]) -> Overlaps {
+/// Overlaps of moved clusters forwards, and backwards by the same motions: the cluster's own or, without an
+/// overlap, that of the cluster that covers it most.
+fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<ClusterMotion>]) -> Overlaps {
     let nobody = vec![0.0; before.components()];
     let forward: Vec<Row> = (0..before.components())
         .map(|k| match motions[k] {
@@ -48,7 +48,7 @@ fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<FineMotion>]
             None => vec![0.0; after.components()],
         })
         .collect();
-    let back = |k: usize, motion: &Option<FineMotion>| match motion {
+    let back = |k: usize, motion: &Option<ClusterMotion>| match motion {
         Some(motion) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
         None => nobody.clone(),
     };

@@ -1,18 +1,18 @@
-//! Names, graph and tracks: what is kept of a step.
+//! Tracks, graph and result of a step.
 
+use super::super::association::Sighting;
 use super::super::clusters::Clusters;
 use super::super::graph::{Arc, Node};
-use super::super::identity::Sighting;
 use super::super::step::Step;
 use super::StereoTracker;
 use crate::error::Result;
 use crate::math::median;
 use crate::mixture::Posterior;
 
-/// Variance of what is spread evenly over a length of 1.
+/// Variance of a uniform distribution of width 1.
 const EVEN: f64 = 1.0 / 12.0;
 
-/// What is known of how each cluster came to a step.
+/// Motion of a cluster since the last step.
 pub(super) struct Arrival {
     /// Motion since the last step, px and disparity.
     pub motion: Option<[f64; 3]>,
@@ -21,7 +21,7 @@ pub(super) struct Arrival {
     pub coasting: bool,
 }
 
-/// How a cluster of the last step goes on.
+/// Motion of a cluster of the last step to this one.
 #[derive(Clone, Copy)]
 pub(super) struct Departure {
     /// Motion to this step, px and disparity.
@@ -33,11 +33,11 @@ impl Arrival {
     pub const UNKNOWN: Self = Self { motion: None, affine: None, residual: None, coasting: false };
 }
 impl StereoTracker {
-    /// Tracks of the paper's mode: a cluster goes on the track of another if each is the other's strongest
-    /// arc, and that is strong enough.
-    pub(super) fn name_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
+    /// Paper mode: a cluster continues the track of another if each is the other's strongest arc, with a
+    /// sufficient score.
+    pub(super) fn associate_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
         let components = clusters.components();
-        let before = std::mem::take(&mut self.identities.live);
+        let before = std::mem::take(&mut self.association.live);
         let mut live = vec![None; components];
         let strongest = |of: &dyn Fn(&&Arc) -> bool| {
             arcs.iter().filter(of).fold(None, |best: Option<&Arc>, arc| match best {
@@ -52,23 +52,23 @@ impl StereoTracker {
                 *slot = before.get(arc.from).cloned().flatten();
             }
         }
-        self.identities.live = live;
+        self.association.live = live;
         let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 3]));
-        self.identities.name_all(self.moment, &seen, 0.0, None);
+        self.association.associate(self.clock, &seen, 0.0, None);
     }
 
-    /// Tracks of the improved mode: a component is its track until it is empty or `lost`.
-    pub(super) fn name_by_components(&mut self, clusters: &Clusters, lost: &[bool]) {
+    /// Improved mode: a component keeps its track until it is empty or `lost`.
+    pub(super) fn associate_components(&mut self, clusters: &Clusters, lost: &[bool]) {
         let limits = self.options.recognition.as_ref();
         let lost = |k: usize| lost.get(k).is_none_or(|lost| *lost) || clusters.pixels[k].is_empty();
-        self.identities.rest(self.moment.before(), lost);
-        self.identities.live.resize(clusters.components(), None);
+        self.association.set_lost(self.clock.before(), lost);
+        self.association.live.resize(clusters.components(), None);
         let seen = sightings(clusters, |k| middle_and_deviation(clusters, k));
-        self.identities.name_all(self.moment, &seen, self.options.reseed_below, limits);
+        self.association.associate(self.clock, &seen, self.options.reseed_below, limits);
     }
 
-    /// Puts the clusters into the graph and the tracks, and tells of them: how each came and where the middle
-    /// of its pixels is, px.
+    /// Adds the clusters to graph and tracks, and assembles the step from how each arrived and its middle,
+    /// px.
     pub(super) fn record(
         &mut self,
         clusters: &Clusters,
@@ -78,8 +78,8 @@ impl StereoTracker {
         grouped: &[usize],
     ) -> Step {
         let lattice = *clusters.lattice();
-        let track = |k: usize| self.identities.live.get(k).and_then(Option::as_ref).map_or(0, |identity| identity.id);
-        // A group is called after its oldest track.
+        let track = |k: usize| self.association.live.get(k).and_then(Option::as_ref).map_or(0, |track| track.id);
+        // A group has the number of its oldest track.
         let mut names = vec![u64::MAX; clusters.components()];
         for (k, &group) in grouped.iter().enumerate().filter(|(k, _)| !clusters.pixels[*k].is_empty()) {
             names[group] = names[group].min(track(k));
@@ -98,10 +98,10 @@ impl StereoTracker {
                 weight: posterior.weight_concentration[k] / posterior.weight_concentration.iter().sum::<f64>(),
                 mean,
                 covariance: covariance(posterior, k, lattice.cell()),
-                velocity: arrival.motion.map(|motion| self.moment.velocity(motion)),
+                velocity: arrival.motion.map(|motion| self.clock.velocity(motion)),
                 next_velocity: None,
                 middle: middles[k],
-                affine: arrival.affine.map(|affine| self.moment.velocity(affine)),
+                affine: arrival.affine.map(|affine| self.clock.velocity(affine)),
                 next_affine: None,
                 residual: arrival.residual,
                 coasting: arrival.coasting,
@@ -113,13 +113,13 @@ impl StereoTracker {
             self.graph.insert(node.clone());
             let track = self.tracks.entry(node.track_id).or_default();
             track.times.push(self.time);
-            track.clock.push(self.moment.clock());
+            track.clock.push(self.clock.elapsed());
             track.positions.push(node.mean);
             track.velocities.push(node.velocity.unwrap_or([f64::NAN; 3]));
         }
         Step {
             time: self.time,
-            clock: self.moment.clock(),
+            clock: self.clock.elapsed(),
             clusters: nodes,
             rows: clusters.points.rows.clone(),
             columns: clusters.points.columns.clone(),
@@ -144,21 +144,20 @@ impl StereoTracker {
         let speed = motion.map(|motion| {
             let before = camera.place(std::array::from_fn(|i| mean[i] - motion[i]), middle);
             let now = camera.place(mean, middle);
-            self.moment.velocity(std::array::from_fn(|i| now[i] - before[i]))
+            self.clock.velocity(std::array::from_fn(|i| now[i] - before[i]))
         });
         let finite = |speed: &[f64; 3]| speed.iter().all(|value| value.is_finite());
         (Some(camera.depth(mean[2])).filter(|depth| depth.is_finite()), speed.filter(finite))
     }
 
-    /// Puts arcs between the last step and this one into the graph, and tells the last one's clusters where
-    /// they went.
+    /// Adds arcs between the last step and this one, and the motions of the last step's clusters.
     pub(super) fn connect(&mut self, departures: &[Option<Departure>], arcs: Vec<Arc>) -> Result<()> {
         if let Some(before) = self.time.checked_sub(1) {
             for (k, &departure) in departures.iter().enumerate() {
                 if let Some(node) = self.graph.node_mut(before, k) {
-                    node.next_velocity = departure.map(|departure| self.moment.velocity(departure.motion));
+                    node.next_velocity = departure.map(|departure| self.clock.velocity(departure.motion));
                     let affine = departure.and_then(|departure| departure.affine);
-                    node.next_affine = affine.map(|affine| self.moment.velocity(affine));
+                    node.next_affine = affine.map(|affine| self.clock.velocity(affine));
                 }
             }
         }
@@ -166,17 +165,17 @@ impl StereoTracker {
     }
 }
 
-/// All components that have edge pixels; `told` tells of each where it is and how far it spreads, cells.
-fn sightings(clusters: &Clusters, told: impl Fn(usize) -> ([f64; 3], [f64; 3])) -> Vec<Sighting> {
+/// All components that have edge pixels; `place`: position and spread of each, cells.
+fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 3])) -> Vec<Sighting> {
     let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
     let sighting = |(component, pixels)| {
-        let (position, spread) = told(component);
+        let (position, spread) = place(component);
         Sighting { component, position, pixels, spread }
     };
     pixels.map(sighting).collect()
 }
 
-/// Medians of a cluster's pixels along x, y and in depth, and of how far they are from these, cells and
+/// Medians of a cluster's pixels along x, y and depth, and their median absolute deviations, cells and
 /// layers.
 fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     let places: Vec<[f64; 3]> =
@@ -187,15 +186,14 @@ fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     (middle, std::array::from_fn(off))
 }
 
-/// Mean of a component along x and y, px, and the median disparity of its pixels: the mean of what was
-/// counted in whole layers is off by up to half of one, all pixels of a flat thing alike.
+/// Mean of a component along x and y, px, and the median disparity of its pixels, which layers do not
+/// quantise.
 fn mean(clusters: &Clusters, posterior: &Posterior, k: usize) -> [f64; 3] {
     let [x, y, d] = clusters.lattice().pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
     [x, y, clusters.disparity(k).unwrap_or(d)]
 }
 
-/// Covariance `W_k^-1 / nu_k` of a component in px and disparity, and what counting in cells hides: that of
-/// places spread evenly over a cell.
+/// Covariance `W_k^-1 / nu_k` of a component in px and disparity, with the quantisation variance of a cell.
 fn covariance(posterior: &Posterior, k: usize, cell: [f64; 3]) -> [[f64; 3]; 3] {
     let matrix = &posterior.scale_inverses[9 * k..9 * k + 9];
     let nu = posterior.degrees_of_freedom[k];

@@ -1,4 +1,4 @@
-//! Neighbouring voxels taken together, and what component they would make.
+//! Connected voxels and their moments.
 
 use super::super::options::StereoTrackerOptions;
 use super::super::voxels::Voxels;
@@ -7,12 +7,11 @@ use crate::mixture::Posterior;
 use nalgebra::Matrix3;
 use std::borrow::Borrow;
 
-/// Voxels no farther apart, along x, y and disparity, are of one blob.
+/// Largest distance of neighbours in a blob, cells along x, y and disparity.
 const SEED_REACH: [i32; D] = [2, 2, 1];
 
-/// How much more likely the pixels of some blobs are, each, as components of their own than as one: mean
-/// logarithm of the density, with their shares.
-pub(super) fn gain_of_parting<B: Borrow<Blob>>(parts: &[B]) -> f64 {
+/// Mean gain of log-density per pixel from separate components instead of one.
+pub(super) fn split_gain<B: Borrow<Blob>>(parts: &[B]) -> f64 {
     if parts.len() < 2 {
         return 0.0;
     }
@@ -26,8 +25,7 @@ pub(super) fn gain_of_parting<B: Borrow<Blob>>(parts: &[B]) -> f64 {
     apart / whole.pixels - log_density(1.0, &whole.covariance())
 }
 
-/// Logarithm of the density at one standard deviation along every axis of a component with a share of the
-/// pixels.
+/// Log-density at one standard deviation along every axis of a component with this share of the pixels.
 pub(super) fn log_density(share: f64, covariance: &Matrix3<f64>) -> f64 {
     share.ln() - 0.5 * (D as f64 + (std::f64::consts::TAU.powi(D as i32) * covariance.determinant()).ln())
 }
@@ -45,7 +43,7 @@ pub(super) struct Blob {
 }
 
 impl Blob {
-    /// Moments of some of the voxels, wherever they are; which ones is not kept.
+    /// Moments of some voxels; their indices are not kept.
     pub fn moments(voxels: &Voxels, some: &[usize]) -> Self {
         let mut out = Self::default();
         for &n in some {
@@ -69,7 +67,7 @@ impl Blob {
         }
     }
 
-    /// Takes the voxels of another in.
+    /// Adds the voxels of another blob.
     pub fn join(&mut self, other: &Self) {
         self.members.extend(&other.members);
         self.pixels += other.pixels;
@@ -77,7 +75,7 @@ impl Blob {
         (0..D * D).for_each(|i| self.squares[i] += other.squares[i]);
     }
 
-    /// Covariance, cells^2, with what counting in whole voxels hides: a twelfth of a cell's square.
+    /// Covariance, cells^2, with the quantisation variance of a cell, 1/12.
     pub fn covariance(&self) -> Matrix3<f64> {
         Matrix3::from_fn(|i, j| {
             let counting = if i == j { 1.0 / 12.0 } else { 0.0 };
@@ -85,13 +83,14 @@ impl Blob {
         })
     }
 
-    /// Whether its density at one standard deviation is one that explains, among `all` pixels: wrong matches
+    /// Whether its density at one standard deviation counts as explained, among `all` pixels; wrong matches
     /// are spread too thinly.
     pub fn explains_itself(&self, all: f64, explained: f64) -> bool {
         log_density(self.pixels / all, &self.covariance()) >= explained
     }
 
-    /// Makes component `k` what these pixels alone would make it; of none, the prior where it was.
+    /// Sets component `k` to the posterior of these pixels alone; without pixels, to the prior at its old
+    /// mean.
     pub fn place(&self, posterior: &mut Posterior, k: usize, options: &StereoTrackerOptions) {
         posterior.weight_concentration[k] = options.weight_concentration_prior + self.pixels;
         posterior.mean_precision[k] = options.mean_precision_prior + self.pixels;
@@ -109,7 +108,7 @@ impl Blob {
     }
 }
 
-/// Some of the voxels by who is beside whom, in the order of their first ones.
+/// Connected components of some voxels, in the order of their first ones.
 pub(super) fn blobs(voxels: &Voxels, some: &[usize]) -> Vec<Blob> {
     let lattice = &voxels.lattice;
     if some.is_empty() {

@@ -1,30 +1,50 @@
-//! Motion of a cluster to fractions of a pixel: affine in the picture, one change of disparity.
+//! Motion of a cluster: affine in the picture, one change of disparity.
 
 use super::clusters::Clusters;
-use super::lucas_kanade::PlaneMotion;
+use crate::math::median;
 use crate::types::AffineFlow;
+
+/// A motion in the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PlaneMotion {
+    /// Flow and derivatives at the centre.
+    pub flow: AffineFlow<f64>,
+    /// Medians of the pixels along x and y, px.
+    pub centre: [f64; 2],
+    /// Truncated mean absolute difference left, grey levels.
+    pub residual: f64,
+    /// Deviation of the difference left, from its median, grey levels.
+    pub deviation: f64,
+}
+
+impl PlaneMotion {
+    /// Where a pixel goes, px.
+    pub fn moved(&self, x: f64, y: f64) -> [f64; 2] {
+        let (u, v) = self.flow.at_offset(x - self.centre[0], y - self.centre[1]);
+        [x + u, y + v]
+    }
+}
 
 /// Motion of a cluster to fractions of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FineMotion {
+pub(super) struct ClusterMotion {
     pub plane: PlaneMotion,
     /// Change of the disparity.
     pub depth: f64,
-    /// Share of the cluster's pixels at whose new places the next step shows an edge in the new depth; 0 of
-    /// what was not measured.
+    /// Support: share of the pixels at whose new places the next view has an edge at the new depth; 0 if not
+    /// measured.
     pub support: f64,
 }
 
-impl FineMotion {
-    /// The motion in the picture as `(u, v, u_x, v_x, u_y, v_y)` at a place of the step that it begins with.
+impl ClusterMotion {
+    /// The motion as `(u, v, u_x, v_x, u_y, v_y)` at a place of the step that it begins with.
     pub fn affine_at(&self, [x, y]: [f64; 2]) -> [f64; 6] {
         let PlaneMotion { flow, centre, .. } = self.plane;
         let (u, v) = flow.at_offset(x - centre[0], y - centre[1]);
         AffineFlow { u, v, ..flow }.to_array()
     }
 
-    /// `(u, v, w)` at the centre, px and disparity: medians of the pixels along x and y, which stray pixels
-    /// hardly move.
+    /// `(u, v, w)` at the centre (medians of the pixels, robust against outliers), px and disparity.
     pub fn at_centre(&self) -> [f64; 3] {
         [self.plane.flow.u, self.plane.flow.v, self.depth]
     }
@@ -56,10 +76,9 @@ impl FineMotion {
     }
 }
 
-/// How far the mean of a cluster's voxels goes, cells, once its pixels have moved and are counted anew.
-/// Counting in whole cells of the picture moves it by up to half of one more or less than the pixels; in
-/// depth their means count. `None` for a cluster without pixels.
-pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -> Option<[f64; 3]> {
+/// Motion of the mean of a cluster's voxels, cells, after its moved pixels are quantised again: whole cells
+/// along x and y change it by up to half a cell; depths are means. `None` without pixels.
+pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &ClusterMotion) -> Option<[f64; 3]> {
     let (lattice, pixels) = (clusters.lattice(), &clusters.pixels[k]);
     let mut sum = [0.0; 2];
     for &i in pixels {
@@ -69,6 +88,14 @@ pub(super) fn voxel_motion(clusters: &Clusters, k: usize, motion: &FineMotion) -
     }
     let count = pixels.len() as f64;
     (!pixels.is_empty()).then(|| [sum[0] / count, sum[1] / count, motion.depth])
+}
+
+/// Medians of the pixels along x and y, robust against outliers.
+pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|i| {
+        let mut along: Vec<f64> = pixels.iter().map(|pixel| pixel[i]).collect();
+        median(&mut along).unwrap_or(f64::NAN)
+    })
 }
 
 /// Places `(x, y)` of a cluster's pixels, px.
@@ -82,17 +109,17 @@ pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clusters::tests::made_up;
+    use super::super::clusters::tests::synthetic_clusters;
     use super::*;
 
     #[test]
     fn voxels_move_by_what_counting_makes_of_the_motion() {
         // Pixels at x = 84 and 92, disparity -10.
-        let clusters = made_up(&[([10, 5, 30], 0), ([11, 5, 30], 0)], 2);
-        let moved = |motion| voxel_motion(&clusters, 0, &FineMotion::translation(motion, [88.0, 44.0]));
+        let clusters = synthetic_clusters(&[([10, 5, 30], 0), ([11, 5, 30], 0)], 2);
+        let moved = |motion| voxel_motion(&clusters, 0, &ClusterMotion::translation(motion, [88.0, 44.0]));
         assert_eq!(moved([8.0, -8.0, 2.0]), Some([1.0, -1.0, 2.0]));
         assert_eq!(moved([3.0, 4.0, 0.4]), Some([0.0, 1.0, 0.4]));
         assert_eq!(moved([3.6, 0.0, 0.6]), Some([1.0, 0.0, 0.6]));
-        assert_eq!(voxel_motion(&clusters, 1, &FineMotion::translation([1.0; 3], [0.0; 2])), None);
+        assert_eq!(voxel_motion(&clusters, 1, &ClusterMotion::translation([1.0; 3], [0.0; 2])), None);
     }
 }

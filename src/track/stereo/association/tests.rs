@@ -2,7 +2,7 @@ use super::*;
 
 const CELL: [f64; 3] = [8.0, 8.0, 1.0];
 
-const LEAST: f64 = 20.0;
+const MIN_PIXELS: f64 = 20.0;
 
 fn at(component: usize, position: [f64; 3]) -> Sighting {
     Sighting { component, position, pixels: 100, spread: [2.0, 4.0, 0.3] }
@@ -13,12 +13,12 @@ fn measured(motion: [f64; 3]) -> Measured {
     Measured { motion, support: 0.4 }
 }
 
-fn identities() -> Identities {
-    let mut all = Identities { live: vec![None; 3], ..Identities::default() };
-    all.name_all(
-        Moment::at(0),
+fn association() -> TrackAssociation {
+    let mut all = TrackAssociation { live: vec![None; 3], ..TrackAssociation::default() };
+    all.associate(
+        Clock::at(0),
         &[at(0, [10.0, 10.0, 30.0]), at(1, [40.0, 10.0, 20.0])],
-        LEAST,
+        MIN_PIXELS,
         Some(&Recognition::default()),
     );
     all
@@ -27,40 +27,40 @@ fn identities() -> Identities {
 #[test]
 fn a_hidden_track_is_recognised_where_it_is_expected() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     all.carry(0, (Some(measured([2.0, 0.0, 0.5])), 1.0), CELL, Some(&limits)).unwrap();
     all.carry(0, (Some(measured([2.0, 0.0, 0.5])), 1.0), CELL, Some(&limits)).unwrap();
-    all.name_all(Moment::at(1), &[at(0, [12.0, 10.0, 30.5])], LEAST, Some(&limits));
+    all.associate(Clock::at(1), &[at(0, [12.0, 10.0, 30.5])], MIN_PIXELS, Some(&limits));
     // Gone at steps 2 to 4.
-    all.rest(1.0, |k| k == 0);
+    all.set_lost(1.0, |k| k == 0);
     for time in 2..5 {
-        all.name_all(Moment::at(time), &[at(1, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
+        all.associate(Clock::at(time), &[at(1, [40.0, 10.0, 20.0])], MIN_PIXELS, Some(&limits));
         assert_eq!(all.live[0], None);
     }
     let (mut elsewhere, mut small) = (all.clone(), all.clone());
-    small.name_all(Moment::at(5), &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], LEAST, Some(&limits));
+    small.associate(Clock::at(5), &[Sighting { pixels: 9, ..at(2, [20.5, 11.0, 32.6]) }], MIN_PIXELS, Some(&limits));
     assert_eq!(small.live[2].as_ref().unwrap().id, 2);
     // Half of it, whose middle is farther from the expected one than that of all of it may be.
     let upper = at(2, [20.5, 1.0, 32.6]);
     for (pixels, id) in [(100, 2), (40, 0)] {
         let mut part = all.clone();
-        part.name_all(Moment::at(5), &[Sighting { pixels, ..upper }], LEAST, Some(&limits));
+        part.associate(Clock::at(5), &[Sighting { pixels, ..upper }], MIN_PIXELS, Some(&limits));
         assert_eq!(part.live[2].as_ref().unwrap().id, id);
     }
-    all.name_all(Moment::at(5), &[at(2, [20.5, 11.0, 32.6])], LEAST, Some(&limits));
+    all.associate(Clock::at(5), &[at(2, [20.5, 11.0, 32.6])], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 0);
-    elsewhere.name_all(Moment::at(5), &[at(2, [29.0, 11.0, 32.6])], LEAST, Some(&limits));
+    elsewhere.associate(Clock::at(5), &[at(2, [29.0, 11.0, 32.6])], MIN_PIXELS, Some(&limits));
     assert_eq!(elsewhere.live[2].as_ref().unwrap().id, 2);
 }
 
 #[test]
 fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     for _ in 0..2 {
         all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
-    all.rest(0.0, |k| k == 0);
+    all.set_lost(0.0, |k| k == 0);
     let there = at(2, [16.0, 10.0, 30.0]);
     for (seen, known) in [
         (there, true),
@@ -70,7 +70,7 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
         (Sighting { spread: [2.0, 4.0, 4.0], ..there }, false),
     ] {
         let mut all = all.clone();
-        all.name_all(Moment::at(3), &[seen], LEAST, Some(&limits));
+        all.associate(Clock::at(3), &[seen], MIN_PIXELS, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id == 0, known, "{seen:?}");
     }
 }
@@ -78,44 +78,45 @@ fn who_does_not_resemble_a_hidden_track_is_not_taken_for_it() {
 #[test]
 fn of_the_parts_that_come_to_light_the_largest_is_it() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     for _ in 0..2 {
         all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
-    all.rest(0.0, |k| k == 0);
+    all.set_lost(0.0, |k| k == 0);
     // At step 2 two parts of it, at step 3 another one that is larger; at last it is whole.
     let part = |component, position, pixels| Sighting { pixels, ..at(component, position) };
-    let ids = |all: &Identities| all.live.iter().map(|live| live.as_ref().map(|live| live.id)).collect::<Vec<_>>();
-    all.name_all(
-        Moment::at(2),
+    let ids =
+        |all: &TrackAssociation| all.live.iter().map(|live| live.as_ref().map(|live| live.id)).collect::<Vec<_>>();
+    all.associate(
+        Clock::at(2),
         &[part(0, [14.5, 5.0, 30.0], 20), part(2, [14.5, 14.0, 30.0], 30)],
-        LEAST,
+        MIN_PIXELS,
         Some(&limits),
     );
     assert_eq!(ids(&all), [Some(2), Some(1), Some(0)]);
     all.live[0] = None;
-    all.name_all(
-        Moment::at(3),
+    all.associate(
+        Clock::at(3),
         &[part(0, [16.5, 5.0, 30.0], 60), part(2, [16.5, 14.0, 30.0], 30)],
-        LEAST,
+        MIN_PIXELS,
         Some(&limits),
     );
     assert_eq!(ids(&all), [Some(0), Some(1), Some(3)]);
     assert_eq!(all.live[0].as_ref().unwrap().position, [16.0, 10.0, 30.0]);
     // The one that it was taken for is larger after all.
     let mut other = all.clone();
-    other.name_all(
-        Moment::at(4),
+    other.associate(
+        Clock::at(4),
         &[part(0, [18.5, 5.0, 30.0], 40), part(2, [18.5, 14.0, 30.0], 50)],
-        LEAST,
+        MIN_PIXELS,
         Some(&limits),
     );
     assert_eq!(ids(&other), [Some(3), Some(1), Some(0)]);
     all.live[2] = None;
-    all.name_all(
-        Moment::at(4),
+    all.associate(
+        Clock::at(4),
         &[part(0, [18.5, 10.0, 30.0], 95), part(2, [18.0, 5.0, 30.0], 98)],
-        LEAST,
+        MIN_PIXELS,
         Some(&limits),
     );
     assert_eq!(ids(&all), [Some(0), Some(1), Some(4)]);
@@ -125,7 +126,7 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
 fn what_is_measured_of_little_changes_the_velocity_little() {
     let limits = Recognition::default();
     for (support, depth_motion) in [(0.9, 1.0), (0.6, 1.0), (0.15, 0.25), (0.0, 0.0)] {
-        let mut all = identities();
+        let mut all = association();
         let mut carry = |motion, support| {
             all.carry(0, (Some(Measured { motion, support }), 1.0), CELL, Some(&limits)).unwrap().motion
         };
@@ -139,14 +140,14 @@ fn what_is_measured_of_little_changes_the_velocity_little() {
 #[test]
 fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     for _ in 0..2 {
         all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
     }
-    all.rest(0.0, |k| k == 0);
+    all.set_lost(0.0, |k| k == 0);
     // A glimpse too small to be named after it, which gets a track of its own.
     let part = |position, pixels| Sighting { pixels, ..at(2, position) };
-    all.name_all(Moment::at(2), &[part([14.0, 10.0, 30.0], 12)], LEAST, Some(&limits));
+    all.associate(Clock::at(2), &[part([14.0, 10.0, 30.0], 12)], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
     for _ in 0..2 {
         all.carry(2, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
@@ -155,7 +156,7 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     // it is that.
     for (pixels, place, id) in [(17, 22.0, 2), (90, 22.0, 0), (90, 32.0, 2)] {
         let mut all = all.clone();
-        all.name_all(Moment::at(6), &[part([place, 10.0, 30.0], pixels)], 1.0, Some(&limits));
+        all.associate(Clock::at(6), &[part([place, 10.0, 30.0], pixels)], 1.0, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, id, "{pixels} pixels at {place}");
     }
 }
@@ -163,27 +164,27 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
 #[test]
 fn nobody_waits_for_ever_nor_without_a_history() {
     let limits = Recognition::default();
-    let mut all = identities();
-    all.rest(0.0, |k| k == 1);
-    all.name_all(Moment::at(3), &[at(2, [40.0, 10.0, 20.0])], LEAST, Some(&limits));
+    let mut all = association();
+    all.set_lost(0.0, |k| k == 1);
+    all.associate(Clock::at(3), &[at(2, [40.0, 10.0, 20.0])], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
     all.carry(0, (Some(measured([0.0; 3])), 1.0), CELL, Some(&limits)).unwrap();
-    all.rest(3.0, |k| k == 0);
-    all.name_all(Moment::at(14), &[at(1, [10.0, 10.0, 30.0])], LEAST, Some(&limits));
+    all.set_lost(3.0, |k| k == 0);
+    all.associate(Clock::at(14), &[at(1, [10.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[1].as_ref().unwrap().id, 3);
 }
 
 #[test]
 fn steady_tracks_coast_through_jumps_for_three_steps() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     let (good, jump) = ([2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]);
     let mut carry = |motion| all.carry(0, (motion, 1.0), CELL, Some(&limits));
     for _ in 0..3 {
         assert_eq!(carry(Some(measured(good))), Some(Carried { motion: good, coasting: false }));
     }
-    for told in [Some(measured(jump)), None, Some(measured(jump))] {
-        assert_eq!(carry(told), Some(Carried { motion: good, coasting: true }));
+    for carried in [Some(measured(jump)), None, Some(measured(jump))] {
+        assert_eq!(carry(carried), Some(Carried { motion: good, coasting: true }));
     }
     assert_eq!(carry(Some(measured(jump))), Some(Carried { motion: jump, coasting: false }));
 }
@@ -193,43 +194,43 @@ fn a_jump_behind_which_most_of_it_is_seen_is_believed() {
     let limits = Recognition::default();
     let (good, twice) = ([2.0, 0.0, -3.0], [4.0, 0.0, -6.0]);
     for (support, believed) in [(0.4, false), (0.8, true)] {
-        let mut all = identities();
+        let mut all = association();
         for _ in 0..3 {
             all.carry(0, (Some(measured(good)), 1.0), CELL, Some(&limits)).unwrap();
         }
-        let told = all.carry(0, (Some(Measured { motion: twice, support }), 1.0), CELL, Some(&limits));
+        let carried = all.carry(0, (Some(Measured { motion: twice, support }), 1.0), CELL, Some(&limits));
         let expected = if believed { twice } else { good };
-        assert_eq!(told, Some(Carried { motion: expected, coasting: !believed }));
+        assert_eq!(carried, Some(Carried { motion: expected, coasting: !believed }));
     }
 }
 
 #[test]
 fn what_is_mostly_covered_goes_on_where_it_went() {
     let limits = Recognition::default();
-    let mut all = identities();
+    let mut all = association();
     all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits)).unwrap();
-    all.name_all(Moment::at(1), &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], LEAST, Some(&limits));
+    all.associate(Clock::at(1), &[Sighting { pixels: 90, ..at(0, [11.5, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
-    all.name_all(Moment::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
+    all.associate(Clock::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);
 }
 
 #[test]
 fn without_recognition_what_is_measured_counts() {
-    let mut all = identities();
+    let mut all = association();
     all.carry(0, (Some(measured([1.0; 3])), 1.0), CELL, None);
     assert_eq!(all.carry(0, (None, 1.0), CELL, None), None);
-    all.rest(1.0, |k| k == 0);
-    all.name_all(Moment::at(4), &[at(0, [13.0, 13.0, 33.0])], LEAST, None);
+    all.set_lost(1.0, |k| k == 0);
+    all.associate(Clock::at(4), &[at(0, [13.0, 13.0, 33.0])], MIN_PIXELS, None);
     assert_eq!(all.live[0].as_ref().unwrap().id, 2);
 }
 
 #[test]
 fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
     let limits = Recognition::default();
-    let late = |now: f64, gap: f64| Moment { now, gap, step_time: 1.0 };
+    let late = |now: f64, gap: f64| Clock { now, gap, step_time: 1.0 };
     let steady = || {
-        let mut all = identities();
+        let mut all = association();
         for _ in 0..2 {
             all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits));
         }
@@ -245,37 +246,37 @@ fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
     // Hidden from 0 on, seen again six ordinary steps later: two steps of three, or one of six.
     for (now, gap) in [(6.0, 3.0), (6.0, 6.0)] {
         let mut all = steady();
-        all.rest(0.0, |k| k == 0);
-        all.name_all(late(now, gap), &[at(2, [22.0, 10.0, 30.0])], LEAST, Some(&limits));
+        all.set_lost(0.0, |k| k == 0);
+        all.associate(late(now, gap), &[at(2, [22.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, 0);
     }
     // Waited for ten ordinary steps, however few steps these are.
     let mut all = steady();
-    all.rest(0.0, |k| k == 0);
-    all.name_all(late(10.5, 5.0), &[at(2, [31.0, 10.0, 30.0])], LEAST, Some(&limits));
+    all.set_lost(0.0, |k| k == 0);
+    all.associate(late(10.5, 5.0), &[at(2, [31.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 2);
     // What is mostly covered goes on for the time that went by.
     let mut all = steady();
-    all.name_all(late(2.5, 2.5), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], LEAST, Some(&limits));
+    all.associate(late(2.5, 2.5), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [15.0, 10.0, 30.0]);
 }
 
 #[test]
 fn what_is_covered_little_by_little_comes_to_light_on_the_other_side_as_itself() {
     let limits = Recognition::default();
-    let mut all = identities();
-    let moved = |all: &mut Identities, component| {
+    let mut all = association();
+    let moved = |all: &mut TrackAssociation, component| {
         all.carry(component, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, Some(&limits))
     };
     // Its left part is less and less, at last at 13; the right one appears about 24, the middle of the whole
     // being at 20.
     for (time, x, pixels) in [(1, 12.0, 100), (2, 13.5, 85), (3, 14.0, 70), (4, 13.5, 35)] {
         moved(&mut all, 0);
-        all.name_all(Moment::at(time), &[Sighting { pixels, ..at(0, [x, 10.0, 30.0]) }], LEAST, Some(&limits));
+        all.associate(Clock::at(time), &[Sighting { pixels, ..at(0, [x, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
     }
     moved(&mut all, 0);
     let left = Sighting { pixels: 6, ..at(0, [13.0, 10.0, 30.0]) };
     let right = Sighting { pixels: 25, ..at(2, [24.2, 10.0, 30.0]) };
-    all.name_all(Moment::at(5), &[left, right], LEAST, Some(&limits));
+    all.associate(Clock::at(5), &[left, right], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[2].as_ref().unwrap().id, 0);
 }

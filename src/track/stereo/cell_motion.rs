@@ -1,4 +1,4 @@
-//! Motion of every cluster from one step to the other by whole cells, and whom it meets.
+//! Motion of clusters by whole cells (paper mode).
 
 use super::cell_luminance::CellLuminance;
 use super::clusters::Clusters;
@@ -6,16 +6,16 @@ use super::lucas_kanade::SmoothedLevels;
 use super::overlap::{Row, depth_motion};
 use rayon::prelude::*;
 
-/// A step as motion needs it.
+/// A step as measured by the tracker.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct ObservedStep {
     pub clusters: Clusters,
     pub luminance: CellLuminance,
     /// For Lucas-Kanade (`improved`).
     pub levels: Option<SmoothedLevels>,
 }
 
-/// How a cluster moved by whole cells, and whom it meets.
+/// Motion of a cluster by whole cells, and its overlaps.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CellMotion {
     /// `(dx, dy, dz)`, cells.
@@ -25,10 +25,9 @@ pub(super) struct CellMotion {
     pub overlaps: Row,
 }
 
-/// Motion in cells of all clusters towards another step, looked for up to `reach` cells far: (29), then (30)
-/// to (32). `None` for empty ones, those whose template leaves the picture, and all where the other step has
-/// no edge pixels: every template fits somewhere in a picture of nothing.
-pub(super) fn cell_motions(from: &Seen, to: &Seen, reach: i32) -> Vec<Option<CellMotion>> {
+/// Motion in cells of all clusters towards another step, up to `reach` cells: (29), then (30) to (32). `None`
+/// for empty clusters, templates that leave the view, and a step without edge pixels.
+pub(super) fn cell_motions(from: &ObservedStep, to: &ObservedStep, reach: i32) -> Vec<Option<CellMotion>> {
     if to.clusters.points.is_empty() {
         return vec![None; from.clusters.components()];
     }
@@ -44,7 +43,7 @@ pub(super) fn cell_motions(from: &Seen, to: &Seen, reach: i32) -> Vec<Option<Cel
 
 #[cfg(test)]
 mod tests {
-    use super::super::clusters::tests::made_up;
+    use super::super::clusters::tests::synthetic_clusters;
     use super::*;
     use crate::types::Frame;
 
@@ -53,10 +52,10 @@ mod tests {
         let cells: Vec<_> = (0..40).map(|i| ([20 + i % 5, 30 + i / 5, 40], 0)).collect();
         let seen = |clusters: Clusters, level: &dyn Fn(usize, usize) -> f32| {
             let luminance = CellLuminance::new(&Frame::from_fn(640, 480, level), clusters.lattice(), 64);
-            Seen { clusters, luminance, levels: None }
+            ObservedStep { clusters, luminance, levels: None }
         };
-        let one = seen(made_up(&cells, 1), &|x, y| ((x / 8 * 37 + y / 8 * 11) % 256) as f32);
-        let nothing = seen(made_up(&[], 0), &|_, _| 0.0);
+        let one = seen(synthetic_clusters(&cells, 1), &|x, y| ((x / 8 * 37 + y / 8 * 11) % 256) as f32);
+        let nothing = seen(synthetic_clusters(&[], 0), &|_, _| 0.0);
         assert_eq!(cell_motions(&one, &nothing, 8), [None]);
         assert_eq!(cell_motions(&nothing, &one, 8), []);
         assert_eq!(cell_motions(&one, &one, 8)[0].as_ref().map(|motion| motion.shift), Some([0, 0, 0]));

@@ -1,15 +1,13 @@
 //! Motion in depth at edge pixels: the disparity at the moved pixels less that at the pixels themselves.
 
-use crate::math::median;
+use crate::math::{MAD_TO_STD, median};
 use crate::types::Frame;
 
-/// Farthest that an edge pixel of the next step is from where a pixel went, px.
-const REACH: f64 = 1.0;
-/// Least deviation, disparity.
-const LEAST_DEVIATION: f64 = 0.03;
-/// Mean absolute deviation from the median, to the deviation of a normal distribution.
-const MAD: f64 = 1.4826;
-/// Rounds of weighting.
+/// Largest distance of the nearest edge pixel, px.
+const MAX_NEIGHBOUR_DISTANCE: f64 = 1.0;
+/// Floor of the standard deviation, disparity.
+const MIN_DISPARITY_STD: f64 = 0.03;
+/// Iterations of the weighted mean.
 const ROUNDS: usize = 5;
 
 /// The disparity of the pixel of `map` nearest to `(x, y)`, at most one pixel away.
@@ -21,7 +19,10 @@ pub(super) fn nearest(map: &Frame<f32>, x: f64, y: f64) -> Option<f64> {
         for i in (column - 1).max(0)..=(column + 1).min(width - 1) {
             let value = map.get(i as usize, j as usize);
             let distance = (i as f64 - x).powi(2) + (j as f64 - y).powi(2);
-            if value.is_finite() && distance <= REACH * REACH && best.is_none_or(|(least, _)| distance < least) {
+            if value.is_finite()
+                && distance <= MAX_NEIGHBOUR_DISTANCE * MAX_NEIGHBOUR_DISTANCE
+                && best.is_none_or(|(least, _)| distance < least)
+            {
                 best = Some((distance, f64::from(value)));
             }
         }
@@ -37,7 +38,7 @@ pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
     }
     let mut mean = median(values)?;
     let mut sizes: Vec<f64> = values.iter().map(|value| (value - mean).abs()).collect();
-    let deviation = (MAD * median(&mut sizes)?).max(LEAST_DEVIATION);
+    let deviation = (MAD_TO_STD * median(&mut sizes)?).max(MIN_DISPARITY_STD);
     for _ in 0..ROUNDS {
         let (mut sum, mut weights) = (0.0, 0.0);
         for value in &*values {

@@ -1,0 +1,313 @@
+//! Associates components with tracks. A component keeps its track while it covers its moved self; a lost
+//! track is kept for a while and recognised by position, size and thickness.
+
+use super::clock::Clock;
+use super::options::Recognition;
+
+/// State of a component's track.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ComponentTrack {
+    pub id: u64,
+    /// Begin, ordinary steps.
+    pub born: f64,
+    /// Last reliable motion, cells along x, y and disparity per ordinary step; measurements are weighted by
+    /// their support.
+    pub velocity: Option<[f64; 3]>,
+    /// Number of steps without a jump.
+    pub steady: usize,
+    /// Time coasted without interruption, ordinary steps.
+    pub coasted: f64,
+    /// Position, cells: its middle, or an extrapolation while it is mostly covered, which shifts the middle.
+    pub position: [f64; 3],
+    /// Decaying maximum of the number of edge pixels.
+    pub peak: f64,
+    /// Median absolute deviations along x, y and depth when it was last mostly visible, cells and layers.
+    pub spread: [f64; 3],
+}
+
+/// A visible component.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sighting {
+    pub component: usize,
+    /// Medians, cells.
+    pub position: [f64; 3],
+    /// Edge pixels.
+    pub pixels: usize,
+    /// Median absolute deviations along x, y and depth, cells and layers; robust against wrong matches.
+    pub spread: [f64; 3],
+}
+
+/// Share of the peak number of pixels below which a track counts as partly covered.
+const COVERED_SHARE: f64 = 0.8;
+/// Tolerance of the thickness of a recognised object: factor, and layers. Occlusion does not change the
+/// extent in depth.
+const THICKNESS_TOLERANCE: (f64, f64) = (2.0, 0.5);
+/// Largest number of pixels of a recognised object over that of the lost one.
+const MAX_GROWTH: f64 = 1.5;
+/// Half the extent of a uniform distribution over its median absolute deviation.
+const HALF_EXTENT: f64 = 2.0;
+/// Decay of the peak number of pixels per ordinary step: follows an object that shrinks with distance, not
+/// one that is covered over several steps.
+const PEAK_DECAY: f64 = 0.95;
+
+/// Rounding tolerance of times, ordinary steps.
+const TIME_TOLERANCE: f64 = 1e-6;
+
+/// Support (share of pixels seen where the motion leads) from which a jump is accepted. An object that gets
+/// hidden jumps onto its occluder with little support; one that stops, or moves twice as far over a missing
+/// frame, has nearly full support.
+const FULL_SUPPORT: f64 = 0.6;
+
+/// A measured motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    /// Cells per ordinary step.
+    pub motion: [f64; 3],
+    /// Support: share of the component's pixels seen at the predicted place and depth.
+    pub support: f64,
+}
+
+/// Motion of a component from one step to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Carried {
+    /// Motion, cells per ordinary step.
+    pub motion: [f64; 3],
+    /// Whether it is an extrapolation.
+    pub coasting: bool,
+}
+
+/// A lost track.
+#[derive(Debug, Clone, PartialEq)]
+struct LostTrack {
+    track: ComponentTrack,
+    /// Time of its position, ordinary steps.
+    since: f64,
+}
+
+/// Tracks of the components, and lost tracks.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TrackAssociation {
+    pub live: Vec<Option<ComponentTrack>>,
+    lost: Vec<LostTrack>,
+    next: u64,
+}
+
+/// Whether two motions, cells per ordinary step, differ by a jump.
+fn jumps(a: [f64; 3], b: [f64; 3], cell: [f64; 3], limits: &Recognition) -> bool {
+    let plane = ((a[0] - b[0]) * cell[0]).hypot((a[1] - b[1]) * cell[1]);
+    plane > limits.jump || (a[2] - b[2]).abs() > limits.jump_disparity
+}
+
+impl TrackAssociation {
+    /// Number of a new track.
+    fn new_id(&mut self) -> u64 {
+        self.next += 1;
+        self.next - 1
+    }
+
+    /// The motion of component `k` over `gap` ordinary steps: the measured one, or the last reliable motion
+    /// of a steady track, for a limited time, after a jump with little support or without a measurement.
+    pub fn carry(
+        &mut self,
+        k: usize,
+        (measured, gap): (Option<Measured>, f64),
+        cell: [f64; 3],
+        limits: Option<&Recognition>,
+    ) -> Option<Carried> {
+        let trust = measured.map_or(0.0, |measured| (measured.support / FULL_SUPPORT).min(1.0));
+        let sure = trust >= 1.0 && crate::ablation::keeps("stereo.sure_jump");
+        let measured = measured.map(|measured| measured.motion);
+        let Some(track) = self.live.get_mut(k).and_then(Option::as_mut) else {
+            return measured.map(|motion| Carried { motion, coasting: false });
+        };
+        let Some(limits) = limits else {
+            track.velocity = measured.or(track.velocity);
+            return measured.map(|motion| Carried { motion, coasting: false });
+        };
+        let like = match (track.velocity, measured) {
+            (Some(last), Some(now)) => !jumps(last, now, cell, limits),
+            _ => false,
+        };
+        if let Some(last) = track.velocity.filter(|_| !like && !sure) {
+            let steady = track.steady >= limits.steady || measured.is_none();
+            let coasted = track.coasted + gap;
+            if crate::ablation::keeps("stereo.coast") && steady && coasted <= limits.coast as f64 + TIME_TOLERANCE {
+                track.coasted = coasted;
+                return Some(Carried { motion: last, coasting: true });
+            }
+        }
+        track.coasted = 0.0;
+        track.steady = if like { track.steady + 1 } else { usize::from(measured.is_some()) };
+        // The visible rest of a nearly hidden object gives poor measurements, and its predicted position
+        // depends on them.
+        track.velocity = match (track.velocity, measured) {
+            (Some(last), Some(now)) if like => {
+                let trust = if crate::ablation::keeps("stereo.trusted_velocity") { trust } else { 1.0 };
+                Some(std::array::from_fn(|i| last[i] + trust * (now[i] - last[i])))
+            }
+            (last, now) => now.or(last),
+        };
+        measured.map(|motion| Carried { motion, coasting: false })
+    }
+
+    /// Marks the tracks of components for which `lost` holds as lost since `since`, ordinary steps.
+    pub fn set_lost(&mut self, since: f64, lost: impl Fn(usize) -> bool) {
+        for k in 0..self.live.len() {
+            if lost(k)
+                && let Some(track) = self.live[k].take()
+            {
+                // A track without a steady motion cannot be predicted.
+                if track.steady > 0 || !crate::ablation::keeps("stereo.never_steady") {
+                    self.lost.push(LostTrack { track, since });
+                }
+            }
+        }
+    }
+
+    /// An object that reappears is first seen in parts. A mostly covered track passes to a larger matching
+    /// component that has no track, a recent one, or a younger one that it outgrows; their tracks are
+    /// exchanged.
+    fn pass_to_larger_parts(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: &Recognition) {
+        for own in seen {
+            let Some(track) = self.live[own.component].as_ref() else { continue };
+            if own.pixels as f64 >= COVERED_SHARE * track.peak {
+                continue;
+            }
+            let begun = |other: &ComponentTrack| at.now <= other.born + limits.coast as f64 + TIME_TOLERANCE;
+            let larger = seen.iter().filter(|new| {
+                let gives_way =
+                    |other: &ComponentTrack| other.born > track.born && (begun(other) || other.is_outgrown(new));
+                self.live[new.component].as_ref().is_none_or(gives_way)
+                    && new.pixels > own.pixels
+                    && new.pixels as f64 >= least
+                    && track.distance(at.gap, new, limits).is_some()
+            });
+            if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
+                self.live.swap(own.component, new.component);
+            }
+        }
+    }
+
+    /// Gives each visible component without a track a lost one that matches (largest component first, then
+    /// the nearest track), with at least `least` pixels, or a new one. A component that outgrows its own
+    /// track is matched with older lost tracks as well. Then updates all positions.
+    pub fn associate(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
+        self.lost.retain(|track| {
+            limits.is_some_and(|limits| at.now - track.since <= limits.patience as f64 + TIME_TOLERANCE)
+        });
+        if let Some(limits) = limits {
+            let mut pairs = Vec::new();
+            for (r, track) in self.lost.iter().enumerate() {
+                let waits_for = |new: &&Sighting| {
+                    let part = |own: &ComponentTrack| {
+                        crate::ablation::keeps("stereo.part_renamed")
+                            && own.born > track.track.born
+                            && own.is_outgrown(new)
+                    };
+                    new.pixels as f64 >= least && self.live[new.component].as_ref().is_none_or(part)
+                };
+                for new in seen.iter().filter(waits_for) {
+                    if let Some(distance) = track.track.distance(at.now - track.since, new, limits) {
+                        pairs.push((new.pixels, distance, r, new.component));
+                    }
+                }
+            }
+            pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
+            let mut taken = vec![false; self.lost.len()];
+            let mut named = vec![false; self.live.len()];
+            for (_, _, r, k) in pairs {
+                if !taken[r] && !named[k] {
+                    (taken[r], named[k]) = (true, true);
+                    self.live[k] = Some(self.lost[r].resumed(at));
+                }
+            }
+            let mut left = taken.into_iter();
+            self.lost.retain(|_| !left.next().unwrap_or(false));
+            if crate::ablation::keeps("stereo.larger_parts") {
+                self.pass_to_larger_parts(at, seen, least, limits);
+            }
+        }
+        for &Sighting { component, position, pixels, spread } in seen {
+            if self.live[component].is_none() {
+                let id = self.new_id();
+                let (born, velocity) = (at.now, None);
+                let unknown =
+                    ComponentTrack { id, born, velocity, steady: 0, coasted: 0.0, position, peak: 0.0, spread };
+                self.live[component] = Some(unknown);
+            }
+            if let Some(track) = &mut self.live[component] {
+                track.see((position, pixels as f64, spread), at.gap);
+            }
+        }
+    }
+}
+
+impl ComponentTrack {
+    /// Updates position, number of pixels and spread, `gap` ordinary steps after the last update.
+    fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 3]), gap: f64) {
+        self.peak = pixels.max(PEAK_DECAY.powf(gap) * self.peak);
+        self.position = match self.velocity {
+            Some(velocity)
+                if crate::ablation::keeps("stereo.covered_position") && pixels < COVERED_SHARE * self.peak =>
+            {
+                std::array::from_fn(|i| self.position[i] + gap * velocity[i])
+            }
+            _ => {
+                self.spread = spread;
+                position
+            }
+        };
+    }
+
+    /// Distance of a component from the predicted position, in tolerances; `None` beyond them or for another
+    /// thickness or size.
+    fn distance(&self, steps: f64, seen: &Sighting, limits: &Recognition) -> Option<f64> {
+        let velocity = self.velocity.filter(|_| self.resembles(seen))?;
+        // The middle of the visible part differs from that of the whole by up to the covered part.
+        let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
+        let mut sum = 0.0;
+        for i in 0..3 {
+            let expected = self.position[i] + steps * velocity[i];
+            let part = if i < 2 && crate::ablation::keeps("stereo.covered_tolerance") {
+                covered * HALF_EXTENT * self.spread[i]
+            } else {
+                0.0
+            };
+            let tolerance = limits.tolerance[i] + steps * limits.tolerance_per_step[i] + part;
+            let off = (seen.position[i] - expected).abs() / tolerance;
+            if off > 1.0 {
+                return None;
+            }
+            sum += off * off;
+        }
+        Some(sum)
+    }
+
+    /// Whether the component is larger than the track ever was.
+    fn is_outgrown(&self, seen: &Sighting) -> bool {
+        seen.pixels as f64 > MAX_GROWTH * self.peak
+    }
+
+    /// Whether the component may be this object, seen wholly or in part.
+    fn resembles(&self, seen: &Sighting) -> bool {
+        let (factor, layers) = THICKNESS_TOLERANCE;
+        let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
+        (thicker <= factor * thinner + layers || !crate::ablation::keeps("stereo.thickness"))
+            && !(self.is_outgrown(seen) && crate::ablation::keeps("stereo.size"))
+    }
+}
+
+impl LostTrack {
+    /// The track continued at its predicted position; its peak size is kept.
+    fn resumed(&self, at: Clock) -> ComponentTrack {
+        let mut track = ComponentTrack { coasted: 0.0, ..self.track.clone() };
+        if let Some(velocity) = track.velocity {
+            let steps = (at.before() - self.since).max(0.0);
+            (0..3).for_each(|i| track.position[i] += steps * velocity[i]);
+        }
+        track
+    }
+}
+
+#[cfg(test)]
+mod tests;
