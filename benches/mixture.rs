@@ -2,8 +2,8 @@
 //! dimensions, on one thread; first seeds apart. Then whole fits of Dirichlet-process mixtures to 1600 points
 //! in the plane, as the particle tracker needs two a frame.
 //!
-//! `python -m benchmarks.tables.mixture` and `python -m benchmarks.tables.dirichlet_mixture` time the same beside
-//! scikit-learn's.
+//! `python -m benchmarks.tables.mixture` and `python -m benchmarks.tables.dirichlet_mixture` time the same
+//! beside scikit-learn's.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::math::random::CounterRng;

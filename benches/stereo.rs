@@ -74,7 +74,10 @@ fn matching(criterion: &mut Criterion) {
             ("classes, rows given", classes.clone()),
             ("classes, 9 rows searched", EdgeDisparityOptions { row_offset: None, ..classes }),
             ("sgm", plain.clone()),
-            ("sgm, unchecked, whole px", EdgeDisparityOptions { check: false, subpixel: false, ..plain.clone() }),
+            (
+                "sgm, unchecked, whole px",
+                EdgeDisparityOptions { left_right_check: false, subpixel: false, ..plain.clone() },
+            ),
         ];
         for (name, options) in contestants {
             group.bench_function(BenchmarkId::new(name, count), |bencher| {

@@ -41,7 +41,7 @@ const REPLACED: &[(&str, &str)] = &[
     (
         "track",
         "outset sound rest take tell look front slanted silence freedom swung wary usual rearranged los \
-         fov eps check seed",
+         fov eps seed",
     ),
     ("cli", "los fov eps shared turning sideways seed"),
 ];

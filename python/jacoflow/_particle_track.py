@@ -139,7 +139,7 @@ class ParticleStep:
 
 def step_of(compiled: _ParticleStep) -> ParticleStep:
     """A step, in px and frames, of its compiled part."""
-    fields = compiled.told()
+    fields = compiled.as_dict()
     return ParticleStep(tracks=ParticleCorners(**fields.pop("tracks")), _compiled=compiled, **fields)
 
 

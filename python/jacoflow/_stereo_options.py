@@ -73,11 +73,11 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in options.items():
         if name in ("classes", "window", "prior_radius", "threads"):
             out[name] = _count(name, value)
-        elif name in ("sigma", "threshold", "min_support", "row_offset"):
+        elif name in ("blur_sigma", "threshold", "min_support", "row_offset"):
             out[name] = _number(name, value)
         elif name in ("disparity_range", "row_range"):
             out[name] = _several(name, value, 2, whole=True)
-        elif name in ("subpixel", "check"):
+        elif name in ("subpixel", "left_right_check"):
             out[name] = _switch(name, value, "True or False")
         elif name == "method" and not isinstance(value, str):
             raise ValueError(f'method: expected "classes" or "sgm", got {value!r}')

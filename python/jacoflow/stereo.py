@@ -51,10 +51,10 @@ def edge_disparity(
     row_offset: float | None = None,
     method: Literal["classes", "sgm"] = "sgm",
     subpixel: bool = True,
-    check: bool = True,
+    left_right_check: bool = True,
     prior: ArrayLike | None = None,
     prior_radius: int = 3,
-    sigma: float = 2.0,
+    blur_sigma: float = 2.0,
     threshold: float = 2.0,
     classes: int = 12,
     window: int = 17,
@@ -80,13 +80,13 @@ def edge_disparity(
         eight sides; fewer mistakes, fractions of a px, faster.
     subpixel : bool
         "sgm": refine to fractions of a px: where two lines of equal slope through the least cost and its neighbours meet, then Lucas-Kanade steps along x in 9 x 9 px, kept within 1 px of that.
-    check : bool
+    left_right_check : bool
         "sgm": keep only what matching from the right view confirms to 1 px.
     prior : array (H, W) or None
         Expected disparities, px, NaN where nothing is expected: only those within `prior_radius` px of them are candidates there.
     prior_radius : px
         See `prior`.
-    sigma : px
+    blur_sigma : px
         Standard deviation of the Gaussian behind the edges.
     threshold : grey levels/px
         Least slope of an edge.
@@ -118,7 +118,7 @@ def estimate_row_offset(
     *,
     disparity_range: tuple[int, int] = (-40, 24),
     row_range: tuple[int, int] = (-4, 4),
-    sigma: float = 2.0,
+    blur_sigma: float = 2.0,
     threshold: float = 2.0,
     classes: int = 12,
     window: int = 17,
@@ -136,10 +136,10 @@ def estimate_row_offset(
     return rows
 
 
-def edge_pixels(view: ArrayLike, *, sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+def edge_pixels(view: ArrayLike, *, blur_sigma: float = 2.0, threshold: float = 2.0, threads: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
     """Rows and columns, (N,) each, px, of the edge pixels of a view (H, W) or (H, W, 3): where `edge_disparity` looks for a match.
 
-    They have a gradient (Gaussian of `sigma` px) of at least `threshold` grey levels/px and are the steepest along its direction.
+    They have a gradient (Gaussian of `blur_sigma` px) of at least `threshold` grey levels/px and are the steepest along its direction.
     """
     return _edge_pixels(view, **_options(locals()))
 

@@ -10,7 +10,7 @@ use crate::image::picture::{GreyRange, draw_disparity};
 use crate::io::{DisparityFormat, DisparityMap, NumberedFiles, write_picture};
 use crate::parallel::Threads;
 use crate::pipeline::{GreyPair, GreyPairs, Numbering, check_target, is_folder};
-use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, FilmRows, Method};
+use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, Method, SequenceRows};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -124,7 +124,7 @@ impl StereoCommand {
             row_range: search.rows.unwrap_or(defaults.row_range),
             row_offset: search.row_offset,
             subpixel: !self.matching.whole,
-            check: !self.matching.unchecked,
+            left_right_check: !self.matching.unchecked,
             threshold: self.matching.threshold,
             threads: Threads::new(self.threads.threads)?,
             ..defaults
@@ -186,7 +186,7 @@ impl StereoCommand {
         if let Some(file) = self.output.as_deref().filter(|path| total > 1 && !is_folder(path)) {
             return Err(Error::argument("output", format!("a folder for {total} pairs"), file.display()));
         }
-        let (mut shown, mut rows) = (None, FilmRows::new(options.row_offset));
+        let (mut shown, mut rows) = (None, SequenceRows::new(options.row_offset));
         while let Some(GreyPair { views: [left, _], grey: pair }) = pairs.next(done.pairs, bar)? {
             let range = *shown.get_or_insert_with(|| GreyRange::of(&left));
             let found = rows.match_next(&pair[0], &pair[1], options)?;

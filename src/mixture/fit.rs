@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
             same_components = !self.prune(&mut posterior, &mut moments);
             converged &= same_components;
             if converged || lower_bounds.len() >= self.options.max_iter {
-                return Ok(self.told(posterior, moments, negentropy, lower_bounds, converged));
+                return Ok(self.result(posterior, moments, negentropy, lower_bounds, converged));
             }
             if !same_components {
                 factors = Factors::of(&posterior)?;
@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The result in the points' coordinates.
-    fn told(
+    fn result(
         &self,
         posterior: Posterior,
         mut moments: Moments,

@@ -13,10 +13,12 @@
 //! // Points about 0 and about 10, those about 10 three times.
 //! let x: Vec<f64> = (0..200).map(|i| f64::from(i % 2) * 10.0 + (f64::from(i) * 0.7).sin()).collect();
 //! let weights: Vec<f64> = (0..200).map(|i| if i % 2 == 0 { 1.0 } else { 3.0 }).collect();
-//! let options = MixtureOptions { components: 2, covariance_prior: CovariancePrior::Isotropic(0.1), ..MixtureOptions::default() };
+//! let covariance_prior = CovariancePrior::Isotropic(0.1);
+//! let options = MixtureOptions { components: 2, covariance_prior, ..MixtureOptions::default() };
 //! let fit = fit(&Points { dimensions: 1, values: &x, weights: Some(&weights) }, &options, Start::Seeds)?;
 //! let heavy = if fit.posterior.means[0] > fit.posterior.means[1] { 0 } else { 1 };
-//! assert!((fit.posterior.means[heavy] - 10.0).abs() < 0.1 && (fit.moments.counts[heavy] - 300.0).abs() < 1e-6);
+//! assert!((fit.posterior.means[heavy] - 10.0).abs() < 0.1);
+//! assert!((fit.moments.counts[heavy] - 300.0).abs() < 1e-6);
 //! # Ok(())
 //! # }
 //! ```

@@ -4,12 +4,12 @@ use crate::error::{Error, Result};
 use crate::parallel::Threads;
 
 /// Most components: what nobody needs must not take all memory.
-const MOST_COMPONENTS: usize = 1 << 16;
+const MAX_COMPONENTS: usize = 1 << 16;
 /// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers
 /// any more.
-const MOST_PRIOR: f64 = 1e100;
+const MAX_PRIOR: f64 = 1e100;
 /// And of fewer, the bound is none any more.
-const LEAST_PRIOR: f64 = 1e-100;
+const MIN_PRIOR: f64 = 1e-100;
 
 /// Where the inverse scale matrix of the Wishart prior, `W0^-1` (D, D), comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,8 +100,8 @@ impl MixtureOptions {
                 return Err(Error::argument(name, "a positive integer", count));
             }
         }
-        if self.components > MOST_COMPONENTS {
-            let expected = format!("a positive integer up to {MOST_COMPONENTS}");
+        if self.components > MAX_COMPONENTS {
+            let expected = format!("a positive integer up to {MAX_COMPONENTS}");
             return Err(Error::argument("n_components", expected, self.components));
         }
         for (name, value) in [
@@ -109,8 +109,8 @@ impl MixtureOptions {
             ("mean_precision_prior", self.mean_precision_prior),
         ] {
             positive(name, value)?;
-            if !(LEAST_PRIOR..=MOST_PRIOR).contains(&value) {
-                let expected = format!("a positive number from {LEAST_PRIOR:e} to {MOST_PRIOR:e}");
+            if !(MIN_PRIOR..=MAX_PRIOR).contains(&value) {
+                let expected = format!("a positive number from {MIN_PRIOR:e} to {MAX_PRIOR:e}");
                 return Err(Error::argument(name, expected, format!("{value:e}")));
             }
         }

@@ -14,7 +14,7 @@ const FLAT: f64 = 1e-10;
 const RAISED: f64 = 1e-6;
 /// Variances up to this are no spread: their inverses would be near overflow, and squares below it lose their
 /// digits.
-const LEAST_VARIANCE: f64 = 1e-304;
+const MIN_VARIANCE: f64 = 1e-304;
 
 /// The prior: `pi ~ Dir(alpha0)` (8), `mu_k ~ N(m0, (beta0 Lambda_k)^-1)`, `Lambda_k ~ W(W0, nu0)` (9).
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +111,7 @@ pub(super) fn data_covariance(points: &Points) -> Vec<f64> {
             sums[j * d + i] = sums[i * d + j];
         }
     }
-    let spread: Vec<bool> = (0..d).map(|i| sums[i * (d + 1)] > LEAST_VARIANCE).collect();
+    let spread: Vec<bool> = (0..d).map(|i| sums[i * (d + 1)] > MIN_VARIANCE).collect();
     raise_where_none(&mut sums, &spread);
     raise_if_flat(&mut sums, d);
     sums
@@ -126,7 +126,7 @@ fn raise_where_none(matrix: &mut [f64], spread: &[bool]) {
             matrix[i * d + j] = 0.0;
             matrix[j * d + i] = 0.0;
         }
-        matrix[i * (d + 1)] = if typical > 0.0 { (RAISED * typical).max(LEAST_VARIANCE) } else { RAISED };
+        matrix[i * (d + 1)] = if typical > 0.0 { (RAISED * typical).max(MIN_VARIANCE) } else { RAISED };
     }
 }
 

@@ -112,7 +112,7 @@ impl Sample {
     }
 }
 
-/// Components from the arrays that [`told`] made.
+/// Components from the arrays that [`fit_dict`] made.
 fn posterior(from: &Bound<'_, PyDict>) -> PyResult<Posterior> {
     let means = arrays::doubles("means", &from.as_any().get_item("means")?)?;
     Ok(Posterior {
@@ -125,7 +125,7 @@ fn posterior(from: &Bound<'_, PyDict>) -> PyResult<Posterior> {
     })
 }
 
-/// What earlier batches left, from the arrays that [`told`] made.
+/// What earlier batches left, from the arrays that [`fit_dict`] made.
 fn retained(from: &Bound<'_, PyDict>) -> PyResult<Retained> {
     let posterior = posterior(from)?;
     let prior = Prior {
@@ -145,7 +145,7 @@ fn retained(from: &Bound<'_, PyDict>) -> PyResult<Retained> {
 }
 
 /// A fit as a dictionary of arrays.
-fn told(py: Python<'_>, fit: Fit) -> PyResult<Bound<'_, PyDict>> {
+fn fit_dict(py: Python<'_>, fit: Fit) -> PyResult<Bound<'_, PyDict>> {
     let out = PyDict::new(py);
     let (k, d) = (fit.posterior.components(), fit.posterior.dimensions);
     let rounds = fit.lower_bounds.len();
@@ -197,7 +197,7 @@ pub fn mixture_fit<'py>(
         };
         fit(&sample.points(), &options, start)
     })?;
-    told(py, result)
+    fit_dict(py, result)
 }
 
 #[pyfunction]
@@ -214,7 +214,7 @@ pub fn mixture_partial_fit<'py>(
     let options = options(parameters, sample.dimensions)?;
     let earlier = earlier.map(retained).transpose()?;
     let result = py.detach(|| partial_fit(&sample.points(), &options, earlier.as_ref(), forgetting))?;
-    told(py, result)
+    fit_dict(py, result)
 }
 
 #[pyfunction]

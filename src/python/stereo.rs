@@ -35,7 +35,7 @@ pub(super) fn in_levels(view: &AnyFrame, gain: f64) -> Frame<f32> {
 struct Search {
     disparity_range: (i32, i32),
     row_range: (i32, i32),
-    sigma: f64,
+    blur_sigma: f64,
     threshold: f64,
     classes: usize,
     window: usize,
@@ -50,7 +50,7 @@ struct Matching<'py> {
     method: String,
     row_offset: Option<f64>,
     subpixel: bool,
-    check: bool,
+    left_right_check: bool,
     prior: Option<Bound<'py, PyAny>>,
     prior_radius: u32,
 }
@@ -60,7 +60,7 @@ impl Search {
         Ok(EdgeDisparityOptions {
             disparity_range: self.disparity_range,
             row_range: self.row_range,
-            sigma: self.sigma,
+            blur_sigma: self.blur_sigma,
             threshold: self.threshold,
             classes: self.classes,
             window: self.window,
@@ -79,7 +79,7 @@ impl Matching<'_> {
             method: Method::parse(&self.method)?,
             row_offset: self.row_offset,
             subpixel: self.subpixel,
-            check: self.check,
+            left_right_check: self.left_right_check,
             prior: prior.map(|prior| prior.to_real::<f32>()),
             prior_radius: self.prior_radius,
             ..options
@@ -133,16 +133,16 @@ pub fn estimate_row_offset(
 #[pyfunction(name = "_edge_pixels")]
 pub fn edge_pixels<'py>(
     view: &Bound<'py, PyAny>,
-    sigma: f64,
+    blur_sigma: f64,
     threshold: f64,
     threads: Option<usize>,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = view.py();
     let threads = Threads::new(threads)?;
-    let options = EdgeDisparityOptions { sigma, threshold, ..EdgeDisparityOptions::default() };
+    let options = EdgeDisparityOptions { blur_sigma, threshold, ..EdgeDisparityOptions::default() };
     options.check()?;
     let [view] = grey_levels([("view", view)])?;
-    let settings = EdgeSettings { sigma, threshold, classes: options.classes };
+    let settings = EdgeSettings { blur_sigma, threshold, classes: options.classes };
     let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
     let count = [map.len()];
     Ok((arrays::owned(py, &count, map.rows)?.into_any(), arrays::owned(py, &count, map.columns)?.into_any()))

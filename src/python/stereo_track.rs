@@ -73,7 +73,7 @@ impl PyStereoTracker {
         ];
         let step =
             py.detach(|| self.lock().step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
-        told(py, step)
+        step_dict(py, step)
     }
 
     /// The next step from the left view and its disparities, NaN where there is none, `dt` after the last
@@ -94,14 +94,14 @@ impl PyStereoTracker {
             }
         };
         if left.size() != disparity.size() {
-            let told = |(width, height): (usize, usize)| format!("({height}, {width})");
-            let expected = format!("the left view's shape {}", told(left.size()));
-            return Err(Error::argument("disparity", expected, told(disparity.size())).into());
+            let shape = |(width, height): (usize, usize)| format!("({height}, {width})");
+            let expected = format!("the left view's shape {}", shape(left.size()));
+            return Err(Error::argument("disparity", expected, shape(disparity.size())).into());
         }
         let points = EdgePoints::from_map(&disparity);
         let step =
             py.detach(|| self.lock().step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
-        told(py, step)
+        step_dict(py, step)
     }
 
     /// How many rows lower the right view shows a point, where that is known.
@@ -163,7 +163,7 @@ fn cluster<'py>(py: Python<'py>, node: &Node) -> PyResult<Bound<'py, PyDict>> {
 }
 
 /// A step, by the names of `jacoflow.track.StereoStep`.
-fn told(py: Python<'_>, step: Step) -> PyResult<Bound<'_, PyDict>> {
+fn step_dict(py: Python<'_>, step: Step) -> PyResult<Bound<'_, PyDict>> {
     let out = PyDict::new(py);
     let count = [step.rows.len()];
     let clusters = step.clusters.iter().map(|node| cluster(py, node)).collect::<PyResult<Vec<_>>>()?;

@@ -1,46 +1,46 @@
-//! What an offset of the rows is worth: how well the views agree with it.
+//! Agreement of the views with a row offset.
 
 use super::semi_global::Match;
 use crate::math::median;
 
-/// Least share of the edge pixels that are matched where the rows are aligned.
-const LEAST_MATCHED: f64 = 0.3;
-/// Fewer edge pixels say nothing of the rows.
-const LEAST_EDGES: usize = 30;
-/// A median score below this is that of matches most of which are wrong: one of rows that are aligned is
-/// above .8 with noise of 2 grey levels, of rows that are two apart or more below .55.
-const POOR: f64 = 0.7;
+/// Smallest share of matched edge pixels with aligned rows.
+const MIN_MATCHED_SHARE: f64 = 0.3;
+/// Smallest number of edge pixels for a decision.
+const MIN_EDGES: usize = 30;
+/// Median score below which most matches are wrong: above .8 with aligned rows and noise of 2 grey levels,
+/// below .55 with rows two or more apart.
+const MIN_SCORE: f64 = 0.7;
 
-/// An estimate of the row offset, and what it is worth.
+/// Row offset, given or estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowOffset {
     /// `y_right - y_left`, rows.
     pub rows: f64,
-    /// Whether the views have edges and yet hardly agree at any offset that was searched: the true one lies
-    /// outside of the range, or the views do not belong together.
+    /// Whether the views have edges and yet disagree at every offset in the range: the true one lies outside,
+    /// or the views do not belong together.
     pub doubtful: bool,
 }
 
 impl RowOffset {
-    /// One that is given, or known, is not to be doubted.
+    /// A given or known offset, not doubtful.
     pub(super) fn given(rows: f64) -> Self {
         Self { rows, doubtful: false }
     }
 }
 
-/// How well matches with some row offset agree.
+/// Agreement of the matches at a row offset.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Agreement {
-    /// Edge pixels that were to be matched.
+    /// Number of edge pixels.
     edges: usize,
-    /// Share of them that were.
+    /// Share of them with a match.
     matched: f64,
-    /// Median score of these, 0 to 1; none of none.
+    /// Median score of the matches, 0 to 1; none without matches.
     score: Option<f64>,
 }
 
 impl Agreement {
-    /// Of as many edge pixels as there are items, from the scores of those that are matched.
+    /// From the score of each edge pixel with a match.
     pub fn new(scores: impl Iterator<Item = Option<f32>>) -> Self {
         let (mut edges, mut found) = (0, Vec::new());
         for score in scores {
@@ -50,31 +50,30 @@ impl Agreement {
         Self { edges, matched: found.len() as f64 / (edges as f64).max(1.0), score: median(&mut found) }
     }
 
-    /// Of semi-global matching.
+    /// From semi-global matching.
     pub fn of(matches: &[Option<Match>]) -> Self {
         Self::new(matches.iter().map(|found| found.map(|found| 1.0 - found.cost)))
     }
 
-    /// Whether enough edge pixels are matched for the offset to be believed.
+    /// Whether enough edge pixels are matched to accept the offset.
     pub fn suffices(&self) -> bool {
-        self.edges >= LEAST_EDGES && self.matched >= LEAST_MATCHED
+        self.edges >= MIN_EDGES && self.matched >= MIN_MATCHED_SHARE
     }
 
-    /// Whether there is much to be matched, and little was.
+    /// Whether there are enough edge pixels, and too few are matched.
     pub fn contradicts(&self) -> bool {
-        self.edges >= LEAST_EDGES && self.matched < LEAST_MATCHED
+        self.edges >= MIN_EDGES && self.matched < MIN_MATCHED_SHARE
     }
 
-    /// Whether there is much to be matched, too little of it was or the offset is `unsure` for another
-    /// reason, and what was matched is matched badly.
+    /// Whether too few of enough edge pixels are matched, or the offset is `unsure` otherwise, and the matches
+    /// are poor.
     pub fn is_doubtful(&self, unsure: bool) -> bool {
-        let poor = self.score.is_some_and(|score| score < POOR);
-        self.edges >= LEAST_EDGES && (unsure || !self.suffices()) && poor
+        let poor = self.score.is_some_and(|score| score < MIN_SCORE);
+        self.edges >= MIN_EDGES && (unsure || !self.suffices()) && poor
     }
 }
 
-/// Whether an offset is at or beyond an end of the rows that were searched: so is the best of those that are
-/// all wrong.
+/// Whether an offset is at an end of the searched range, as the best of wrong ones usually is.
 pub(super) fn at_an_end(rows: f64, (least, greatest): (i32, i32)) -> bool {
     least < greatest && (rows < f64::from(least) + 0.5 || rows > f64::from(greatest) - 0.5)
 }

@@ -10,18 +10,18 @@ use super::cost::{CHUNK, UNIT};
 use super::edges::EdgeMap;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 
-/// How far back along a direction an edge pixel is looked for, px.
-const FARTHEST: usize = 16;
+/// Largest distance of the edge pixel behind, px.
+const MAX_GAP: usize = 16;
 /// Cost of a change by one candidate, and of any larger one, grey levels/px.
 const PENALTIES: [f64; 2] = [1.0, 6.0];
 /// Directions of one sweep: along the row, down the column, and both diagonals.
 const DIRECTIONS: usize = 4;
-/// Stands beside the first and the last candidate: no path comes from there.
+/// Cost beyond the first and the last candidate.
 const WALL: u16 = 60000;
 /// No edge pixel yet.
 const NONE: u32 = u32::MAX;
 
-/// From which side a sweep comes.
+/// Direction of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum From {
     Above,
@@ -45,18 +45,18 @@ struct Sweep<'a> {
 }
 
 /// Penalties at every distance, in units of cost.
-fn penalties() -> [[u16; 2]; FARTHEST + 1] {
+fn penalties() -> [[u16; 2]; MAX_GAP + 1] {
     std::array::from_fn(|gap| {
-        PENALTIES.map(|p| (p * f64::from(UNIT) * (-(gap as f64) / FARTHEST as f64).exp()).round() as u16)
+        PENALTIES.map(|p| (p * f64::from(UNIT) * (-(gap as f64) / MAX_GAP as f64).exp()).round() as u16)
     })
 }
 
-/// Most edge pixels in any `FARTHEST + 1` rows that follow one another, at least 1.
+/// Most edge pixels in any `MAX_GAP + 1` rows that follow one another, at least 1.
 fn most_in_reach(rows: &[u32]) -> usize {
     let mut first = 0;
     let mut most = 1;
     for (i, &row) in rows.iter().enumerate() {
-        while (row - rows[first]) as usize > FARTHEST {
+        while (row - rows[first]) as usize > MAX_GAP {
             first += 1;
         }
         most = most.max(i - first + 1);
@@ -64,7 +64,7 @@ fn most_in_reach(rows: &[u32]) -> usize {
     most
 }
 
-/// The edge pixels met last, by what they share with one that follows in a direction.
+/// Last edge pixel on each row, column and diagonal.
 struct Last {
     row: u32,
     column: Vec<u32>,
@@ -78,7 +78,7 @@ impl Last {
         Self { row: NONE, column: vec![NONE; width], falling: diagonals.clone(), rising: diagonals }
     }
 
-    /// Those behind a pixel, one a direction; the pixel takes their place.
+    /// Edge pixels behind a pixel, one for each direction; the pixel replaces them.
     #[inline(always)]
     fn replace(&mut self, x: usize, y: usize, step: u32) -> [u32; DIRECTIONS] {
         let (falling, rising) = (x + self.falling.len() - self.column.len() - 1 - y, x + y);
@@ -91,8 +91,7 @@ impl Last {
     }
 }
 
-/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the
-/// instructions of the level.
+/// Small integers: the compiler vectorises the loops with the instructions of the level.
 impl Kernel<f32> for Sweep<'_> {
     type Output = ();
 
@@ -119,10 +118,10 @@ impl Kernel<f32> for Sweep<'_> {
                 if behind[r] != NONE {
                     let q = of(behind[r] as usize);
                     let (dx, dy) = (x.abs_diff(edges.columns[q] as usize), y.abs_diff(edges.rows[q] as usize));
-                    // What was met last may be in a row above.
+                    // The last edge pixel may be in a row above.
                     gap = if r == 0 && dy > 0 { usize::MAX } else { dx.max(dy) };
                 }
-                least[slot] = if gap <= FARTHEST {
+                least[slot] = if gap <= MAX_GAP {
                     let q = r * kept + behind[r] as usize % kept;
                     let ranges = [q * block..(q + 1) * block, slot * block..(slot + 1) * block];
                     let [before, path] = paths.get_disjoint_mut(ranges).expect("blocks of two pixels");
@@ -198,7 +197,7 @@ fn chunk_mut(values: &mut [u16], at: usize) -> &mut [u16; CHUNK] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cost::HIGHEST;
+    use super::super::cost::MAX_COST;
     use super::super::edges::NO_CLASS;
     use super::*;
     use crate::math::random::CounterRng;
@@ -230,7 +229,7 @@ mod tests {
         let mut paths = vec![0u16; costs.len()];
         for p in order {
             let (x, y) = (i64::from(edges.columns[p]), i64::from(edges.rows[p]));
-            let behind = (1..=FARTHEST as i64).find_map(|g| Some((g as usize, index(x - g * dx, y - g * dy)?)));
+            let behind = (1..=MAX_GAP as i64).find_map(|g| Some((g as usize, index(x - g * dx, y - g * dy)?)));
             for k in 0..padded {
                 let mut value = costs[p * padded + k];
                 if let Some((gap, q)) = behind {
@@ -255,7 +254,7 @@ mod tests {
         let padded = 2 * CHUNK;
         let rng = CounterRng::new(9);
         let costs: Vec<u16> =
-            (0..edges.len() * padded).map(|i| (rng.uniform(i as u64) * f64::from(HIGHEST)) as u16).collect();
+            (0..edges.len() * padded).map(|i| (rng.uniform(i as u64) * f64::from(MAX_COST)) as u16).collect();
         for (from, directions) in
             [(From::Above, [(1, 0), (0, 1), (1, 1), (-1, 1)]), (From::Below, [(-1, 0), (0, -1), (1, -1), (-1, -1)])]
         {

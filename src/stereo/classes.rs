@@ -11,8 +11,7 @@ use rayon::prelude::*;
 
 /// Pixels compared at a time; no window is wider.
 const LANES: usize = 32;
-/// Stands for left pixels without a class and for what is beyond a window, never equal to [`NO_CLASS`] or a
-/// class on the right.
+/// Code of left pixels without a class, and beyond a window; differs from [`NO_CLASS`] and all classes.
 const NOTHING_LEFT: u8 = NO_CLASS - 1;
 /// Edge pixels of one task.
 const TASK: usize = 256;
@@ -96,8 +95,7 @@ struct Task<'a> {
     out: &'a mut [Option<ClassMatch>],
 }
 
-/// Bytes are compared, whatever the lanes are: the compiler makes vectors of the loops with the instructions
-/// of the level.
+/// Bytes: the compiler vectorises the loops with the instructions of the level.
 impl Kernel<f32> for Task<'_> {
     type Output = ();
 
@@ -215,7 +213,7 @@ mod tests {
     }
 
     fn edges(view: &Frame<f32>) -> EdgeMap {
-        EdgeMap::new(view, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 })
+        EdgeMap::new(view, &EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 })
     }
 
     /// The same by the definition.

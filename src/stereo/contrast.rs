@@ -1,41 +1,41 @@
-//! Cameras of different gain: the right view with the contrast of the left one.
+//! Cameras of different gain: scales the right view to the contrast of the left one.
 
 use crate::types::Frame;
 use std::borrow::Cow;
 
-/// Every how many pixels along x and y one is looked at.
+/// Step of the sampled pixels along x and y.
 const SAMPLED: usize = 2;
-/// Shares of the differences in brightness that are above those which are compared.
+/// Upper quantiles of the differences in brightness that are compared.
 const SHARES: [f64; 4] = [0.01, 0.02, 0.04, 0.08];
-/// Smaller differences are noise, grey levels.
-const LEAST: f32 = 2.0;
-/// Factors between which contrasts count as equal: what one view shows beside the other makes as much.
-const EQUAL: [f32; 2] = [0.92, 1.08];
-/// By what factor the ratios may differ; where they do by more, the views differ otherwise than by a gain.
-const ALIKE: f32 = 1.15;
+/// Floor of the differences, grey levels: noise.
+const MIN_DIFFERENCE: f32 = 2.0;
+/// Ratios that count as 1: different content of the views causes as much.
+const EQUAL_CONTRAST: [f32; 2] = [0.92, 1.08];
+/// Largest ratio of the ratios; above, the views differ by more than a gain.
+const MAX_RATIO_SPREAD: f32 = 1.15;
 
-/// The right view times the ratio of both views' contrasts, unless that is nearly 1 or is none. Matching
-/// compares gradients, which a gain changes; a bias they do not see.
+/// The right view times the ratio of contrasts, unless that is nearly 1 or undefined. Gradients depend on a
+/// gain, not on a bias.
 pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, Frame<f32>> {
     match ratio(left, right).filter(|_| crate::ablation::keeps("edges.contrast")) {
-        Some(ratio) if !(EQUAL[0]..=EQUAL[1]).contains(&ratio) => Cow::Owned(right.map(|&value| value * ratio)),
+        Some(ratio) if !(EQUAL_CONTRAST[0]..=EQUAL_CONTRAST[1]).contains(&ratio) => {
+            Cow::Owned(right.map(|&value| value * ratio))
+        }
         _ => Cow::Borrowed(right),
     }
 }
 
-/// Contrast of the left view over that of the right one, where it can be told: the middle of the ratios of
-/// both views' greatest differences in brightness, at the same ranks. Only a gain makes all of them alike:
-/// not what covers part of a view, nor a white at which one is cut off.
+/// Ratio of the contrasts: median of the ratios of both views' upper quantiles. `None` if they differ, as
+/// with occlusion or saturation.
 fn ratio(left: &Frame<f32>, right: &Frame<f32>) -> Option<f32> {
     let (left, right) = (greatest_differences(left)?, greatest_differences(right)?);
     let mut ratios: [f32; SHARES.len()] = std::array::from_fn(|i| left[i] / right[i]);
     ratios.sort_unstable_by(f32::total_cmp);
     let [least, below, above, most] = ratios;
-    (most <= ALIKE * least).then_some(0.5 * (below + above))
+    (most <= MAX_RATIO_SPREAD * least).then_some(0.5 * (below + above))
 }
 
-/// Sizes of the differences across two pixels along x that the shares are above; `None` where these are
-/// noise.
+/// Upper quantiles of the differences across two pixels along x; `None` if they are noise.
 fn greatest_differences(view: &Frame<f32>) -> Option<[f32; SHARES.len()]> {
     let rows = (0..view.height()).step_by(SAMPLED).map(|y| view.row(y));
     let sizes = rows.flat_map(|row| row.windows(3).step_by(SAMPLED).map(|three| (three[2] - three[0]).abs()));
@@ -44,7 +44,7 @@ fn greatest_differences(view: &Frame<f32>) -> Option<[f32; SHARES.len()]> {
     let mut at = |share: f64| {
         let place = ((1.0 - share) * count as f64) as usize;
         let size = (place < count).then(|| *sizes.select_nth_unstable_by(place, f32::total_cmp).1);
-        size.filter(|size| *size >= LEAST)
+        size.filter(|size| *size >= MIN_DIFFERENCE)
     };
     Some([at(SHARES[0])?, at(SHARES[1])?, at(SHARES[2])?, at(SHARES[3])?])
 }

@@ -1,8 +1,8 @@
-//! What it costs to call two pixels one point: section 6.2.
+//! Matching cost of two pixels.
 //!
 //! `C(p, d)` is the mean over 5 x 5 px of `min(|g_x - g_x'| + |g_y - g_y'|, 6)`, gradients with a Gaussian of
-//! 1 px. Gradients are kept in sixteenths of a grey level/px, which is far below their noise, so that 16
-//! candidates are compared at a time and sums are exact whatever their order.
+//! 1 px. Gradients are quantised to sixteenths of a grey level/px, far below their noise: 16 candidates are
+//! compared at a time, and sums are exact in any order.
 
 use super::edges::EdgeMap;
 use crate::parallel::for_each_band;
@@ -18,16 +18,15 @@ const RADIUS: usize = 2;
 const SIDE: usize = 2 * RADIUS + 1;
 /// Steps of a gradient in one grey level/px.
 const STEPS: f32 = 16.0;
-/// Difference of two gradients that counts as any larger one, grey levels/px.
+/// Truncation of the difference of two gradients, grey levels/px.
 const TRUNCATION: u16 = 6;
 /// Cost of one grey level/px.
 pub(super) const UNIT: u16 = STEPS as u16 * (SIDE * SIDE) as u16;
 /// The highest cost: no pixel of the window is alike.
-pub(super) const HIGHEST: u16 = TRUNCATION * UNIT;
-/// Gradients beyond this are told as this, steps.
-const LARGEST: f32 = 8000.0;
-/// Stands for what is unknown or outside, by the side of the view: further from every gradient, and from the
-/// other side's, than the truncation.
+pub(super) const MAX_COST: u16 = TRUNCATION * UNIT;
+/// Largest gradient, steps; larger ones are clamped.
+const MAX_GRADIENT: f32 = 8000.0;
+/// Code of unknown or outside gradients of each view, farther than the truncation from every gradient.
 const UNKNOWN: [i16; 2] = [-16000, 16000];
 /// Edge pixels of one task.
 const TASK: usize = 256;
@@ -60,7 +59,7 @@ impl Coded {
                     let Some(y) = row.checked_sub(RADIUS).filter(|y| *y < slopes.height()) else { continue };
                     for (out, &slope) in out[border..].iter_mut().zip(slopes.row(y)) {
                         if slope.is_finite() {
-                            *out = rounded((slope * STEPS).clamp(-LARGEST, LARGEST));
+                            *out = rounded((slope * STEPS).clamp(-MAX_GRADIENT, MAX_GRADIENT));
                         }
                     }
                 }
@@ -71,11 +70,10 @@ impl Coded {
     }
 }
 
-/// The nearest whole number to a value within [`LARGEST`] of 0. Cut off rather than rounded, which not every
-/// processor can do to many at a time.
+/// Rounds a value within [`MAX_GRADIENT`] of 0 by truncation, which vectorises on every processor.
 #[inline(always)]
 fn rounded(value: f32) -> i16 {
-    const SHIFT: f32 = 2.0 * LARGEST;
+    const SHIFT: f32 = 2.0 * MAX_GRADIENT;
     ((value + (SHIFT + 0.5)) as i32 - SHIFT as i32) as i16
 }
 
@@ -119,7 +117,7 @@ pub(super) fn costs(
     allowed: impl Fn(usize) -> std::ops::Range<usize> + Sync,
 ) -> Vec<u16> {
     let padded = candidates.padded();
-    let mut costs = vec![HIGHEST; edges.len() * padded];
+    let mut costs = vec![MAX_COST; edges.len() * padded];
     costs.par_chunks_mut(TASK * padded).enumerate().for_each(|(task, out)| {
         for (i, out) in out.chunks_exact_mut(padded).enumerate() {
             let edge = task * TASK + i;
@@ -133,8 +131,8 @@ pub(super) fn costs(
             let others = (others as isize + candidates.first as isize) as usize;
             let chunks = allowed.start / CHUNK..allowed.end.div_ceil(CHUNK);
             dispatch(Level::detect(), OnePixel { own, other, window, others, chunks, out });
-            out[..allowed.start].fill(HIGHEST);
-            out[allowed.end..].fill(HIGHEST);
+            out[..allowed.start].fill(MAX_COST);
+            out[allowed.end..].fill(MAX_COST);
         }
     });
     costs
@@ -151,8 +149,7 @@ struct OnePixel<'a> {
     out: &'a mut [u16],
 }
 
-/// Small integers are compared, whatever the lanes are: the compiler makes vectors of the loops with the
-/// instructions of the level.
+/// Small integers: the compiler vectorises the loops with the instructions of the level.
 impl Kernel<f32> for OnePixel<'_> {
     type Output = ();
 
@@ -197,7 +194,7 @@ mod tests {
     #[test]
     fn costs_are_those_of_the_definition() {
         let view = Frame::from_fn(40, 30, |x, y| if (x / 9 + y / 7) % 2 == 0 { 50.0f32 } else { 150.0 });
-        let edges = EdgeMap::new(&view, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        let edges = EdgeMap::new(&view, &EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 });
         let (own, mut other) = ([slopes(1), slopes(2)], [slopes(3), slopes(4)]);
         other[0].data_mut()[15 * 40 + 20] = f32::NAN;
         let candidates = Candidates { first: -6, count: 19 };
@@ -232,7 +229,9 @@ mod tests {
 
     #[test]
     fn gradients_are_rounded_to_the_nearest_step() {
-        for (value, step) in [(0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (LARGEST, 8000), (-LARGEST, -8000)] {
+        for (value, step) in
+            [(0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (MAX_GRADIENT, 8000), (-MAX_GRADIENT, -8000)]
+        {
             assert_eq!(rounded(value), step, "{value}");
         }
     }

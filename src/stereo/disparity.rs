@@ -1,14 +1,13 @@
-//! The one door: two views in, the disparity of the left edge pixels out.
+//! Entry point: two views in, the disparity of the left edge pixels out.
 
 use super::agreement::{Agreement, RowOffset, at_an_end};
-use super::align::rows_moved;
+use super::align::match_aligned;
 use super::classes::{match_classes, most_frequent_row};
 use super::contrast::balanced;
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::{EdgeDisparityOptions, Method};
 use super::row_offset::row_offset_of;
-use super::semi_global::{Match, View, match_views};
-use super::subpixel::refine;
+use super::semi_global::{Match, View};
 use crate::error::Result;
 use crate::types::Frame;
 
@@ -23,14 +22,14 @@ pub struct EdgeDisparity {
     pub columns: Vec<u32>,
     /// Their disparities, px.
     pub values: Vec<f32>,
-    /// How well both views agree there, 0 to 1: share of the window's classed pixels whose class agrees, or 1
-    /// less the matching cost over its truncation.
+    /// Agreement of the views, 0 to 1: share of the window's classed pixels whose class agrees, or 1 less the
+    /// matching cost over its truncation.
     pub scores: Vec<f32>,
-    /// Whether `row_offset` was searched and the views hardly agree with it: the true one lies outside of the
+    /// Whether `row_offset` was searched and the views disagree with it: the true one lies outside of the
     /// range, or the views do not belong together. Many disparities are then wrong.
     pub rows_doubtful: bool,
-    /// How many rows lower the right view shows a point: the one given, the estimate, or the most frequent
-    /// one of the class matching (0 without matches).
+    /// Row offset of the right view: given, estimated, or the most frequent one of the class matching (0
+    /// without matches).
     pub row_offset: f64,
 }
 
@@ -73,7 +72,7 @@ pub fn edge_disparity(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDispa
     }))
 }
 
-/// Class matching with the rows that the options ask for.
+/// Class matching.
 fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
     let settings = EdgeSettings::of(options);
     let (edges, right) = (EdgeMap::new(left, &settings), EdgeMap::new(right, &settings));
@@ -94,42 +93,13 @@ fn by_classes(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOpti
 fn by_semi_global(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> EdgeDisparity {
     let right = &*balanced(left, right);
     let view = View::of(left, options);
-    let rows =
-        options.row_offset.map_or_else(|| row_offset_of(left, &view, right, options).told(options), RowOffset::given);
-    told(&view, &match_aligned(left, &view, right, rows.rows, options), rows)
+    let rows = options
+        .row_offset
+        .map_or_else(|| row_offset_of(left, &view, right, options).row_offset(options), RowOffset::given);
+    edge_disparities(&view, &match_aligned(left, &view, right, rows.rows, options), rows)
 }
 
-/// What matches of the left edge pixels say.
-pub(super) fn told(view: &View, matches: &[Option<Match>], rows: RowOffset) -> EdgeDisparity {
+/// Disparities of the matched left edge pixels.
+pub(super) fn edge_disparities(view: &View, matches: &[Option<Match>], rows: RowOffset) -> EdgeDisparity {
     EdgeDisparity::new(&view.edges, matches.iter().map(|m| m.map(|m| (m.disparity, 1.0 - m.cost))), rows)
-}
-
-/// Matches of the left edge pixels with the right view moved up by `row_offset`.
-pub(super) fn match_aligned(
-    left: &Frame<f32>,
-    view: &View,
-    right: &Frame<f32>,
-    row_offset: f64,
-    options: &EdgeDisparityOptions,
-) -> Vec<Option<Match>> {
-    let aligned = rows_moved(right, row_offset);
-    let mut matches = match_views(view, &View::of(&aligned, options), options);
-    // A row that the right view does not have was replicated from its border.
-    let last = left.height() as f64 - 1.0;
-    for (found, &row) in matches.iter_mut().zip(&view.edges.rows) {
-        if !(0.0..=last).contains(&(f64::from(row) + row_offset)) {
-            *found = None;
-        }
-    }
-    if options.subpixel {
-        refine(left, view, &aligned, &mut matches);
-    }
-    matches
-}
-
-impl EdgeSettings {
-    /// Those of a matcher.
-    pub(super) fn of(options: &EdgeDisparityOptions) -> Self {
-        Self { sigma: options.sigma, threshold: options.threshold, classes: options.classes }
-    }
 }

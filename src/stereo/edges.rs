@@ -1,5 +1,6 @@
 //! Edge pixels, and the class of every pixel's gradient direction: sections 2.1 and 2.2.
 
+use super::options::EdgeDisparityOptions;
 use crate::image::gaussian_gradient;
 use crate::parallel::for_each_band;
 use crate::simd::Level;
@@ -26,15 +27,22 @@ pub struct EdgeMap {
     pub columns: Vec<u32>,
 }
 
-/// How gradients become edges.
+/// Settings of the edge detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeSettings {
     /// Standard deviation of the Gaussian, px; cut off at four times that.
-    pub sigma: f64,
-    /// Least magnitude that has a direction, grey levels/px.
+    pub blur_sigma: f64,
+    /// Smallest magnitude with a direction, grey levels/px.
     pub threshold: f64,
     /// Classes over the whole turn.
     pub classes: usize,
+}
+
+impl EdgeSettings {
+    /// The settings of matching options.
+    pub(super) fn of(options: &EdgeDisparityOptions) -> Self {
+        Self { blur_sigma: options.blur_sigma, threshold: options.threshold, classes: options.classes }
+    }
 }
 
 impl EdgeMap {
@@ -44,8 +52,8 @@ impl EdgeMap {
     /// and more than one px ahead (bilinear), so that of two equal neighbours one remains. The outermost
     /// pixels have no neighbours and are none. Identical for any number of threads.
     pub fn new(view: &Frame<f32>, settings: &EdgeSettings) -> Self {
-        let radius = (4.0 * settings.sigma).round() as usize;
-        let (gradient_x, gradient_y) = gaussian_gradient(Level::detect(), view, settings.sigma, radius);
+        let radius = (4.0 * settings.blur_sigma).round() as usize;
+        let (gradient_x, gradient_y) = gaussian_gradient(Level::detect(), view, settings.blur_sigma, radius);
         let (width, height) = view.size();
         let mut magnitude = Frame::filled(width, height, 0.0f32);
         for_each_band(magnitude.data_mut(), width, |_, rows, band| {
@@ -139,7 +147,7 @@ fn direction_class(x: f32, y: f32, classes: usize) -> u8 {
 mod tests {
     use super::*;
 
-    const SETTINGS: EdgeSettings = EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 };
+    const SETTINGS: EdgeSettings = EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 };
 
     #[test]
     fn directions_keep_their_sign() {

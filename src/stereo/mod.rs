@@ -17,15 +17,15 @@ mod contrast;
 mod cost;
 mod disparity;
 mod edges;
-mod film_rows;
 mod options;
 mod row_offset;
 mod semi_global;
+mod sequence_rows;
 mod subpixel;
 
 pub use agreement::RowOffset;
 pub use disparity::{EdgeDisparity, edge_disparity};
 pub use edges::{EdgeMap, EdgeSettings, NO_CLASS};
-pub use film_rows::FilmRows;
-pub use options::{EdgeDisparityOptions, LEAST_VIEW, Method};
+pub use options::{EdgeDisparityOptions, MIN_VIEW_SIDE, Method};
 pub use row_offset::{estimate_row_offset, find_row_offset};
+pub use sequence_rows::SequenceRows;

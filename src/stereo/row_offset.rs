@@ -1,14 +1,12 @@
-//! How many rows lower the right camera sees a point: section 6.1.
+//! Row offset of the right camera.
 //!
 //! Along a slanted edge a wrong row offset looks like a wrong disparity. Each window's own shift along x is
-//! therefore solved for together with the one offset that all share, and only what no shift along x explains
-//! speaks for an offset.
+//! therefore solved together with the common offset.
 
 use super::agreement::{Agreement, RowOffset, at_an_end};
-use super::align::rows_moved;
+use super::align::{match_aligned, rows_moved};
 use super::classes::{match_classes, most_frequent_row};
 use super::contrast::balanced;
-use super::disparity::match_aligned;
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::EdgeDisparityOptions;
 use super::semi_global::{Match, View};
@@ -21,24 +19,24 @@ use rayon::prelude::*;
 const PASSES: usize = 2;
 /// Vertical steps of a pass.
 const STEPS: usize = 6;
-/// A step as short as this is the last, rows.
-const SHORT: f64 = 1e-3;
-/// Farthest from the start of a pass that an offset is believed, rows.
-const FARTHEST: f64 = 1.5;
-/// Every how many edge pixels one is asked for its row by classes.
+/// Convergence tolerance of a step, rows.
+const MIN_STEP: f64 = 1e-3;
+/// Largest change from the start of a pass, rows.
+const MAX_SHIFT: f64 = 1.5;
+/// Step of the edge pixels in the class matching.
 const SAMPLED: usize = 4;
-/// Least and most windows that vertical steps are made with.
+/// Smallest and largest number of windows for vertical steps.
 const WINDOWS: (usize, usize) = (30, 6000);
-/// Most windows that a known offset is watched with.
-const WATCHED: usize = 1000;
+/// Largest number of windows for monitoring.
+const MAX_MONITORED_WINDOWS: usize = 1000;
 /// Pixels on each side of the middle of a window.
 const RADIUS: usize = 4;
 /// Pixels of a window.
 const AREA: usize = (2 * RADIUS + 1) * (2 * RADIUS + 1);
-/// Least scale of the residuals, grey levels: rounding.
-const LEAST_SCALE: f64 = 0.5;
-/// Least sum of squared slopes of a window, (grey levels/px)^2, before it is divided by.
-const LEAST_SLOPE: f64 = 4.0;
+/// Floor of the scale of residuals, grey levels: rounding.
+const MIN_RESIDUAL_SCALE: f64 = 0.5;
+/// Floor of the sum of squared slopes of a window, (grey levels/px)^2.
+const MIN_SLOPE_SQUARES: f64 = 4.0;
 
 /// How many rows lower the right view shows a point: `y_right - y_left`, rows with fractions; 0 where nothing
 /// can be matched.
@@ -55,7 +53,7 @@ pub fn estimate_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &Edge
     find_row_offset(left, right, options).map(|found| found.rows)
 }
 
-/// As [`estimate_row_offset`], with whether it is to be doubted.
+/// As [`estimate_row_offset`], with its reliability.
 ///
 /// # Errors
 /// As [`edge_disparity`](super::edge_disparity).
@@ -63,35 +61,34 @@ pub fn find_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisp
     options.check_views(left, right)?;
     Ok(options.threads.install(|| {
         let view = View::new(left, &EdgeSettings::of(options));
-        row_offset_of(left, &view, &balanced(left, right), options).told(options)
+        row_offset_of(left, &view, &balanced(left, right), options).row_offset(options)
     }))
 }
 
-/// What one pair says of its rows.
+/// Row offset from one pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RowEstimate {
     /// `y_right - y_left`.
     pub rows: f64,
-    /// Whether vertical steps could be made until the end; else it is the most frequent offset of the
-    /// classes, whatever that is worth.
+    /// Whether the vertical steps converged; otherwise `rows` is the most frequent offset of the classes.
     pub settled: bool,
-    /// How well the views agree with it.
+    /// Agreement of the views with it.
     pub agreement: Agreement,
 }
 
 impl RowEstimate {
-    /// Whether nothing speaks for it, and the agreement against it: rows that cannot be told, as of vertical
-    /// edges alone, do no harm.
+    /// Whether it did not converge or is at an end of the range, and the agreement is bad. Rows that are not
+    /// observable, as with vertical edges alone, do no harm.
     pub fn is_doubtful(&self, options: &EdgeDisparityOptions) -> bool {
         self.agreement.is_doubtful(!self.settled || at_an_end(self.rows, options.row_range))
     }
 
-    /// The estimate, and whether it is to be doubted.
-    pub fn told(&self, options: &EdgeDisparityOptions) -> RowOffset {
+    /// The estimate with its reliability.
+    pub fn row_offset(&self, options: &EdgeDisparityOptions) -> RowOffset {
         RowOffset { rows: self.rows, doubtful: self.is_doubtful(options) }
     }
 
-    /// Whether it may be kept for other pairs.
+    /// Whether it may be used for other pairs.
     pub fn is_believed(&self, options: &EdgeDisparityOptions) -> bool {
         !crate::ablation::keeps("edges.believed_rows")
             || self.settled && self.agreement.suffices() && !self.is_doubtful(options)
@@ -105,7 +102,7 @@ pub(super) fn row_offset_of(
     right: &Frame<f32>,
     options: &EdgeDisparityOptions,
 ) -> RowEstimate {
-    let options = EdgeDisparityOptions { prior: None, subpixel: true, check: true, ..options.clone() };
+    let options = EdgeDisparityOptions { prior: None, subpixel: true, left_right_check: true, ..options.clone() };
     let classes = EdgeMap::new(right, &EdgeSettings::of(&options));
     let matches = match_classes(&view.edges, &classes, &options, options.row_range, SAMPLED);
     let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
@@ -123,8 +120,7 @@ pub(super) fn row_offset_of(
     RowEstimate { rows: offset, settled: true, agreement }
 }
 
-/// How far one vertical step leads from an offset with which views were matched, rows; none of fewer windows
-/// than steps need.
+/// One vertical step from the offset of the matches, rows; none for too few windows.
 pub(super) fn misalignment(
     left: &Frame<f32>,
     view: &View,
@@ -133,12 +129,12 @@ pub(super) fn misalignment(
     rows: f64,
 ) -> Option<f64> {
     let (left_smooth, right_smooth) = smoothed(left, right);
-    let mut windows = windows(&left_smooth, view, matches, WATCHED);
-    // A step that is too long to be believed is still one.
+    let mut windows = windows(&left_smooth, view, matches, MAX_MONITORED_WINDOWS);
+    // A step beyond the limit still shows a misalignment.
     vertical_step(&mut windows, &rows_moved(&right_smooth, rows))
 }
 
-/// Both views as vertical steps compare them.
+/// Both views, smoothed.
 fn smoothed(left: &Frame<f32>, right: &Frame<f32>) -> (Frame<f32>, Frame<f32>) {
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
     rayon::join(|| smoother.apply(left), || smoother.apply(right))
@@ -156,8 +152,8 @@ struct Window {
     at: (f64, usize),
 }
 
-/// What one window says of a step: `sum g (L - R)` along x and y, and the root mean square of `L - R` less
-/// its mean.
+/// Contribution of one window: `sum g (L - R)` along x and y, and the root mean square of `L - R` less its
+/// mean.
 #[derive(Clone, Copy)]
 struct Misfit {
     moments: [f64; 2],
@@ -193,7 +189,7 @@ impl Window {
             squares[1] += slope[0] * slope[1];
             squares[2] += slope[1] * slope[1];
         }
-        squares[0] = squares[0].max(LEAST_SLOPE);
+        squares[0] = squares[0].max(MIN_SLOPE_SQUARES);
         Self { slopes, brightness, squares, at: (x as f64 - disparity, y) }
     }
 
@@ -237,10 +233,10 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps:
     for _ in 0..steps {
         let step = vertical_step(windows, &rows_moved(right, offset))?;
         offset += step;
-        if offset.is_nan() || (offset - start).abs() > FARTHEST {
+        if offset.is_nan() || (offset - start).abs() > MAX_SHIFT {
             return None;
         }
-        if step.abs() < SHORT {
+        if step.abs() < MIN_STEP {
             break;
         }
     }
@@ -256,8 +252,8 @@ fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
         return None;
     }
     let middle = residuals.len() / 2;
-    let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(LEAST_SCALE);
-    // Summed in the order of the windows, whatever the threads.
+    let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(MIN_RESIDUAL_SCALE);
+    // Summed in the order of the windows, independent of threads.
     let (mut moment, mut square) = (0.0, 0.0);
     for (window, misfit) in windows.iter().zip(&misfits) {
         let Some(misfit) = misfit else { continue };

@@ -1,7 +1,7 @@
 //! Sparse semi-global matching of two views whose rows are aligned, checked from both sides: section 6.2.
 
 use super::chains::{From, sweep};
-use super::cost::{Candidates, Coded, HIGHEST, Side, costs};
+use super::cost::{Candidates, Coded, MAX_COST, Side, costs};
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::EdgeDisparityOptions;
 use crate::image::gaussian_gradient;
@@ -10,10 +10,10 @@ use crate::types::Frame;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Share of the highest cost above which a match is refused.
-const REFUSED: f32 = 0.8;
-/// By how much the disparities of both views may differ, px.
-const AGREEMENT: f32 = 1.0;
+/// Largest cost of a match over the highest cost.
+const MAX_COST_SHARE: f32 = 0.8;
+/// Tolerance of the left-right check, px.
+const DISPARITY_TOLERANCE: f32 = 1.0;
 /// Standard deviation of the Gaussian behind the gradients that are compared, px, and where it is cut off.
 const COMPARED: (f64, usize) = (1.0, 4);
 /// Edge pixels of one task.
@@ -36,7 +36,7 @@ impl View {
         Self { edges: EdgeMap::new(view, settings), along_x, along_y }
     }
 
-    /// The same with the settings of a matcher.
+    /// Edges and gradients with the settings of the options.
     pub(super) fn of(view: &Frame<f32>, options: &EdgeDisparityOptions) -> Self {
         Self::new(view, &EdgeSettings::of(options))
     }
@@ -55,8 +55,7 @@ pub(super) struct Match {
 pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOptions) -> Vec<Option<Match>> {
     let (least, greatest) = options.disparity_range;
     let count = (greatest - least + 1) as usize;
-    // To the right of the left view's first candidate lie smaller disparities, to the right of the right
-    // view's greater ones.
+    // Columns ascend with falling disparity in the left view, with rising disparity in the right view.
     let from_left = Candidates { first: -greatest, count };
     let from_right = Candidates { first: least, count };
     let reach = from_left.reach().max(from_right.reach());
@@ -74,7 +73,7 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
     };
     let place = if options.subpixel { fitted } else { whole };
     let find_left = || winners(&left.edges, [&own, &other], from_left, allowed, place, |k| greatest as f32 - k);
-    if !options.check {
+    if !options.left_right_check {
         return find_left();
     }
     let everywhere = |edge: usize| from_right.inside(right.edges.columns[edge], width);
@@ -113,11 +112,11 @@ fn winners(
     matches
 }
 
-/// The candidate with the least sum, and its cost over the highest; none that costs too much.
+/// The candidate with the least sum, and its cost over the highest; none above the limit.
 fn lowest(sums: &[u16], costs: &[u16], allowed: Range<usize>) -> Option<(usize, f32)> {
     let best = allowed.min_by_key(|&k| sums[k])?;
-    let cost = f32::from(costs[best]) / f32::from(HIGHEST);
-    (cost <= REFUSED || !crate::ablation::keeps("edges.refused_cost")).then_some((best, cost))
+    let cost = f32::from(costs[best]) / f32::from(MAX_COST);
+    (cost <= MAX_COST_SHARE || !crate::ablation::keeps("edges.refused_cost")).then_some((best, cost))
 }
 
 /// Where the least sum is: beside, or at, the candidate that has it.
@@ -152,7 +151,7 @@ fn keep_confirmed(edges: &EdgeMap, matches: &mut [Option<Match>], others: &EdgeM
         let near = |(x, y): (i64, i64)| {
             (0..width as i64).contains(&x)
                 && (0..height as i64).contains(&y)
-                && (found.get(x as usize, y as usize) - disparity).abs() <= AGREEMENT
+                && (found.get(x as usize, y as usize) - disparity).abs() <= DISPARITY_TOLERANCE
         };
         if !(-1..=1).any(|j| (-1..=1).any(|i| near((x + i, y + j)))) {
             *own = None;

@@ -19,15 +19,15 @@ const SIDE: usize = 2 * RADIUS + 1;
 const ROW: usize = 16;
 /// Steps at most.
 const STEPS: usize = 5;
-/// Farthest from the start that an answer is believed, px.
-const FARTHEST: f32 = 1.0;
-/// A step as short as this is the last, px.
-const SHORT: f32 = 0.005;
+/// Largest shift from the start, px.
+const MAX_SHIFT: f32 = 1.0;
+/// Convergence tolerance, px.
+const MIN_STEP: f32 = 0.005;
 /// Whole pixels round the start at which the right window is looked at: enough for cubic convolution anywhere
-/// within [`FARTHEST`].
+/// within [`MAX_SHIFT`].
 const PLACES: usize = 6;
-/// Least `sum g^2` over the window, (grey levels/px)^2: less is noise.
-const LEAST_SLOPE: f32 = 4.0;
+/// Floor of `sum g^2` over the window, (grey levels/px)^2: noise.
+const MIN_SLOPE_SQUARES: f32 = 4.0;
 /// Edge pixels of one task.
 const TASK: usize = 256;
 
@@ -99,10 +99,10 @@ impl Task<'_> {
             let step = (sum - between(&places, at)) / squares;
             at += step;
             // NaN comes from a bad sample.
-            if at.is_nan() || (at - from).abs() > FARTHEST {
+            if at.is_nan() || (at - from).abs() > MAX_SHIFT {
                 return None;
             }
-            if step.abs() < SHORT {
+            if step.abs() < MIN_STEP {
                 break;
             }
         }
@@ -132,7 +132,7 @@ impl Task<'_> {
                 squares += slopes[j][i] * slopes[j][i];
             }
         }
-        (squares > LEAST_SLOPE * (SIDE * SIDE) as f32 / 81.0).then_some((slopes, sum, squares))
+        (squares > MIN_SLOPE_SQUARES * (SIDE * SIDE) as f32 / 81.0).then_some((slopes, sum, squares))
     }
 }
 
@@ -158,7 +158,7 @@ mod tests {
     fn shifts_of_a_smooth_pattern_are_found_and_gain_and_bias_do_not_matter() {
         let pattern = |x: f64, y: f64| 100.0 + 40.0 * (0.35 * x + 0.05 * y).sin() + 20.0 * (0.13 * x - 0.2 * y).cos();
         let left = Frame::from_fn(80, 60, |x, y| pattern(x as f64, y as f64) as f32);
-        let view = View::new(&left, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        let view = View::new(&left, &EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 });
         assert!(view.edges.len() > 200);
         for truth in [2.0f32, 2.4, 2.75, -0.6] {
             let right =
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn what_cannot_be_refined_stays() {
         let left = Frame::from_fn(60, 40, |_, y| if y < 20 { 50.0f32 } else { 150.0 });
-        let view = View::new(&left, &EdgeSettings { sigma: 2.0, threshold: 2.0, classes: 12 });
+        let view = View::new(&left, &EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 });
         let before = vec![Some(Match { disparity: 1.25, cost: 0.1 }); view.edges.len()];
         let mut after = before.clone();
         refine(&left, &view, &left, &mut after);

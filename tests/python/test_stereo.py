@@ -203,7 +203,7 @@ def test_arrays_that_are_no_views_are_refused():
         ("row_offset", float("nan")),
         ("method", "magic"),
         ("prior", np.zeros((3, 3), np.float32)),
-        ("sigma", 0.0),
+        ("blur_sigma", 0.0),
         ("threshold", -1.0),
         ("classes", 1),
         ("window", 16),
@@ -227,7 +227,7 @@ def test_bad_options_are_named(name, value):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("disparity_range", (0.5, 3)), ("disparity_range", None), ("row_range", "ab"), ("sigma", "wide"), ("row_offset", "high"), ("window", None), ("classes", 1.5), ("threads", 1.5), ("subpixel", "yes"), ("check", None)],
+    [("disparity_range", (0.5, 3)), ("disparity_range", None), ("row_range", "ab"), ("blur_sigma", "wide"), ("row_offset", "high"), ("window", None), ("classes", 1.5), ("threads", 1.5), ("subpixel", "yes"), ("left_right_check", None)],
 )  # fmt: skip
 def test_options_of_another_kind_are_named(name, value):
     view = np.zeros((40, 40), np.uint8)
@@ -235,7 +235,7 @@ def test_options_of_another_kind_are_named(name, value):
         stereo.edge_disparity(view, view, **{name: value})
 
 
-@pytest.mark.parametrize(("name", "value", "kind"), [("sigma", "wide", TypeError), ("threads", -1, ValueError), ("threads", 1.5, TypeError), ("threshold", 0, ValueError)])
+@pytest.mark.parametrize(("name", "value", "kind"), [("blur_sigma", "wide", TypeError), ("threads", -1, ValueError), ("threads", 1.5, TypeError), ("threshold", 0, ValueError)])
 def test_bad_options_of_edges_are_named(name, value, kind):
     with pytest.raises(kind, match=f"^{name}: expected .*, got"):
         stereo.edge_pixels(np.zeros((40, 40), np.uint8), **{name: value})
@@ -277,12 +277,12 @@ def test_fractions_of_a_pixel_are_measured():
         assert np.median(np.abs(found.values - truth)) <= np.median(np.abs(coarse.values - truth)) + 0.01
 
 
-@pytest.mark.parametrize("check", [True, False])
-def test_whole_disparities_are_whole(check):
+@pytest.mark.parametrize("left_right_check", [True, False])
+def test_whole_disparities_are_whole(left_right_check):
     step = small()[0]
-    found = disparity(step.left, step.right, row_offset=1.0, subpixel=False, check=check)
+    found = disparity(step.left, step.right, row_offset=1.0, subpixel=False, left_right_check=left_right_check)
     assert len(found.values) > 4000 and (found.values % 1 == 0).all()
-    fitted = disparity(step.left, step.right, row_offset=1.0, check=check)
+    fitted = disparity(step.left, step.right, row_offset=1.0, left_right_check=left_right_check)
     assert (fitted.values % 1 != 0).mean() > 0.9
 
 
@@ -303,9 +303,9 @@ def test_a_prior_narrows_the_search(method):
 def test_matching_from_the_right_drops_what_is_hidden():
     step = small()[0]
     hidden = {}
-    for check in (True, False):
-        found = disparity(step.left, step.right, row_offset=1.0, check=check)
-        hidden[check] = int((~step.visible[found.rows, found.cols]).sum())
+    for left_right_check in (True, False):
+        found = disparity(step.left, step.right, row_offset=1.0, left_right_check=left_right_check)
+        hidden[left_right_check] = int((~step.visible[found.rows, found.cols]).sum())
     assert 0 < 2 * hidden[True] < hidden[False]
 
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Below this an exponential is zero; a product of it and zero is then zero, whatever the density.
-const LEAST: f64 = -1000.0;
+const MIN_LOG_SHARE: f64 = -1000.0;
 
 /// What the E step leaves: responsibilities only as their sums.
 #[derive(Debug)]
@@ -119,7 +119,7 @@ fn exponentials<V: Lanes<Scalar = f64>>(
     entropy: &mut [f64; BLOCK],
 ) {
     for at in (0..BLOCK).step_by(V::LANES) {
-        let log = (V::load(&logs[at..]) - V::load(&most[at..])).max(V::splat(LEAST));
+        let log = (V::load(&logs[at..]) - V::load(&most[at..])).max(V::splat(MIN_LOG_SHARE));
         let share = exp(log);
         share.store(&mut logs[at..]);
         (V::load(&total[at..]) + share).store(&mut total[at..]);

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 /// Fewest pairs that can be tracked through.
-const LEAST_PAIRS: usize = 2;
+const MIN_PAIRS: usize = 2;
 
 /// What the tracker says of one pair.
 #[derive(Debug)]
@@ -77,7 +77,7 @@ pub struct StereoSummary {
     pub tracks: usize,
     /// How many rows lower the right view shows a point, where that was found or given once for all pairs.
     pub row_offset: Option<f64>,
-    /// Pairs whose views hardly agree with any row offset that was searched.
+    /// Number of pairs whose views disagree at every row offset in the range.
     pub rows_doubtful: usize,
     /// Files written.
     pub files: usize,
@@ -114,7 +114,7 @@ impl StereoRun {
 
     /// Works through `pairs` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of pairs taken, at least once a pair and while waiting for one; its
+    /// `progress` is called with the number of pairs taken, at least once a pair and while waiting for one; its
     /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
@@ -124,7 +124,7 @@ impl StereoRun {
         let start = Instant::now();
         let worked = self.work(&mut pairs, begin, progress);
         let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        // Every sink is ended even when an earlier one fails; the first error is returned.
         let mut result = worked;
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending, self.tracker.graph()));
@@ -142,9 +142,9 @@ impl StereoRun {
         let mut begin = Some(begin);
         // Two are there before anything is said: of one there is nothing to follow.
         let mut first = Vec::new();
-        while first.len() < LEAST_PAIRS {
+        while first.len() < MIN_PAIRS {
             let Some(pair) = pairs.next(self.summary.pairs, progress)? else {
-                let expected = format!("at least {LEAST_PAIRS} pairs of views to track through");
+                let expected = format!("at least {MIN_PAIRS} pairs of views to track through");
                 return Err(Error::argument("frames", expected, first.len()));
             };
             first.push(pair);
@@ -158,7 +158,7 @@ impl StereoRun {
         Ok(())
     }
 
-    /// Follows one pair farther, and tells the sinks, which are begun if they are not.
+    /// Processes one pair and passes it to the sinks, which begin with the first one.
     fn take(
         &mut self,
         GreyPair { views: [left, _], grey }: GreyPair,
@@ -176,9 +176,9 @@ impl StereoRun {
         if let Some(begin) = begin.take() {
             self.sinks = begin()?;
         }
-        let told = StereoStep { frame_index, time, left: &left, step: &step };
+        let followed = StereoStep { frame_index, time, left: &left, step: &step };
         for sink in &mut self.sinks {
-            sink.accept(&told)?;
+            sink.accept(&followed)?;
         }
         self.summary.pairs += 1;
         self.summary.pixels += step.rows.len();

@@ -42,7 +42,7 @@ impl GreyPairs {
         self.total
     }
 
-    /// The next pair, after `done` of them; `None` after the last. `progress` is asked at least once, and
+    /// The next pair, after `done` of them; `None` after the last. `progress` is called at least once, and
     /// while there is none yet.
     ///
     /// # Errors

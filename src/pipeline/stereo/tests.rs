@@ -121,7 +121,10 @@ fn a_run_that_fails_keeps_what_there_is_under_other_names() {
 fn of_fewer_than_two_pairs_nothing_is_begun() {
     let folder = tempfile::tempdir().unwrap();
     let (summary, ended) = run(1, Box::new(|| into(folder.path())), 1);
-    let told = ended.unwrap_err().to_string();
-    assert!(told.starts_with("frames: ") && told.contains("at least 2 pairs") && told.contains('1'), "{told}");
+    let message = ended.unwrap_err().to_string();
+    assert!(
+        message.starts_with("frames: ") && message.contains("at least 2 pairs") && message.contains('1'),
+        "{message}"
+    );
     assert_eq!((summary.pairs, summary.files, folder.path().read_dir().unwrap().count()), (0, 0, 0));
 }

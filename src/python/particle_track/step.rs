@@ -14,8 +14,8 @@ pub struct PyParticleStep(pub(super) StepRecord);
 #[pymethods]
 impl PyParticleStep {
     /// Everything, by the names of `jacoflow.track.ParticleStep`.
-    fn told<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        told(py, self.0.step())
+    fn as_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        step_dict(py, self.0.step())
     }
 
     /// Particles (N, 6) and weights (N,) of a target; None where they were not kept.
@@ -69,7 +69,7 @@ fn signed(id: u64) -> PyResult<i64> {
     Ok(i64::try_from(id).map_err(|_| Error::argument("id", "an integer below 2^63", id))?)
 }
 
-fn told<'py>(py: Python<'py>, step: &ParticleStep) -> PyResult<Bound<'py, PyDict>> {
+fn step_dict<'py>(py: Python<'py>, step: &ParticleStep) -> PyResult<Bound<'py, PyDict>> {
     let targets = &step.targets;
     let count = targets.len();
     let out = PyDict::new(py);

@@ -23,7 +23,7 @@ const QUANTILES: usize = 9;
 const UNSATURATED: std::ops::Range<f64> = 2.0..253.0;
 /// Smallest number of pixels for an estimate, and smallest standard deviation of their brightness, grey
 /// levels.
-const ENOUGH: (usize, f64) = (50, 4.0);
+const MIN_SAMPLES_AND_STD: (usize, f64) = (50, 4.0);
 /// Largest number of pixels taken from a cluster.
 const MAX_CLUSTER_SAMPLES: usize = 200;
 /// Iterations of the weighted fit.
@@ -82,7 +82,7 @@ impl Exposure {
     fn of_pairs(pairs: &[[f64; 2]]) -> Option<Self> {
         let inside = |pair: &&[f64; 2]| pair.iter().all(|value| UNSATURATED.contains(value));
         let pairs: Vec<[f64; 2]> = pairs.iter().filter(inside).copied().collect();
-        if pairs.len() < ENOUGH.0 {
+        if pairs.len() < MIN_SAMPLES_AND_STD.0 {
             return None;
         }
         let offset = median(&mut pairs.iter().map(|[x, y]| y - x).collect::<Vec<_>>())?;
@@ -128,7 +128,7 @@ fn weighted_line(pairs: &[[f64; 2]], weight: impl Fn(&[f64; 2]) -> f64) -> Optio
     let of_x = sum(&|pair| (pair[0] - x).powi(2)) / all;
     let of_y = sum(&|pair| (pair[1] - y).powi(2)) / all;
     let both = sum(&|pair| (pair[0] - x) * (pair[1] - y)) / all;
-    if both.is_nan() || both <= 0.0 || of_x < ENOUGH.1.powi(2) {
+    if both.is_nan() || both <= 0.0 || of_x < MIN_SAMPLES_AND_STD.1.powi(2) {
         return None;
     }
     let gain = (of_y - of_x + (of_y - of_x).hypot(2.0 * both)) / (2.0 * both);
@@ -140,12 +140,12 @@ fn deciles(frame: &Frame<f32>) -> Option<[f64; QUANTILES]> {
     let rows = (0..frame.height()).step_by(SAMPLE_STEP).map(|y| frame.row(y));
     let mut values: Vec<f32> =
         rows.flat_map(|row| row.iter().step_by(SAMPLE_STEP).copied()).filter(|value| value.is_finite()).collect();
-    if values.len() < ENOUGH.0 {
+    if values.len() < MIN_SAMPLES_AND_STD.0 {
         return None;
     }
     values.sort_unstable_by(f32::total_cmp);
     let out: [f64; QUANTILES] = std::array::from_fn(|i| f64::from(values[(i + 1) * values.len() / (QUANTILES + 1)]));
-    (out[QUANTILES - 1] - out[0] >= ENOUGH.1).then_some(out)
+    (out[QUANTILES - 1] - out[0] >= MIN_SAMPLES_AND_STD.1).then_some(out)
 }
 
 #[cfg(test)]

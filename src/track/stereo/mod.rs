@@ -14,8 +14,8 @@
 //!
 //! [`tracker`] calls them. All results refer to the left view: positions `(x, y)` px, disparity
 //! `d = x_left - x_right` (near is large), motion `(u, v)` px/step and `w` disparity/step.
-//! [`StereoMode::Paper`] is the paper's text; [`StereoMode::Improved`] measures motion to fractions of a pixel
-//! first and carries the clusters along. Model and limits: `docs/stereo_tracker.md`.
+//! [`StereoMode::Paper`] is the paper's text; [`StereoMode::Improved`] measures motion to fractions of a
+//! pixel first and carries the clusters along. Model and limits: `docs/stereo_tracker.md`.
 
 mod association;
 mod cell_luminance;

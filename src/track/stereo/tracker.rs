@@ -16,7 +16,7 @@ use super::step::{Step, Track};
 use super::voxels::{EdgePoints, Lattice, Voxels};
 use crate::error::{Error, Result};
 use crate::mixture::Posterior;
-use crate::stereo::{EdgeDisparity, FilmRows};
+use crate::stereo::{EdgeDisparity, SequenceRows};
 use crate::types::Frame;
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ pub struct StereoTracker {
     /// Given time from the last step to the next.
     waited: Option<f64>,
     /// Offset of the right view's rows.
-    rows: FilmRows,
+    rows: SequenceRows,
     last: Option<ObservedStep>,
     posterior: Option<Posterior>,
     association: TrackAssociation,
@@ -49,7 +49,7 @@ impl StereoTracker {
     pub fn new(options: StereoTrackerOptions) -> Result<Self> {
         options.check()?;
         Ok(Self {
-            rows: FilmRows::new(options.row_offset),
+            rows: SequenceRows::new(options.row_offset),
             clock: Clock { now: 0.0, gap: 1.0, step_time: options.step_time },
             waited: None,
             options,

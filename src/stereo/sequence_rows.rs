@@ -1,47 +1,45 @@
-//! The row offset of a film: found at the first pair that shows enough of it, and watched from then on.
+//! Row offset of a sequence: estimated at the first suitable pair and monitored from then on.
 //!
-//! Cameras are screwed down, so one offset serves a film, and a single pair's would only add noise. But a
-//! film may begin with black, with a title that was drawn into both views alike, or with noise: what such a
-//! pair says, if anything, must not be believed for ever.
+//! Cameras are fixed, so one offset serves a sequence, and estimates of single pairs only add noise. But a
+//! sequence may begin with black, a title or noise.
 
 use super::agreement::{Agreement, RowOffset};
+use super::align::match_aligned;
 use super::contrast::balanced;
-use super::disparity::{EdgeDisparity, edge_disparity, match_aligned, told};
+use super::disparity::{EdgeDisparity, edge_disparities, edge_disparity};
 use super::options::{EdgeDisparityOptions, Method};
 use super::row_offset::{misalignment, row_offset_of};
 use super::semi_global::{Match, View};
 use crate::error::Result;
 use crate::types::Frame;
 
-/// A misalignment above this, rows, is not noise: single pairs are within .05 of the truth.
-const MISALIGNED: f64 = 0.2;
+/// Misalignment above noise, rows: single pairs are within .05 of the truth.
+const MAX_MISALIGNMENT: f64 = 0.2;
 
-/// Matches a film pair by pair, and knows how many rows lower its right views show a point.
+/// Matches a sequence pair by pair, and keeps its row offset.
 #[derive(Debug, Clone, Default)]
-pub struct FilmRows {
+pub struct SequenceRows {
     given: Option<f64>,
     found: Option<f64>,
 }
 
-impl FilmRows {
-    /// Of a film whose offset is given, rows, or is to be found.
+impl SequenceRows {
+    /// For a sequence with a given offset, rows, or one to be estimated.
     pub fn new(given: Option<f64>) -> Self {
         Self { given, found: None }
     }
 
-    /// The offset for all pairs to come, rows: the one given, or what was found as long as the views agree
-    /// with it.
+    /// The offset for the pairs to come, rows: given, or estimated and still valid.
     pub fn known(&self) -> Option<f64> {
         self.given.or(self.found)
     }
 
-    /// The next pair, as [`edge_disparity`] matches it; the options' `row_offset` is not looked at.
+    /// Matches the next pair as [`edge_disparity`]; `row_offset` of the options is ignored.
     ///
-    /// [`Method::SemiGlobal`] aligns the rows by the offset that is known. It becomes known at the first pair
-    /// of which the estimate can be believed: enough windows for the vertical steps, and three tenths of the
-    /// edge pixels matched. Where a later pair is matched worse than that, or a vertical step from the known
-    /// offset leads farther than a fifth of a row, it is estimated again. Pairs that show too little change
-    /// nothing. [`Method::Classes`] searches the rows at every pixel unless they are given.
+    /// [`Method::SemiGlobal`] aligns the rows by the known offset. It becomes known at the first pair with
+    /// enough windows for vertical steps and three tenths of the edge pixels matched. It is estimated again
+    /// where a later pair is matched worse, or a vertical step exceeds a fifth of a row. Pairs with too few
+    /// edges change nothing. [`Method::Classes`] searches the rows at every pixel unless given.
     ///
     /// # Errors
     /// As [`edge_disparity`].
@@ -65,23 +63,23 @@ impl FilmRows {
         if let Some(rows) = self.found {
             let matches = pair.matched(rows);
             if !crate::ablation::keeps("edges.watched_rows") || !pair.contradicts(rows, &matches) {
-                return told(&pair.view, &matches, RowOffset::given(rows));
+                return edge_disparities(&pair.view, &matches, RowOffset::given(rows));
             }
         }
         let found = row_offset_of(left, &pair.view, right, options);
         let believed = found.is_believed(options);
         match self.found {
-            // Whatever is wrong with this pair, it does not know better.
-            Some(known) if !believed => told(&pair.view, &pair.matched(known), RowOffset::given(known)),
+            // An estimate that is not reliable does not replace the known one.
+            Some(known) if !believed => edge_disparities(&pair.view, &pair.matched(known), RowOffset::given(known)),
             _ => {
                 self.found = Some(found.rows).filter(|_| believed);
-                told(&pair.view, &pair.matched(found.rows), found.told(options))
+                edge_disparities(&pair.view, &pair.matched(found.rows), found.row_offset(options))
             }
         }
     }
 }
 
-/// Two views that are being matched.
+/// A pair of views.
 struct Pair<'a> {
     left: &'a Frame<f32>,
     right: &'a Frame<f32>,
@@ -94,10 +92,10 @@ impl Pair<'_> {
         match_aligned(self.left, &self.view, self.right, rows, self.options)
     }
 
-    /// Whether matches made with an offset speak against it.
+    /// Whether the matches contradict their offset.
     fn contradicts(&self, rows: f64, matches: &[Option<Match>]) -> bool {
         let step = misalignment(self.left, &self.view, self.right, matches, rows);
-        let misaligned = step.is_some_and(|step| step.abs() > MISALIGNED);
+        let misaligned = step.is_some_and(|step| step.abs() > MAX_MISALIGNMENT);
         misaligned || Agreement::of(matches).contradicts()
     }
 }
@@ -132,7 +130,7 @@ mod tests {
     #[test]
     fn whatever_a_film_begins_with_its_rows_are_found() {
         for opening in openings() {
-            let mut rows = FilmRows::new(None);
+            let mut rows = SequenceRows::new(None);
             rows.match_next(&opening[0], &opening[1], &options()).unwrap();
             for offset in [1.4, 1.4, -2.3] {
                 let [left, right] = views(offset);
@@ -146,7 +144,7 @@ mod tests {
     #[test]
     fn what_shows_nothing_settles_nothing_and_changes_nothing() {
         let [black, noise, _] = openings();
-        let mut rows = FilmRows::new(None);
+        let mut rows = SequenceRows::new(None);
         for pair in [&black, &noise] {
             rows.match_next(&pair[0], &pair[1], &options()).unwrap();
             assert_eq!(rows.known(), None);
@@ -164,7 +162,7 @@ mod tests {
     #[test]
     fn an_offset_that_is_given_is_kept() {
         let [left, right] = views(1.4);
-        let mut rows = FilmRows::new(Some(1.0));
+        let mut rows = SequenceRows::new(Some(1.0));
         let found = rows.match_next(&left, &right, &options()).unwrap();
         assert_eq!((found.row_offset, rows.known()), (1.0, Some(1.0)));
         let given = EdgeDisparityOptions { row_offset: Some(1.0), ..options() };
