@@ -1218,7 +1218,7 @@ class _GaussMarkovFilter:
 
 @final
 class _ParticleStep:
-    def told(self, /) -> dict[str, Any]:
+    def as_dict(self, /) -> dict[str, Any]:
         """Everything, by the names of `jacoflow.track.ParticleStep`."""
     def particles(self, /, id: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Particles (N, 6) and weights (N,) of a target; None where they were not kept."""

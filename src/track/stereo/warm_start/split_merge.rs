@@ -42,7 +42,7 @@ pub(in super::super) fn split_and_merge(
     for (k, _) in &several {
         pool.exclude(*k);
     }
-    while crate::ablation::keeps("stereo.merge_pieces") && pool.merge_pieces() {}
+    while crate::ablation::keeps("stereo.join_pieces") && pool.merge_pieces() {}
     for (k, parts) in several.into_iter().filter(|_| crate::ablation::keeps("stereo.part")) {
         pool.split(k, parts);
     }
