@@ -80,7 +80,7 @@ compare: install
 ablation: $(BIN)/maturin
 	$(PYTHON) -m venv $(VENV)-ablation
 	rm -rf target/wheels-ablation
-	$(BIN)/maturin build -q $(CI) --features ablation --out target/wheels-ablation -i $(BIN)/python
+	$(BIN)/maturin build -q $(CI) --features python,ablation --out target/wheels-ablation -i $(BIN)/python
 	$(VENV)-ablation/bin/python -m pip install -q --force-reinstall --no-deps target/wheels-ablation/jacoflow-*.whl
 	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
 	$(VENV)-ablation/bin/python -m benchmarks.ablation $(ARGUMENTS)

@@ -1,7 +1,7 @@
 //! Time of 3-D motion from the flow of 1000 and 100 000 points, on two threads: maximum likelihood, smoothed
 //! weights, robust search.
 //!
-//! `python -m benchmarks.tables.motion3d --only speed` times the same beside OpenCV's essential matrices.
+//! `python -m benchmarks.tables.motion3d_speed` times the same beside OpenCV's essential matrices.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::math::random::CounterRng;

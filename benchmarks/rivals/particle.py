@@ -10,33 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.rivals.trackers import Box, creator, cv2, next_box, to_opencv
+from benchmarks.scenes.particle_recordings import Sequence
 
 Array = NDArray[np.float64]
 Frames = NDArray[np.uint8]
 RIVALS = ("CSRT", "KCF", "MIL", "MedianFlow")
 """OpenCV's trackers that need no trained network."""
-
-
-@dataclass(frozen=True)
-class Sequence:
-    """Colour frames and the true boxes of their targets."""
-
-    name: str
-    frames: Frames
-    """(T, H, W, 3), red, green and blue."""
-    boxes: Array
-    """(T, K, 4), left, top, width, height, px, with left = centre - width / 2; NaN where a target has no truth."""
-
-    @property
-    def starts(self) -> NDArray[np.intp]:
-        """(K,), the first frame in which each target has a true box: trackers get that box."""
-        return np.isfinite(self.boxes).all(axis=-1).argmax(axis=0)
-
-    def contains(self, box: Array) -> bool:
-        """Whether the centre of a box is in the picture."""
-        x, y = box[:2] + box[2:] / 2
-        height, width = self.frames.shape[1:3]
-        return bool(-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5)
 
 
 @dataclass(frozen=True)

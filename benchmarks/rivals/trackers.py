@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes.textures import Array
 from benchmarks.scores import timing
+from benchmarks.scores.tracking import Track
 
 try:
     import cv2
@@ -26,31 +28,8 @@ RIVALS = ("CSRT", "KCF", "MedianFlow", "MIL", "MOSSE")
 ENLARGED = ("CSRT", "KCF")
 """Those that also run on frames enlarged three times."""
 TIMES_LARGER = 3
-
-
-@dataclass(frozen=True)
-class Track:
-    """What a tracker said; the first axis is time (T), frame 0 being given. NaN where it does not tell."""
-
-    boxes: Array
-    """(T, 4), x, y, width, height, px, with x = centre - width / 2."""
-    displacements: Array
-    """(T, 2), measured step since the frame before, px."""
-    velocities: Array | None = None
-    """(T, 2), filtered velocity, px/frame."""
-    sights: Array | None = None
-    """(T, 2), middle of the window that is looked at, px."""
-    scales: Array | None = None
-    """(T,)."""
-    rotations: Array | None = None
-    """(T,), rad."""
-    milliseconds: float = float("nan")
-    """CPU time of a frame on one thread."""
-
-    @property
-    def centres(self) -> Array:
-        """(T, 2), x and y, px."""
-        return self.boxes[:, :2] + self.boxes[:, 2:] / 2
+ARGUMENTS = {"--trackers": {"nargs": "+", "help": "parts of the names of the trackers to run"}}
+"""Option of the tables that compare trackers."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +39,18 @@ class Tracker:
     name: str
     run: Callable[[Frames, Box], Track]
     """The track through the frames (T, H, W) from a box in the first."""
+
+
+def chosen(options: Namespace) -> list[Tracker]:
+    """Every tracker whose name holds one of the parts in `--trackers`."""
+    return [each for each in everyone() if options.trackers is None or any(part in each.name for part in options.trackers)]
+
+
+def with_affine(trackers: list[Tracker]) -> list[Tracker]:
+    """The trackers; `layered` with an affine model first if `layered` is among them."""
+    if not any(tracker.name == "jacoflow layered" for tracker in trackers):
+        return trackers
+    return [*(Tracker(f"{each.name} affine", each.run) for each in ours(("layered",), model="affine")), *trackers]
 
 
 def everyone() -> list[Tracker]:

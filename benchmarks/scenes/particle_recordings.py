@@ -4,20 +4,43 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-
-from benchmarks.rivals.particle import Array, Sequence
 
 try:
     import cv2
 except ImportError:
     cv2 = None
 
+Array = NDArray[np.float64]
+Frames = NDArray[np.uint8]
 CAMPUS, OTB = "TUD-Campus", "track_otb"
 """The recording of several people, and the folder of those of the tracking benchmark by Wu, Lim and Yang."""
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Colour frames and the true boxes of their targets."""
+
+    name: str
+    frames: Frames
+    """(T, H, W, 3), red, green and blue."""
+    boxes: Array
+    """(T, K, 4), left, top, width, height, px, with left = centre - width / 2; NaN where a target has no truth."""
+
+    @property
+    def starts(self) -> NDArray[np.intp]:
+        """(K,), the first frame in which each target has a true box: trackers get that box."""
+        return np.isfinite(self.boxes).all(axis=-1).argmax(axis=0)
+
+    def contains(self, box: Array) -> bool:
+        """Whether the centre of a box is in the picture."""
+        x, y = box[:2] + box[2:] / 2
+        height, width = self.frames.shape[1:3]
+        return bool(-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5)
 
 
 def campus(data: Path) -> Sequence | None:

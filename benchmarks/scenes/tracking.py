@@ -187,3 +187,27 @@ def published() -> Iterator[Scene]:
     yield simulation(1, "flat:90", 16.0, whole=True, noise=0.0)
     for number in (1, 2, 3):
         yield simulation(number, "fractal:1,90,30", 24.0)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a track is compared with; the first axis is time (T)."""
+
+    boxes: Array
+    """(T, 4), x, y, width, height, px; NaN where unknown."""
+    scored: NDArray[np.bool_]
+    """(T,), frames that count."""
+    scales: Array | None = None
+    """(T,)."""
+    angles: Array | None = None
+    """(T,), rad."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> Truth:
+        """The truth of a scene."""
+        return cls(scene.boxes, scene.scored, scene.scales, scene.angles)
+
+    @property
+    def centres(self) -> Array:
+        """(T, 2), px."""
+        return self.boxes[:, :2] + self.boxes[:, 2:] / 2

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scenes.recordings import read_grey
-from benchmarks.scores.tracking import Truth
+from benchmarks.scenes.tracking import Truth
 
 try:
     import cv2

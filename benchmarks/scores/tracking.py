@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.rivals.trackers import Track
 from benchmarks.scenes.textures import Array
-from benchmarks.scenes.tracking import Scene
+from benchmarks.scenes.tracking import Truth
 
 NEAR = 3.0
 """A centre counts as found within this many px."""
@@ -20,26 +18,27 @@ SETTLED = 6
 
 
 @dataclass(frozen=True)
-class Truth:
-    """What a track is compared with; the first axis is time (T)."""
+class Track:
+    """What a tracker said; the first axis is time (T), frame 0 being given. NaN where it does not tell."""
 
     boxes: Array
-    """(T, 4), x, y, width, height, px; NaN where unknown."""
-    scored: NDArray[np.bool_]
-    """(T,), frames that count."""
+    """(T, 4), x, y, width, height, px, with x = centre - width / 2."""
+    displacements: Array
+    """(T, 2), measured step since the frame before, px."""
+    velocities: Array | None = None
+    """(T, 2), filtered velocity, px/frame."""
+    sights: Array | None = None
+    """(T, 2), middle of the window that is looked at, px."""
     scales: Array | None = None
     """(T,)."""
-    angles: Array | None = None
+    rotations: Array | None = None
     """(T,), rad."""
-
-    @classmethod
-    def of(cls, scene: Scene) -> Truth:
-        """That of a scene."""
-        return cls(scene.boxes, scene.scored, scene.scales, scene.angles)
+    milliseconds: float = float("nan")
+    """CPU time of a frame on one thread."""
 
     @property
     def centres(self) -> Array:
-        """(T, 2), px."""
+        """(T, 2), x and y, px."""
         return self.boxes[:, :2] + self.boxes[:, 2:] / 2
 
 

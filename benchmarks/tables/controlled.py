@@ -1,13 +1,10 @@
 """Textures moved by smooth velocity fields with exact truth: errors beside Farneback's flow, plain and smoothed, and beside the bound that noise sets.
 
-    python -m benchmarks.tables.controlled [--wavelengths 64 256] [--speeds 1 2 4 8] [--noises 0 3]
+    python -m benchmarks.tables.controlled
 """
 
 from __future__ import annotations
 
-import argparse
-import functools
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,71 +13,16 @@ from numpy.typing import NDArray
 
 from benchmarks import report
 from benchmarks.rivals import flow as rivals
+from benchmarks.scenes.controlled import Case, Picture, cases, frame, gradient, truth
 from benchmarks.scores import noise_bound
 from benchmarks.scores.flow import differences, end_point_error, inside, jacobian_error
 from benchmarks.settings import CONTROLLED, Setting
-from jacoflow import scenes
 
 Array = NDArray[np.floating]
-Picture = NDArray[np.uint8]
 Row = dict[str, object]
-SIZE = 256
-"""Width and height of the frames, px."""
 MARGIN = 24
 """Left out along each side, px: what enters the frame has no counterpart."""
 RATIOS = ("end_point_gain", "efficient_gain", "jacobian_gain", "jacobian_gain_over_smoothed", "jacobian_over_bound")
-
-
-@dataclass(frozen=True)
-class Case:
-    """A scene: a noise texture moved by waves of about `wavelength` px, at most `speed` px/frame fast in the frame, seen by an 8-bit camera."""
-
-    wavelength: float
-    speed: float
-    noise: float
-    """Grey levels."""
-    seed: int = 1
-
-    def scene(self, origin: tuple[float, float] = (0.0, 0.0)) -> scenes.Scene:
-        """The scene through a window at `origin`."""
-        rms = self.speed / fastest(self.wavelength, self.seed)
-        return scenes.Scene("waves", width=SIZE, height=SIZE, origin=origin, random_state=self.seed, carrier="noise", speed=rms, wavelength=self.wavelength)
-
-
-@functools.cache
-def fastest(wavelength: float, seed: int) -> float:
-    """The greatest speed in the frame of a field whose root-mean-square speed is 1 px/frame."""
-    unit = scenes.Scene("waves", width=SIZE, height=SIZE, random_state=seed, carrier="speckle", speed=1.0, wavelength=wavelength)
-    return float(np.linalg.norm(unit.truth(0.0).flow, axis=-1).max())
-
-
-@functools.cache
-def clean_frame(wavelength: float, speed: float, seed: int, t: float) -> Array:
-    """The scene's brightness at a time, before the camera."""
-    return Case(wavelength, speed, 0.0, seed).scene().frame(t)
-
-
-def frame(case: Case, t: float) -> Picture:
-    """What the camera sees at a time: noise, whole grey levels, 0 to 255."""
-    camera = scenes.Sensor(noise=case.noise, rounding="nearest", saturate=True, random_state=case.seed)
-    return camera.apply_u8(clean_frame(case.wavelength, case.speed, case.seed, t), index=int(t) + 8)
-
-
-@functools.cache
-def truth(wavelength: float, speed: float, seed: int, t: float, between: tuple[float, float]) -> tuple[Array, Array]:
-    """Exact mean flow and Jacobian between the frames at the pixels of time t."""
-    field = Case(wavelength, speed, 0.0, seed).scene().truth(t, between=between)
-    return field.flow, field.jacobian
-
-
-@functools.cache
-def gradient(wavelength: float, speed: float, seed: int, t: float) -> Array:
-    """Exact brightness gradient (H, W, 2) at a time, grey levels/px: differences over 0.02 px of the scene itself."""
-    case, h = Case(wavelength, speed, 0.0, seed), 0.01
-    along_x, along_y = (
-        (case.scene((dx, dy)).frame(t) - case.scene((-dx, -dy)).frame(t)) / (2 * h) for dx, dy in ((h, 0.0), (0.0, h))
-    )
-    return np.stack([along_x, along_y], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -207,26 +149,14 @@ def table(cases: list[Case], contestants: list[Contestant]) -> list[Row]:
     return rows
 
 
-def cases(wavelengths: tuple[float, ...] = (64.0, 256.0), speeds: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0), noises: tuple[float, ...] = (0.0, 3.0)) -> list[Case]:
-    """Every combination."""
-    return [Case(*each) for each in itertools.product(wavelengths, speeds, noises)]
-
-
-def default_table(quick: bool = False) -> list[Row]:
-    """All scenes (`quick`: every other speed), our settings."""
-    chosen = cases(speeds=(2.0, 8.0)) if quick else cases()
-    return table(chosen, [Contestant.of(setting) for setting in CONTROLLED])
-
-
-def main() -> None:
-    """Prints the table of the scenes asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("wavelengths", (64.0, 256.0)), ("speeds", (1.0, 2.0, 4.0, 8.0)), ("noises", (0.0, 3.0))):
-        parser.add_argument(f"--{name}", type=float, nargs="+", default=default)
-    options = parser.parse_args()
-    chosen = cases(tuple(options.wavelengths), tuple(options.speeds), tuple(options.noises))
-    print("\n".join(report.table_lines(table(chosen, [Contestant.of(setting) for setting in CONTROLLED]))))
-
+TABLES = {
+    "controlled": report.Table(
+        "Accuracy on scenes with exact truth",
+        lambda o: table(
+            cases(speeds=(2.0, 8.0)) if o.quick else cases(), [Contestant.of(setting) for setting in CONTROLLED]
+        ),
+    )
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

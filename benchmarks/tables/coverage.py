@@ -1,16 +1,14 @@
 """How often 95 % intervals hold the truth: u, v, divergence and curl of the coarse-to-fine estimate on made scenes and on recordings.
 
-    python -m benchmarks.tables.coverage [--held-out] [--border] [--seeds 1 2] [--frames 2 3] [--preset balanced] [--data FOLDER]
+    python -m benchmarks.tables.coverage [--only fitted held_out recordings] [--data FOLDER]
 
 The scenes `FITTED` are those that the covariance's constants were fitted on; `HELD_OUT` differ in seed, size, texture, motion and noise, and were not.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +18,8 @@ from numpy.typing import NDArray
 import jacoflow
 from benchmarks import report
 from benchmarks.scenes import recordings as samples
+from benchmarks.scenes.coverage import FITTED, HELD_OUT, Plan
 from benchmarks.scores.flow import differences, inside, usable
-from jacoflow import scenes
 
 Array = NDArray[np.floating]
 Row = dict[str, object]
@@ -32,78 +30,6 @@ NORMAL = 1.959964
 """Half the width of a 95 % interval, deviations."""
 ASKED = (0.92, 0.97)
 """Shares of the truth that the intervals should hold."""
-
-
-@dataclass(frozen=True)
-class Family:
-    """A carrier and a motion."""
-
-    carrier: str
-    motion: str
-    name: str
-    parameters: dict[str, float] = field(default_factory=dict, hash=False)
-
-    def frames(self, size: tuple[int, int], noise: float, seed: int, count: int) -> tuple[list[Array], Any]:
-        """What an 8-bit camera sees, and the exact mean flow at the pixels that the estimate belongs to."""
-        scene = scenes.Scene(self.motion, width=size[0], height=size[1], random_state=seed, carrier=self.carrier, **self.parameters)
-        camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
-        times = (0.0, 1.0) if count == 2 else (-1.0, 0.0, 1.0)
-        pictures = [camera.apply_u8(scene.frame(t), index=int(t) + 8) for t in times]
-        return pictures, scene.truth(0.0, between=(0.0, 1.0))
-
-
-def affine(u: float, v: float, u_x: float = 0.0, v_x: float = 0.0, u_y: float = 0.0, v_y: float = 0.0) -> tuple[str, dict[str, float]]:
-    """The scene of one affine motion."""
-    return "affine", {"u": u, "v": v, "u_x": u_x, "v_x": v_x, "u_y": u_y, "v_y": v_y}
-
-
-MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
-    "still": affine(0.1, 0.05),
-    "affine": affine(3.3, -2.2, 0.01, 0.02, -0.02, 0.01),
-    "fast": affine(7.4, 6.7, 0.02, -0.03, 0.02, -0.01),
-    "vortex": ("vortex", {"circulation": 400.0, "core": 25.0}),
-    "waves": ("waves", {"speed": 1.5, "wavelength": 128.0}),
-    "turbulence": ("turbulence", {"speed": 2.0, "longest": 192.0}),
-}
-CARRIERS: dict[str, tuple[str, dict[str, float]]] = {"noise": ("noise", {}), "speckle": ("speckle", {}), "particles": ("particles", {})}
-OTHER_MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
-    "slide": affine(0.31, 0.62),
-    "spin": affine(2.7, -4.4, -0.004, 0.03, -0.03, -0.004),
-    "quick": affine(6.3, -5.6, 0.02, 0.01, -0.015, 0.015),
-    "vortex": ("vortex", {"circulation": 550.0, "core": 30.0}),
-    "waves": ("waves", {"speed": 2.2, "wavelength": 110.0}),
-    "turbulence": ("turbulence", {"speed": 1.6, "longest": 170.0}),
-}
-OTHER_CARRIERS: dict[str, tuple[str, dict[str, float]]] = {
-    "noise 1.7 px": ("noise", {"sigma": 1.7, "std": 30.0}),
-    "noise 2.6 px": ("noise", {"sigma": 2.6, "std": 45.0}),
-    "speckle 3 px": ("speckle", {"radius": 3.0}),
-    "particles 3.2 px": ("particles", {"diameter": 3.2, "density": 0.06}),
-    "particles 2.5 px": ("particles", {"diameter": 2.5, "density": 0.04}),
-}
-
-
-def families(
-    carriers: dict[str, tuple[str, dict[str, float]]], motions: dict[str, tuple[str, dict[str, float]]]
-) -> list[Family]:
-    """Every combination."""
-    return [
-        Family(carrier, motion, f"{texture}, {moving}", {**look, **path})
-        for (texture, (carrier, look)), (moving, (motion, path)) in itertools.product(carriers.items(), motions.items())
-    ]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Families seen at some noise levels."""
-
-    families: list[Family]
-    noises: tuple[float, ...]
-    size: tuple[int, int]
-
-
-FITTED = Plan(families(CARRIERS, MOTIONS), (0.0, 1.0, 2.0, 4.0), (192, 192))
-HELD_OUT = Plan(families(OTHER_CARRIERS, OTHER_MOTIONS), (0.5, 2.0, 3.0), (224, 160))
 
 
 def estimate(frames: list[Any], preset: str) -> jacoflow.FlowField:
@@ -174,34 +100,21 @@ def recordings(data: Path, preset: str = "balanced") -> list[Row]:
     return rows + [{"scene": line, "frames": "missing"} for line in missing]
 
 
-def sections(quick: bool, data: Path | None) -> dict[str, list[Row]]:
-    """The tables of `compare.py`."""
-    seeds = [1] if quick else [1, 2]
-    out = {
-        "Share of 95 % intervals that hold the truth, scenes of the fit": table(FITTED, seeds, [2, 3]),
-        "Share of 95 % intervals that hold the truth, other scenes": table(HELD_OUT, [seed + 2 for seed in seeds], [2, 3]),
-    }
-    if data is not None:
-        out["Share of 95 % intervals that hold the truth, recordings off motion boundaries"] = recordings(data)
-    return out
-
-
-def main() -> None:
-    """Prints the tables asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--held-out", action="store_true", help="the scenes that the constants were not fitted on")
-    parser.add_argument("--border", action="store_true", help=f"only the outermost {MARGIN} px, which the other tables leave out")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--frames", type=int, nargs="+", default=[2, 3])
-    parser.add_argument("--preset", default="balanced")
-    parser.add_argument("--data", type=Path, help="folder of recordings with truth: those instead of scenes")
-    options = parser.parse_args()
-    if options.data is not None:
-        rows = recordings(options.data, options.preset)
-    else:
-        rows = table(HELD_OUT if options.held_out else FITTED, options.seeds, options.frames, options.preset, options.border)
-    print("\n".join(report.table_lines(rows)))
-
+SEEDS = {"fitted": (1, 2), "held_out": (3, 4)}
+TABLES = {
+    "fitted": report.Table(
+        "Share of 95 % intervals that hold the truth, scenes of the fit",
+        lambda o: table(FITTED, list(SEEDS["fitted"][: 1 if o.quick else 2]), [2, 3]),
+    ),
+    "held_out": report.Table(
+        "Share of 95 % intervals that hold the truth, other scenes",
+        lambda o: table(HELD_OUT, list(SEEDS["held_out"][: 1 if o.quick else 2]), [2, 3]),
+    ),
+    "recordings": report.Table(
+        "Share of 95 % intervals that hold the truth, recordings off motion boundaries",
+        lambda o: [] if o.data is None else recordings(o.data),
+    ),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

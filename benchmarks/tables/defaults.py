@@ -1,20 +1,23 @@
 """Which rows and how much smoothing the windowed estimator should have by default: error and coverage on scenes with exact truth.
 
-Usage: python -m benchmarks.tables.defaults [--noise 1 4]
+    python -m benchmarks.tables.defaults
 
 Each line: root mean square error of the flow (px/frame) and of the four derivatives (1/frame), and the share of components whose error is below two of their
 standard deviations (.954 for normal errors that are fully described). Frames have 8 bits; a margin of 20 px is left out.
 """
 
-import argparse
 import itertools
 
 import numpy as np
 
 import jacoflow
+from benchmarks import report
 from jacoflow import scenes
 
+Row = dict[str, object]
 MARGIN = 20
+NOISES = (1.0, 4.0)
+"""Grey levels."""
 SCENES = [
     ("affine", "noise"),
     ("affine", "speckle"),
@@ -29,7 +32,7 @@ SCENES = [
 ]
 
 
-def measure(name: str, carrier: str | None, noise: float, options: dict) -> tuple[float, float, float, float]:
+def measure(name: str, carrier: str | None, noise: float, options: dict[str, object]) -> tuple[float, float, float, float]:
     """Errors of flow and Jacobian, and coverage of both, in the middle of three frames."""
     scene = scenes.Scene(name, width=128, height=112, random_state=5, carrier=carrier)
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=1)
@@ -51,32 +54,41 @@ def measure(name: str, carrier: str | None, noise: float, options: dict) -> tupl
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--noise", type=float, nargs="+", default=[1.0, 4.0], help="grey levels")
-    noises = parser.parse_args().noise
-    choices = [
+def choices() -> list[dict[str, object]]:
+    """Options that are compared."""
+    return [
         dict(rows=rows, smooth=smooth)
         for rows, smooth in itertools.product(("brightness", "gradient", "all"), (0.0, 1.0, 1.5, 2.0))
     ]
-    totals = np.zeros((len(choices), 2))
-    print("| scene | carrier | noise | rows | smooth, px | flow rms | Jacobian rms | within 2 sd: flow | Jacobian |")
-    print("|---|---|---|---|---|---|---|---|---|")
-    for (name, carrier), noise in itertools.product(SCENES, noises):
-        results = [measure(name, carrier, noise, options) for options in choices]
-        for options, (flow, jacobian, held, held_jacobian) in zip(choices, results, strict=True):
-            print(
-                f"| {name} | {carrier or '-'} | {noise:g} | {options['rows']} | {options['smooth']:g} "
-                f"| {flow:.4f} | {jacobian:.4f} | {held:.2f} | {held_jacobian:.2f} |",
-                flush=True,
-            )
-        errors = np.array(results)[:, :2]
-        totals += np.log(errors / errors.min(0))
-    print("\nError relative to the best choice of each scene, geometric mean over the scenes:\n")
-    print("| rows | smooth, px | flow | Jacobian |\n|---|---|---|---|")
-    for options, (flow, jacobian) in zip(choices, np.exp(totals / (len(SCENES) * len(noises))), strict=True):
-        print(f"| {options['rows']} | {options['smooth']:g} | {flow:.2f} | {jacobian:.2f} |")
 
+
+def table() -> list[Row]:
+    """One row for each scene, noise and choice."""
+    rows: list[Row] = []
+    for (name, carrier), noise, options in itertools.product(SCENES, NOISES, choices()):
+        flow, jacobian, held, held_jacobian = measure(name, carrier, noise, options)
+        row: Row = {"scene": name, "carrier": carrier or "-", "noise": noise, **options}
+        row |= {"flow rms": flow, "Jacobian rms": jacobian}
+        rows.append(row | {"flow within 2 sd": held, "Jacobian within 2 sd": held_jacobian})
+    return rows
+
+
+def summary() -> list[Row]:
+    """Error relative to the best choice of each scene, geometric mean over the scenes."""
+    totals = np.zeros((len(choices()), 2))
+    for (name, carrier), noise in itertools.product(SCENES, NOISES):
+        errors = np.array([measure(name, carrier, noise, options)[:2] for options in choices()])
+        totals += np.log(errors / errors.min(0))
+    means = np.exp(totals / (len(SCENES) * len(NOISES))).tolist()
+    return [{**options, "flow": f, "Jacobian": j} for options, (f, j) in zip(choices(), means, strict=True)]
+
+
+TABLES = {
+    "scenes": report.Table("Windowed estimator, choice of rows and smoothing", lambda _: table()),
+    "summary": report.Table(
+        "Windowed estimator, errors relative to the best choice of each scene", lambda _: summary()
+    ),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

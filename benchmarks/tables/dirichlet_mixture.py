@@ -1,11 +1,10 @@
 """Dirichlet-process mixtures on random data with known clusters, beside scikit-learn's, in one process.
 
-    python -m benchmarks.tables.dirichlet_mixture [--seeds 10] [--rounds 10]
+    python -m benchmarks.tables.dirichlet_mixture
 """
 
 from __future__ import annotations
 
-import argparse
 import functools
 import warnings
 from collections.abc import Callable
@@ -22,6 +21,8 @@ Array = NDArray[np.float64]
 Row = dict[str, object]
 COMPONENTS = 12
 """Largest number of components of every method."""
+SEEDS = 10
+"""Random data sets of each kind."""
 ACTIVE_SHARE = 0.005
 """Weight above which a component counts."""
 LONG: dict[str, Any] = {"tol": 1e-6, "max_iter": 1000}
@@ -137,17 +138,16 @@ def times(rounds: int = 3) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Prints both tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=10, help="number of random data sets of each kind")
-    parser.add_argument("--rounds", type=int, default=10, help="runs of each fit, taken in turns; the best counts")
-    arguments = parser.parse_args()
-    print("Components (range), largest weight, adjusted Rand index:\n")
-    print("\n".join(report.table_lines(outcomes(arguments.seeds))))
-    print("\nMilliseconds of a fit on one thread (scikit-learn's time over it):\n")
-    print("\n".join(report.table_lines(times(arguments.rounds))))
-
+TABLES = {
+    "outcomes": report.Table(
+        "Dirichlet-process mixtures: components (range), largest weight, adjusted Rand index",
+        lambda o: outcomes(report.trials(o, SEEDS, 3)),
+    ),
+    "times": report.Table(
+        "Dirichlet-process mixtures: milliseconds of a fit on one thread (scikit-learn's time over it)",
+        lambda o: times(report.rounds(o)),
+    ),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

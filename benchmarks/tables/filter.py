@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import jacoflow
+from benchmarks import report
 from benchmarks.scores.timing import race
 
 try:
@@ -104,3 +105,16 @@ def agreement(frames: int = 400) -> list[dict[str, object]]:
             order = "motion first" if form == "fast" else "brightness first"
             rows.append({"form": form, "reference_square_root": order, "precision": dtype, "frames": frames, "largest_relative_difference": relative})
     return rows
+
+
+TABLES = {
+    "speed": report.Table(
+        "Flow filter, microseconds per pixel and frame, 640 x 480", lambda o: speed(max(2, report.rounds(o) // 2))
+    ),
+    "agreement": report.Table(
+        "Flow filter, agreement with the reference", lambda o: agreement(60 if o.quick else 400)
+    ),
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 import jacoflow
+from benchmarks import report
 from benchmarks.rivals import flow as rivals
 from benchmarks.scores.timing import race
 from benchmarks.settings import SPEED, Setting
@@ -60,3 +61,15 @@ def speed(rounds: int, width: int = 640, height: int = 480, ours: list[Setting] 
             row[f"times_{rival}"] = time.busiest / measured.busiest if time else None
         rows.append({**row, "speedup_cpu": one_thread.busiest / measured.busiest, "speedup_wall": one_thread.wall / measured.wall})
     return rows
+
+
+TABLES = {
+    f"{width}": report.Table(
+        f"Flow per second, {width} x {height}",
+        lambda o, size=(width, height): [] if o.quick and size != SIZES[0] else speed(report.rounds(o), *size),
+    )
+    for width, height in SIZES
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

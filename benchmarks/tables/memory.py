@@ -1,13 +1,12 @@
 """Peak of resident memory during one estimate, over that before it, in planes of one 4-byte number per pixel.
 
-    python -m benchmarks.tables.memory [--width 1920] [--height 1080]
+    python -m benchmarks.tables.memory
 
 Each estimate runs in a process of its own, which has made one on small frames before: what libraries take once is not counted. The result is counted.
 """
 
 from __future__ import annotations
 
-import argparse
 import resource
 import subprocess
 import sys
@@ -22,6 +21,10 @@ import jacoflow
 from benchmarks import report
 
 PRESETS = ("fast", "balanced", "accurate")
+SIZE = (1920, 1080)
+"""Width and height of the frames, px."""
+CHILD = "--child"
+"""First argument of a process that makes one estimate."""
 WARM_UP = 64
 """Side of the small frames, px."""
 
@@ -69,25 +72,21 @@ def rows(width: int, height: int) -> Iterator[dict[str, object]]:
         for preset, count in product(PRESETS, (2, 3)):
             row: dict[str, object] = {"preset": preset, "frames": count}
             for covariance in (False, True):
-                child = [sys.executable, "-m", "benchmarks.tables.memory", "--child", str(file), preset, str(count), str(int(covariance))]
+                child = [sys.executable, "-m", "benchmarks.tables.memory", CHILD, str(file), preset, str(count), str(int(covariance))]
                 found = subprocess.run(child, check=True, capture_output=True, text=True)
                 row["planes_with_covariance" if covariance else "planes"] = float(found.stdout)
             yield row
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--width", type=int, default=1920)
-    parser.add_argument("--height", type=int, default=1080)
-    parser.add_argument("--child", nargs=4, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.child is not None:
-        file, preset, count, covariance = options.child
-        print(measure(file, preset, int(count), covariance == "1"))
-        return
-    print("\n".join(report.table_lines(list(rows(options.width, options.height)))))
-
+TABLES = {
+    "memory": report.Table(
+        f"Peak of resident memory, planes of one 4-byte number per pixel, {SIZE[0]} x {SIZE[1]}",
+        lambda _: list(rows(*SIZE)),
+    )
+}
 
 if __name__ == "__main__":
-    main()
+    if len(sys.argv) == 6 and sys.argv[1] == CHILD:
+        print(measure(sys.argv[2], sys.argv[3], int(sys.argv[4]), sys.argv[5] == "1"))
+    else:
+        report.main(__doc__, TABLES)

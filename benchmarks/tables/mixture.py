@@ -1,11 +1,10 @@
 """A round of the weighted variational mixture beside scikit-learn's, on the same points, and how far both agree.
 
-    python -m benchmarks.tables.mixture [--rounds 10]
+    python -m benchmarks.tables.mixture
 """
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from collections.abc import Callable
 
@@ -95,12 +94,7 @@ def table(rounds: int = 10) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=10, help="runs of each, taken in turns; the best counts")
-    print("\n".join(report.table_lines(table(parser.parse_args().rounds))))
-
+TABLES = {"rounds": report.Table("Weighted mixtures, a round", lambda o: table(report.rounds(o)))}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

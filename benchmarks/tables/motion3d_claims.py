@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.rivals import motion3d as rivals
 from benchmarks.scenes import motion3d as scenes
-from benchmarks.tables.motion3d_published import angle, rms
+from benchmarks.scores.motion3d import ELLIPSOID, angle, rms
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
@@ -22,8 +23,6 @@ DISPLACED = (
     (0.1, 0.15, (1.26, 10.9), (0.047, 0.16)),
 )
 """Translation over depth, rotation in rad; published: direction in degrees and rotation in mrad of flow placed at the start and half way."""
-ELLIPSOID = 11.07
-"""95 % of chi squared with five degrees of freedom."""
 LAYOUTS, TRIALS = 40, 200
 """Layouts of points without noise; trials of the single figures."""
 
@@ -229,3 +228,14 @@ def claims(trials: int) -> list[Row]:
     """Single figures of the text."""
     parts = (aperture, between_minima, unknown_noise, rotations_alone, exact_points, inside_the_points, biases, turning)
     return [row for part in parts for row in part(trials)]
+
+
+TABLES = {
+    "displacements": report.Table(
+        "3-D motion: displacements over a whole frame, without noise", lambda o: displacements(report.trials(o, LAYOUTS))
+    ),
+    "claims": report.Table("3-D motion: single figures", lambda o: claims(report.trials(o, TRIALS))),
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -1,23 +1,22 @@
 """How often the stated covariances of 3-D motion hold where they are hardest to state: long lenses, narrow fields and epipoles among the points, a thing that moves, few points with outliers in unknown noise, many outliers, few near points before a far background, few patches; and in fast turns.
 
-    python -m benchmarks.tables.motion3d_coverage [--trials 400] [--only long narrow around mover few outliers patches turns]
+    python -m benchmarks.tables.motion3d_coverage [--trials 400] [--cases long narrow around mover few outliers patches turns]
 
 `wrong`: said to be `ok` and more than 15 degrees and four of its stated deviations off. `ellipsoid`, `ellipse`: shares of the estimates with the status `ok` whose 95 % ellipsoid of all five unknowns, and whose 95 % ellipse of the direction, hold the truth. None of the layouts is one of the published tables.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import table_lines
+from benchmarks import report
 from benchmarks.scenes import motion3d as scenes
-from benchmarks.tables.motion3d_honesty import DEPTHS, ELLIPSE, far_off
-from benchmarks.tables.motion3d_published import angle, squared
+from benchmarks.scores.motion3d import ELLIPSE, ELLIPSOID, angle, far_off, squared
+from benchmarks.tables.motion3d_honesty import DEPTHS
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
@@ -25,8 +24,6 @@ Row = dict[str, object]
 Estimated = tuple[motion3d.MotionEstimate, Array, Array]
 """An estimate, and the true direction and rotation."""
 TRIALS = 400
-ELLIPSOID = 11.070
-"""95 % of chi squared with five degrees of freedom."""
 
 
 def _by_chance(rng: np.random.Generator, turn: float = 0.04) -> tuple[Array, Array]:
@@ -229,14 +226,10 @@ def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--only", nargs="+", choices=list(CASES))
-    options = parser.parse_args()
-    print("\n".join(table_lines(table(options.trials, options.only))))
-
+TABLES = {
+    "coverage": report.Table("3-D motion: where covariances are hardest to state", lambda o: table(report.trials(o, TRIALS, 12), o.cases)),
+}
+ARGUMENTS = {"--cases": {"nargs": "+", "choices": list(CASES), "help": "parts of the table"}}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import jacoflow
-from benchmarks.tables import motion3d_recordings as recordings
+from benchmarks import report
+from benchmarks.scenes import drives
+from benchmarks.tables.motion3d_recordings import on_drive
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
@@ -22,23 +24,17 @@ SPACINGS = (32, 64)
 """Distances of points, px, whose motions are compared."""
 
 
-def drive(data: Path) -> tuple[list[NDArray[np.uint8]], Array]:
-    """Frames, and camera-to-world poses (T, 3, 4)."""
-    folder = data / "kitti_odometry" / "KITTI_sequence_1"
-    return recordings.frames(folder / "image_l"), np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)
-
-
 def poses(data: Path, preset: str = "balanced") -> list[Row]:
     """Rotations pair by pair, beside the reference's: a camera on a car shakes by hundredths of a degree from pair to pair, in ours and in the measured ones, and in the first of the reference by nothing. So these were interpolated, and tell nothing of single pairs."""
-    images, reference = drive(data)
-    true = [recordings.true_motion(reference, k) for k in range(len(images))]
-    ours = [motion3d.estimate_field_motion(recordings.field(images[k], images[k + 1], preset), recordings.K_DRIVE)[0] for k in range(len(images) - 1)]
+    images, reference = drives.drive(data)
+    true = [drives.true_motion(reference, k) for k in range(len(images))]
+    ours = [motion3d.estimate_field_motion(drives.field(images[k], images[k + 1], preset), drives.K_DRIVE)[0] for k in range(len(images) - 1)]
     change = lambda rotations, k: round(float(np.degrees(np.linalg.norm(rotations[k] - rotations[k - 1]))), 4)
     rows: list[Row] = []
     for k in range(1, len(ours)):
         rows.append(
             {
-                "pair": f"{k} to {k + 1}", "reference": "interpolated" if k < recordings.INTERPOLATED else "measured",
+                "pair": f"{k} to {k + 1}", "reference": "interpolated" if k < drives.INTERPOLATED else "measured",
                 "reference turns otherwise than in the pair before, deg": change([w for _, w, _, _ in true], k),
                 "ours, deg": change([found.rotation for found in ours], k),
                 "ours off the reference, deg": round(float(np.degrees(np.linalg.norm(ours[k].rotation - true[k][1]))), 4),
@@ -62,7 +58,7 @@ def correlation(errors: Array, points: Array, used: NDArray[np.bool_], distance:
 
 def together(data: Path) -> list[Row]:
     """How far errors go together, and what it does to a motion: of fields of pairs and of three frames, the distance of points by default; correlations of the residuals across epipolar lines beside the model's; by how much the sum over correlated points widens the direction; how much directions scatter about their mean offset from the reference, at the pairs whose pose was measured; residuals of the quarter of the points with the least variance, in units of what the field tells (1 if it told the truth)."""
-    images, reference = drive(data)
+    images, reference = drives.drive(data)
     rows: list[Row] = []
     for kind, count in FRAMES.items():
         fields = [jacoflow.estimate(images[k : k + count], preset="balanced") for k in range(len(images) - count + 1)]
@@ -72,14 +68,14 @@ def together(data: Path) -> list[Row]:
         sums = {distance: np.zeros(2) for distance in DISTANCES}
         widened, best = [], []
         for field in fields:
-            found, points = motion3d.estimate_field_motion(field, recordings.K_DRIVE, spacing=step)
+            found, points = motion3d.estimate_field_motion(field, drives.K_DRIVE, spacing=step)
             for distance in DISTANCES:
                 sums[distance] += correlation(found.residuals, points, found.inliers, distance)
-            usual, _ = motion3d.estimate_field_motion(field, recordings.K_DRIVE)
-            alone, _ = motion3d.estimate_field_motion(field, recordings.K_DRIVE, correlation_length=0.0)
+            usual, _ = motion3d.estimate_field_motion(field, drives.K_DRIVE)
+            alone, _ = motion3d.estimate_field_motion(field, drives.K_DRIVE, correlation_length=0.0)
             widened.append(usual.direction_std / alone.direction_std)
             # So far apart that the points' covariances are their own.
-            apart, places = motion3d.estimate_field_motion(field, recordings.K_DRIVE, spacing=4 * length)
+            apart, places = motion3d.estimate_field_motion(field, drives.K_DRIVE, spacing=4 * length)
             x, y = places.astype(int).T
             variance = np.trace(field.covariance[y, x][:, :2, :2], axis1=1, axis2=2)
             least = apart.inliers & (variance <= np.quantile(variance[apart.inliers], 0.25))
@@ -92,11 +88,22 @@ def together(data: Path) -> list[Row]:
         row["residuals of the best points"] = round(float(np.median(best)), 2)
         for spacing in SPACINGS:
             offsets = []
-            for k in range(recordings.INTERPOLATED, len(fields)):
-                found, _ = motion3d.estimate_field_motion(fields[k], recordings.K_DRIVE, spacing=spacing)
+            for k in range(drives.INTERPOLATED, len(fields)):
+                found, _ = motion3d.estimate_field_motion(fields[k], drives.K_DRIVE, spacing=spacing)
                 # The motion of three frames is that at the middle one.
-                true = np.mean([recordings.true_motion(reference, j)[0] for j in range(k, k + count - 1)], 0)
+                true = np.mean([drives.true_motion(reference, j)[0] for j in range(k, k + count - 1)], 0)
                 offsets.append(np.degrees(found.translation - true)[:2])
             row[f"direction scatters at {spacing} px, deg"] = round(float(np.sqrt(np.var(offsets, axis=0, ddof=1).sum())), 2)
         rows.append(row)
     return rows
+
+
+TABLES = {
+    "poses": report.Table(
+        "3-D motion: rotations of the drive and of its reference, pair by pair", on_drive(poses)
+    ),
+    "together": report.Table("3-D motion: errors that go together on the drive", on_drive(together)),
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

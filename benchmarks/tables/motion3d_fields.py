@@ -1,20 +1,19 @@
 """How often the stated covariances of the motion of a flow field hold: rendered rooms of chance with exact truth (`motion3d_rooms`), two frames of 320 x 240 px, f = 300 px.
 
-    python -m benchmarks.tables.motion3d_fields [--trials 40] [--only coarse_to_fine windowed] [--errors]
+    python -m benchmarks.tables.motion3d_fields [--trials 40] [--only fields errors]
 
-Flow by both methods that have a field of windows, in noise of 1.5 and 5 grey levels, each estimated robustly (the default), from all points, and from patches of 48 px. `quick`: translational flow of some 2 px, beyond what the windowed method is made for; `slow`: a quarter of it. Columns as in `motion3d_coverage`. With --errors instead: what the errors of a picture's flow have in common.
+Flow by both methods that have a field of windows, in noise of 1.5 and 5 grey levels, each estimated robustly (the default), from all points, and from patches of 48 px. `quick`: translational flow of some 2 px, beyond what the windowed method is made for; `slow`: a quarter of it. Columns as in `motion3d_coverage`. `errors`: what the errors of a picture's flow have in common.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
 
 import jacoflow
-from benchmarks.report import table_lines
+from benchmarks import report
 from benchmarks.scenes import rooms
 from benchmarks.tables.motion3d_coverage import Estimated, Row, row
 from jacoflow import motion3d
@@ -91,15 +90,12 @@ def errors(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--only", nargs="+", choices=METHODS)
-    parser.add_argument("--errors", action="store_true")
-    options = parser.parse_args()
-    print("\n".join(table_lines((errors if options.errors else table)(options.trials, options.only))))
-
+TABLES = {
+    "fields": report.Table("3-D motion: flow fields of rendered rooms", lambda o: table(report.trials(o, TRIALS))),
+    "errors": report.Table(
+        "3-D motion: what the errors of a picture's flow have in common", lambda o: errors(report.trials(o, TRIALS))
+    ),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks import report
 from benchmarks.scenes import motion3d as scenes
 from jacoflow import motion3d
 
@@ -47,3 +48,9 @@ def fixed_values() -> list[Row]:
     tell("one unknown, CRLB", 8.2128e-4, sideways.crlb)
     tell("one unknown, crossover sigma", 0.30369, sideways.crossover)
     return rows
+
+
+TABLES = {"fixed": report.Table("3-D motion: values without chance", lambda _: fixed_values())}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -8,7 +8,6 @@ of its stated deviations off. `holds`: share of the `ok` ones whose 95 % ellipse
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,18 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import table_lines
+from benchmarks import report
 from benchmarks.scenes import motion3d as scenes
-from benchmarks.tables.motion3d_published import angle, squared
+from benchmarks.scores.motion3d import ELLIPSE, angle, far_off, squared
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
 Row = dict[str, object]
 TRIALS = 6000
-FAR_OFF, DEVIATIONS = 15.0, 4.0
-"""An `ok` is wrong beyond both: degrees, and stated deviations."""
-ELLIPSE = 5.991
-"""95 % of chi squared with two degrees of freedom."""
 WIDTHS = ((0.15, 0.3), (0.3, 0.6), (0.6, 1.0))
 """Classes of the half width of the field."""
 
@@ -93,11 +88,6 @@ class Verdict:
     holds: bool
 
 
-def far_off(found: motion3d.MotionEstimate, u: Array) -> bool:
-    """Whether a direction said to be `ok` is beyond both limits."""
-    return angle(found.translation, u) > max(FAR_OFF, DEVIATIONS * found.direction_std)
-
-
 def verdict(each: Trial, robust: bool) -> Verdict:
     """Estimates; noise is told."""
     make = each.scene
@@ -122,14 +112,10 @@ def table(trials: int = TRIALS, robust: bool = False) -> list[Row]:
     return rows
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--robust", action="store_true", help="with the search that bears outliers, of which there are none")
-    options = parser.parse_args()
-    print("\n".join(table_lines(table(options.trials, options.robust))))
-
+TABLES = {
+    "honesty": report.Table("3-D motion: what is said of scenes by chance", lambda o: table(report.trials(o, TRIALS, 12), o.robust)),
+}
+ARGUMENTS = {"--robust": {"action": "store_true", "help": "robust estimates of scenes without outliers"}}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

@@ -1,6 +1,6 @@
 """Where the points lie, what shape their noise has, planes, and long displacements in large noise: how often an estimate of 3-D motion that says `ok` is wrong and how often its covariance holds, of scenes by chance.
 
-    python -m benchmarks.tables.motion3d_layouts [--trials 400] [--only layouts noise things planes band views]
+    python -m benchmarks.tables.motion3d_layouts [--trials 400] [--cases layouts noise things planes band views]
 
 Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a street or a wall with a relief
 of 3 %. A thing that moves by itself is a tenth to a third of the points, the nearest to one of them, half as near again; noise is .3 to 10 % there, and the search robust. Planes are exact ones with noise of 1 % of the flow, which another motion explains as well unless it has points behind the camera. The band is a tenth as high as it is wide and up to 160 degrees of it are seen. In two views the camera moves by a tenth of the depth, and noise is
@@ -9,13 +9,12 @@ a share of the displacements. The columns are those of `motion3d_coverage.py`.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import table_lines
+from benchmarks import report
 from benchmarks.scenes import motion3d as scenes
 from benchmarks.tables.motion3d_coverage import Estimated, Row, row
 from benchmarks.tables.motion3d_honesty import DEPTHS
@@ -173,14 +172,17 @@ def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
     return [coverage_row(name, trials) for name in cases(only)]
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--only", nargs="+", choices=["layouts", "noise", "things", "planes", "band", "views"])
-    options = parser.parse_args()
-    print("\n".join(table_lines(table(options.trials, options.only))))
-
+TABLES = {
+    "layouts": report.Table(
+        "3-D motion: where the points lie, what shape their noise has, planes and long displacements",
+        lambda o: table(report.trials(o, TRIALS, 12), o.cases),
+    )
+}
+ARGUMENTS = {
+    "--cases": {
+        "nargs": "+", "choices": ["layouts", "noise", "things", "planes", "band", "views"], "help": "parts of the table"
+    }
+}  # fmt: skip
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

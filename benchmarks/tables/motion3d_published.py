@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.rivals import motion3d as rivals
 from benchmarks.scenes import motion3d as scenes
+from benchmarks.scores.motion3d import ELLIPSOID, angle, rms, squared
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
 Row = dict[str, object]
-
-
-def angle(a: Array, b: Array) -> float:
-    """Angle between two directions, degrees."""
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b))))
-
-
-def rms(values: Sequence[float]) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def both(values: Sequence[float]) -> str:
@@ -33,11 +25,6 @@ def both(values: Sequence[float]) -> str:
 def error(truth: scenes.Scene, u: Array, w: Array, tangent: Array) -> Array:
     """(psi, w) of the truth as seen from an estimate, (5,), rad and rad/frame."""
     return np.concatenate([tangent @ truth.u, truth.w - w])
-
-
-def squared(delta: Array, covariance: Array) -> float:
-    """Squared Mahalanobis distance."""
-    return float(delta @ np.linalg.solve(covariance, delta))
 
 
 THEORY = (
@@ -150,7 +137,7 @@ PRACTICAL_COLUMNS = ("ML", "prior", "efficient", "true depths", "CRLB", "linear"
 
 def holds(truth: scenes.Scene, found: motion3d.MotionEstimate, covariance: Array) -> bool:
     """Whether a 95 % ellipsoid around an estimate holds the truth."""
-    return squared(error(truth, found.translation, found.rotation, found.tangent), covariance) < 11.070
+    return squared(error(truth, found.translation, found.rotation, found.tangent), covariance) < ELLIPSOID
 
 
 def gauss_newton(found: motion3d.MotionEstimate) -> Array | None:
@@ -275,11 +262,19 @@ def pixels(trials: int) -> list[Row]:
     return rows
 
 
-TABLES: dict[str, tuple[str, Callable[[int], list[Row]], int]] = {
-    "theory": ("ML follows (17), not the bound", theory, 200),
-    "weights": ("True depths in the weights reach (25)", true_weights, 120),
-    "one": ("One unknown: variances over their formulas", one_unknown, 3000),
-    "practical": ("Scenes, searched everywhere", practical, 200),
-    "pixels": ("Two views in pixels beside OpenCV", pixels, 240),
+TABLES = {
+    name: report.Table(f"3-D motion: {title}", lambda o, rows=rows, own=own: rows(report.trials(o, own)))
+    for name, (title, rows, own) in {
+        "theory": ("ML follows (17), not the bound", theory, 200),
+        "weights": ("True depths in the weights reach (25)", true_weights, 120),
+        "one": ("One unknown: variances over their formulas", one_unknown, 3000),
+        "practical": ("Scenes, searched everywhere", practical, 200),
+        "pixels": ("Two views in pixels beside OpenCV", pixels, 240),
+    }.items()
 }
-"""Tables by name: title, what makes it, trials."""
+
+
+
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.scenes import motion3d as scenes
-from benchmarks.tables.motion3d_published import angle, rms
+from benchmarks.scores.motion3d import angle, rms
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
@@ -78,3 +79,11 @@ def six_row(drawn: list[tuple[scenes.Scene, Array, Array]], asked: Sequence[floa
     for column, bound, (own, its) in (("flow ML", "CRLB flow", (0, 4)), ("six shrunk", "CRLB six", (3, 5))):
         row[f"{column} / bound"], row[f"{column} / bound asked"] = round(rms(columns[column]) / rms(columns[bound]), 2), round(asked[own] / asked[its], 2)
     return row
+
+
+TABLES = {
+    "six": report.Table("3-D motion: Six numbers a patch against flow", lambda o: six_numbers(report.trials(o, 240))),
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -1,16 +1,16 @@
 """The particle filter beside the Kalman filter on a linear model, and its CPU time beside filterpy's resampling and a NumPy filter.
 
-    python -m benchmarks.tables.particle_filter [--rounds 10] [--seeds 5] [--particles 20000]
+    python -m benchmarks.tables.particle_filter
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.scores import timing
 from jacoflow.filters import KalmanFilter, ParticleFilter, resample
 
@@ -20,6 +20,9 @@ except ImportError:
     monte_carlo = None
 
 Array = NDArray[np.float64]
+Row = dict[str, object]
+SEEDS, PARTICLES = 12, 20_000
+COLUMNS = ("mean, sd/sqrt(ESS)", "variances, %", "log evidence of a step", "of all steps together", "N / smallest ESS")
 SCHEMES = ("systematic", "stratified", "residual", "multinomial")
 F = np.array([[1.0, 1.0], [0.0, 1.0]])
 Q = np.diag([0.05, 0.02])
@@ -112,26 +115,28 @@ def worst_step(filter_: ParticleFilter | NumpyFilter, scheme: str, seed: int) ->
     return float(mean), float(variance), float(evidence), abs(total), len(filter_.x) / fewest
 
 
-def accuracy(particles: int, seeds: int) -> None:
-    """Prints the comparison with the Kalman filter: median and largest of the seeds' worst steps."""
-    print(f"Worst of {STEPS} steps against the Kalman filter, N = {particles}: median of {seeds} seeds (largest). Bars: {BARS}\n")
-    print("| filter | mean, sd/sqrt(ESS) | variances, % | log evidence of a step | of all steps together | N / smallest ESS |\n|---|---|---|---|---|---|")
+def accuracy(particles: int, seeds: int) -> list[Row]:
+    """The comparison with the Kalman filter: median of the seeds' worst steps (largest)."""
+    rows: list[Row] = []
     for scheme in (*SCHEMES, "NumPy, systematic"):
         begin = NumpyFilter if scheme.startswith("NumPy") else ours
-        rows = np.array([worst_step(begin(particles, seed), scheme, seed) for seed in range(seeds)]) * [1, 100, 1, 1, 1]
-        middle, largest = np.median(rows, axis=0), rows.max(axis=0)
-        cells = [f"{m:.{d}f} ({most:.{d}f})" for m, most, d in zip(middle, largest, (1, 1, 3, 3, 1), strict=True)]
-        print(f"| {scheme} | {' | '.join(cells)} |")
+        worst = [worst_step(begin(particles, seed), scheme, seed) for seed in range(seeds)]
+        figures = np.array(worst) * [1, 100, 1, 1, 1]
+        cells = zip(COLUMNS, np.median(figures, axis=0), figures.max(axis=0), (1, 1, 3, 3, 1), strict=True)
+        rows.append({"filter": scheme} | {name: f"{m:.{d}f} ({most:.{d}f})" for name, m, most, d in cells})
+    return rows
 
 
-def copies(draws: int = 20_000) -> None:
-    """Prints mean and variance of the copies of four particles, n = 8."""
+def copies(draws: int = 20_000) -> list[Row]:
+    """Mean and variance of the copies of four particles, n = 8."""
     weights = np.array([0.1, 0.2, 0.3, 0.4])
-    print(f"\nCopies of w = .1 .2 .3 .4, n = 8, {draws} draws\n\n| scheme | mean | variance |\n|---|---|---|")
+    rows: list[Row] = []
     for scheme in SCHEMES:
-        counts = np.array([np.bincount(resample(weights, 8, scheme, random_state=k), minlength=4) for k in range(draws)])
+        drawn = (resample(weights, 8, scheme, random_state=k) for k in range(draws))
+        counts = np.array([np.bincount(each, minlength=4) for each in drawn])
         mean, variance = (" ".join(f"{v:.2f}" for v in values) for values in (counts.mean(0), counts.var(0)))
-        print(f"| {scheme} | {mean} | {variance} |")
+        rows.append({"scheme": scheme, "mean": mean, "variance": variance})
+    return rows
 
 
 def cycle(filter_: ParticleFilter | NumpyFilter, z: Array) -> None:
@@ -142,8 +147,8 @@ def cycle(filter_: ParticleFilter | NumpyFilter, z: Array) -> None:
         filter_.resample("systematic")
 
 
-def speed(particles: int, rounds: int) -> None:
-    """Prints CPU times of the busiest thread and their ratios to ours with one thread."""
+def cycles(particles: int, rounds: int) -> list[Row]:
+    """CPU time of the busiest thread for one cycle of prediction, update and resampling."""
     z = measurements(0)
     times = timing.race(
         {
@@ -153,31 +158,42 @@ def speed(particles: int, rounds: int) -> None:
         },
         rounds,
     )
-    print(f"\nA cycle (predict, update, resample), N = {particles}\n\n| filter | us | ratio |\n|---|---|---|")
-    for name, time in times.items():
-        print(f"| {name} | {1e6 * time.busiest / STEPS:.0f} | {time.busiest / times['ours, 1 thread'].busiest:.2f} |")
+    base = times["ours, 1 thread"].busiest
+    return [
+        {"filter": name, "us": 1e6 * time.busiest / STEPS, "ratio": time.busiest / base} for name, time in times.items()
+    ]
+
+
+def resampling(particles: int, rounds: int) -> list[Row]:
+    """CPU time of one resampling beside filterpy's."""
     if monte_carlo is None:
-        return
+        return []
     weights = np.random.default_rng(0).random(particles) ** 3
     weights /= weights.sum()
-    print(f"\nOne resampling, N = {particles}\n\n| scheme | ours, us | filterpy, us | ratio |\n|---|---|---|---|")
+    rows: list[Row] = []
     for scheme in SCHEMES:
         rival = getattr(monte_carlo, f"{scheme}_resample")
-        both = timing.race({"ours": lambda s=scheme: resample(weights, scheme=s), "filterpy": lambda r=rival: r(weights)}, rounds)
-        own, theirs = both["ours"].busiest, both["filterpy"].busiest
-        print(f"| {scheme} | {1e6 * own:.0f} | {1e6 * theirs:.0f} | {theirs / own:.1f} |")
+        times = timing.race(
+            {"ours": lambda s=scheme: resample(weights, scheme=s), "filterpy": lambda r=rival: r(weights)}, rounds
+        )
+        own, theirs = times["ours"].busiest, times["filterpy"].busiest
+        rows.append({"scheme": scheme, "ours, us": 1e6 * own, "filterpy, us": 1e6 * theirs, "ratio": theirs / own})
+    return rows
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--seeds", type=int, default=12)
-    parser.add_argument("--particles", type=int, default=20_000)
-    options = parser.parse_args()
-    accuracy(options.particles, options.seeds)
-    copies()
-    speed(options.particles, options.rounds)
-
+TABLES = {
+    "accuracy": report.Table(
+        f"Particle filter, worst of {STEPS} steps against the Kalman filter: median of seeds (largest); asked: {BARS}",
+        lambda o: accuracy(PARTICLES, report.trials(o, SEEDS)),
+    ),
+    "copies": report.Table("Particle filter, copies of weights .1 .2 .3 .4, n = 8", lambda _: copies()),
+    "cycles": report.Table(
+        "Particle filter, time of a cycle", lambda o: cycles(PARTICLES, report.rounds(o))
+    ),
+    "resampling": report.Table(
+        "Particle filter, time of a resampling", lambda o: resampling(PARTICLES, report.rounds(o))
+    ),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

@@ -1,6 +1,6 @@
 """The particle tracker beside OpenCV's trackers on scenes of targets that look alike and on recordings.
 
-    python -m benchmarks.tables.particle_tracking [--runs 3] [--recordings 10 11] [--scenes NAME ...] [--only TABLE ...] [--data FOLDER] [--out FOLDER]
+    python -m benchmarks.tables.particle_tracking [--only TABLE ...] [--runs 3] [--recordings 10 11] [--trackers NAME ...] [--data FOLDER] [--out FOLDER]
 
 Every tracker gets the true box of each target in its first frame. A cell is success in % / mean overlap (intersection over union) / mean error of the
 centre in px, over recordings (seeds of the scene), runs (seeds of the tracker) and targets. Success: the centre in the target's own true box in 80 % of the
@@ -9,18 +9,14 @@ frames, and a mean overlap of 0.3 in the last ten. OpenCV's trackers run once a 
 
 from __future__ import annotations
 
-import argparse
-import datetime
-import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks import report
-from benchmarks.rivals.particle import RIVALS, Contestant, Sequence, Settings, rivals
+from benchmarks.rivals.particle import Contestant, Sequence, Settings, rivals
 from benchmarks.scenes import particle_recordings
 from benchmarks.scores.particle import (
     FOUND,
@@ -33,8 +29,6 @@ from jacoflow import scenes
 from jacoflow.track import ParticleTracker
 
 Row = dict[str, object]
-Tables = dict[str, list[Row]]
-NAMES = ("likelihoods", "readings", "parts", "scenes", "recordings", "speed")
 PAPER_SCENES = ("people_handheld", "cars_handheld", "people_static")
 """Scenes of the paper: both handheld ones and the static one."""
 HARD_SCENES = ("slow_cross", "stop_and_go", "pillar")
@@ -148,65 +142,54 @@ def speed(threads: int = 2, rounds: int = 3) -> list[Row]:
     return [{"tracker": name, "mean, ms": round(float(np.mean(each)), 1), "median, ms": round(float(np.median(each)), 1)} for name, each in times.items()]
 
 
-def sections(
-    data: Path | None,
-    *,
-    names: Iterable[str] = NAMES,
-    recordings: Iterable[int] = RECORDINGS,
-    runs: int = RUNS,
-    chosen: Iterable[str] | None = None,
-    trackers: Iterable[str] | None = None,
-) -> Tables:
-    """The tables by title; `chosen` are the scenes, by default those of each table, `trackers` parts of the names of those to run."""
-    recordings, picked = tuple(recordings), None if chosen is None else tuple(chosen)
-    wanted = None if trackers is None else tuple(trackers)
-    others = list(rivals())
-
-    def among(settings: Iterable[Settings], beside: list[Contestant] | None = None) -> list[Contestant]:
-        candidates = [*(each.contestant() for each in settings), *(beside or [])]
-        return [each for each in candidates if wanted is None or any(part in each.name for part in wanted)]
-
-    def on(usual: tuple[str, ...], contestants: list[Contestant]) -> list[Row]:
-        return comparison(usual if picked is None else picked, contestants, recordings, runs) if contestants else []
-
-    modes = (IMPROVED_MODE, PAPER_MODE)
-    beyond = (*modes, without("paper", PAPER, "foreground"))
-    makers: dict[str, dict[str, Callable[[], list[Row]]]] = {
-        "likelihoods": {"Particle tracker, each factor of the likelihood left out": lambda: on(PAPER_SCENES, among(LIKELIHOODS, others))},
-        "readings": {"Particle tracker, readings of the paper": lambda: on(PAPER_SCENES, among(READINGS))},
-        "parts": {"Particle tracker, parts of the improved mode": lambda: on(HARD_SCENES, among(PARTS))},
-        "scenes": {"Particle tracker, ten scenes": lambda: on(tuple(scenes.target_scenes()), among(beyond, others))},
-        "speed": {"Particle tracker, time of a frame of 720 x 480, two targets, two threads": speed},
-        "recordings": {
-            f"Particle tracker, {particle_recordings.CAMPUS}": lambda: [] if data is None else campus(data, among(modes), among((), others)),
-            "Particle tracker, other recordings": lambda: [] if data is None else single(data, among(modes, others)),
-        },
-    }
-    tables = {title: make() for name in names for title, make in makers[name].items()}
-    return {title: rows for title, rows in tables.items() if rows}
+def among(options: report.Options, settings: Iterable[Settings], *beside: Contestant) -> list[Contestant]:
+    """Those whose name holds one of the parts in `--trackers`."""
+    candidates = [*(each.contestant() for each in settings), *beside]
+    wanted = options.trackers
+    return [each for each in candidates if wanted is None or any(part in each.name for part in wanted)]
 
 
-def main() -> None:
-    """Prints the tables; writes them into a folder if one is given."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=RUNS, help="runs of the particle tracker a recording")
-    parser.add_argument("--recordings", type=int, nargs="+", default=RECORDINGS, help="seeds of the scenes")
-    parser.add_argument("--scenes", nargs="+", choices=list(scenes.target_scenes()), help="scenes instead of each table's own")
-    parser.add_argument("--trackers", nargs="+", help=f"parts of the names of the trackers to run (modes, OpenCV's {', '.join(RIVALS)})")
-    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, help="tables to print")
-    parser.add_argument("--data", type=Path, default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth")
-    parser.add_argument("--out", type=Path, help="folder of the dated table that the tables go into")
-    options = parser.parse_args()
-    data = None if options.data is None else Path(options.data)
-    asked: dict[str, Any] = {"names": options.only, "recordings": options.recordings, "runs": options.runs}
-    tables = sections(data, **asked, chosen=options.scenes, trackers=options.trackers)
-    for title, rows in tables.items():
-        print(f"## {title}\n\n" + "\n".join(report.table_lines(rows)) + "\n")
-    if options.out is not None:
-        record = report.Record(datetime.date.today().isoformat(), report.describe_machine(os.environ.get("JACOFLOW_SIMD", "best")), tables)
-        before = report.newest(options.out)
-        (record if before is None else before.updated(record)).keep(options.out)
+def on(options: report.Options, names: Iterable[str], contestants: list[Contestant]) -> list[Row]:
+    """The comparison on scenes; `quick`: one recording, one run."""
+    seeds, runs = (RECORDINGS[:1], 1) if options.quick else (options.recordings, options.runs)
+    return comparison(names, contestants, seeds, runs) if contestants else []
 
+
+MODES = (IMPROVED_MODE, PAPER_MODE)
+TABLES = {
+    "likelihoods": report.Table(
+        "Particle tracker, each factor of the likelihood left out",
+        lambda o: on(o, PAPER_SCENES, among(o, LIKELIHOODS, *rivals())),
+    ),
+    "readings": report.Table(
+        "Particle tracker, readings of the paper", lambda o: on(o, PAPER_SCENES, among(o, READINGS))
+    ),
+    "parts": report.Table(
+        "Particle tracker, parts of the improved mode", lambda o: on(o, HARD_SCENES, among(o, PARTS))
+    ),
+    "scenes": report.Table(
+        "Particle tracker, ten scenes",
+        lambda o: on(
+            o, scenes.target_scenes(), among(o, (*MODES, without("paper", PAPER, "foreground")), *rivals())
+        ),
+    ),
+    "speed": report.Table(
+        "Particle tracker, time of a frame of 720 x 480, two targets, two threads", lambda _: speed()
+    ),
+    "campus": report.Table(
+        f"Particle tracker, {particle_recordings.CAMPUS}",
+        lambda o: [] if o.data is None else campus(o.data, among(o, MODES), among(o, (), *rivals())),
+    ),
+    "recordings": report.Table(
+        "Particle tracker, other recordings",
+        lambda o: [] if o.data is None else single(o.data, among(o, MODES, *rivals())),
+    ),
+}
+ARGUMENTS = {
+    "--trackers": {"nargs": "+", "help": "parts of the names of the trackers to run"},
+    "--runs": {"type": int, "default": RUNS, "help": "runs of the particle tracker a recording"},
+    "--recordings": {"type": int, "nargs": "+", "default": RECORDINGS, "help": "seeds of the scenes"},
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

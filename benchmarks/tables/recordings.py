@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.rivals import flow as rivals
 from benchmarks.scenes import recordings as samples
 from benchmarks.scenes.recordings import Sample
@@ -129,3 +130,14 @@ def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
             row |= {name: error(*estimate), f"{name}_reach": reach, f"{name}_aim": reach / 2}
         rows.append(row)
     return rows[:1] + peers + rows[1:]
+
+
+TABLES = {
+    "flow": report.Table("Accuracy on recordings", lambda o: [] if o.data is None else table(o.data)),
+    "strain": report.Table(
+        "Strain from image correlation", lambda o: [] if o.data is None else strain(o.data)
+    ),
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

@@ -1,6 +1,6 @@
 """Graph segmentation beside scikit-image's and OpenCV's, on the same pictures: agreement and time.
 
-    python -m benchmarks.tables.segmentation [--rounds 10] [--data FOLDER]
+    python -m benchmarks.tables.segmentation [--data FOLDER]
 
 Agreement: number of regions, and adjusted Rand index of our labels against scikit-image's, at scale / min_size
 150 / 30 and 300 / 60, sigma 0.8. Without `--data` (or JACOFLOW_DATA) only pictures that come with scikit-image
@@ -10,8 +10,6 @@ process; given are CPU time of the busiest thread and the median of the time on 
 
 from __future__ import annotations
 
-import argparse
-import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -121,15 +119,10 @@ def times(data: Path | None, rounds: int) -> list[Row]:
     ]  # fmt: skip
 
 
-def main() -> None:
-    """Prints both tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=10, help="runs of each, taken in turns")
-    parser.add_argument("--data", type=Path, default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings and scenes")
-    options = parser.parse_args()
-    for rows in (agreement(options.data), times(options.data, options.rounds)):
-        print("\n".join(report.table_lines(rows)), end="\n\n")
-
+TABLES = {
+    "agreement": report.Table("Graph segmentation, agreement", lambda o: agreement(o.data)),
+    "times": report.Table("Graph segmentation, time", lambda o: times(o.data, report.rounds(o))),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

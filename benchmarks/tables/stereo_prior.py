@@ -8,7 +8,6 @@ Outliers are edge pixels more than 1 px off the best truth within 2 px. Times ar
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import numpy as np
@@ -16,9 +15,9 @@ from numpy.typing import NDArray
 
 import jacoflow
 from benchmarks import report
+from benchmarks.rivals.stereo import edge_pixels
 from benchmarks.scenes import stereo as stereo_scenes
 from benchmarks.scores.stereo import count, figures
-from benchmarks.tables.stereo import edge_pixels
 
 Row = dict[str, object]
 
@@ -59,11 +58,9 @@ def table() -> list[Row]:
     return [prior_row(scene, method, with_prior) for scene in scenes for method in ("classes", "sgm") for with_prior in (False, True)]
 
 
-def main() -> None:
-    """Prints the table."""
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    print("\n".join(report.table_lines(table())))
-
+TABLES = {
+    "prior": report.Table("Disparity of edge pixels, looked for near those of the step before", lambda _: table()),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES)

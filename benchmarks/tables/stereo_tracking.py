@@ -1,6 +1,6 @@
 """The stereo tracker on scenes with exact truth, both modes, beside what is asked of it.
 
-    python -m benchmarks.tables.stereo_tracking [--scenes crossing cart] [--modes improved paper] [--seeds 3] [--starts 8] [--disparity truth]
+    python -m benchmarks.tables.stereo_tracking [--only crossing cart] [--modes improved paper] [--trials 3]
 
 Purity is the share of edge pixels in clusters of their own majority label, recall the share of an object's edge pixels in clusters where it is the majority, path the steps over which the chain of strongest arcs stays on an object until
 it is hidden, index the same for its component, id for its track from the first step on; kept is the share of the steps at which it is visible with one and the same track (of a cluster at least half as large as its largest). Recognised are films in which
@@ -13,7 +13,6 @@ one start in six or so puts what is left into the wall. There each texture is fo
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import report
 from benchmarks.scenes import stereo as stereo_scenes
 from benchmarks.scores.stereo_tracking import (
     Clustering,
@@ -161,32 +161,19 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, starts: int, from_
 SCENES = {name: stereo_scenes.SCENES[name] for name in ("crossing", "curved", "cart", "passing", "pillar", "tiny", "small")}
 
 
-def sections(quick: bool) -> dict[str, list[Row]]:
-    """One table for each scene: both modes over three textures (`quick`: the smallest scene, one seed); and one of films by chance."""
-    names = ["small"] if quick else list(SCENES)
-    modes = {name: ("improved", "paper") if (name, "paper") in ASKED else ("improved",) for name in names}
-    tables = {f"Stereo tracking, {name}": [scored(SCENES[name](), mode, 1 if quick else 3, 1 if quick else STARTS[mode], False) for mode in modes[name]] for name in names}
-    from benchmarks.tables import stereo_tracking_chance
-
-    return tables | {"Stereo tracking, films by chance": stereo_tracking_chance.table(1 if quick else 20)}
+SEEDS = 3
+"""Textures of each scene."""
 
 
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
-    parser.add_argument("--modes", nargs="+", choices=("improved", "paper"), default=("improved", "paper"))
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--starts", type=int, help="of the mixture on each texture; default 8 (paper), 1 (improved)")
-    parser.add_argument("--disparity", choices=("matched", "truth"), default="matched", help="truth: with a little noise, for the tracker alone")
-    options = parser.parse_args()
-    for name in options.scenes:
-        for mode in options.modes:
-            row = scored(SCENES[name](), mode, options.seeds, options.starts or STARTS[mode], options.disparity == "truth")
-            print(f"\n{row.pop('scene')}, {row.pop('mode')}")
-            for what, value in row.items():
-                print(f"  {what:14} {value:.3f}" if isinstance(value, float) else f"  {what:14} {value}", flush=True)
+def table(name: str, options: report.Options) -> list[Row]:
+    """One row for each mode; the paper's only on the scenes of the specification. `quick`: one seed, one start."""
+    modes = [mode for mode in options.modes if mode == "improved" or (name, mode) in ASKED]
+    seeds = options.trials or (1 if options.quick else SEEDS)
+    return [scored(SCENES[name](), mode, seeds, 1 if options.quick else STARTS[mode], False) for mode in modes]
 
+
+TABLES = {name: report.Table(f"Stereo tracking, {name}", lambda o, name=name: table(name, o)) for name in SCENES}
+ARGUMENTS = {"--modes": {"nargs": "+", "choices": ("improved", "paper"), "default": ("improved", "paper")}}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

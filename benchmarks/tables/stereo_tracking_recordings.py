@@ -1,6 +1,6 @@
 """The stereo tracker on a recording: five pairs of KITTI 2012 from a driving car, with the known flow of one of them.
 
-    python -m benchmarks.tables.stereo_tracking_recordings --data FOLDER [--picture OUT.png]
+    python -m benchmarks.tables.stereo_tracking_recordings --data FOLDER [--picture FILE]
 
 Each edge pixel of pair 10 is told by its cluster's affine motion where it is in pair 11; where the true flow is known, that is compared: end point error, and outliers as KITTI counts them (off by more than 3 px and 5 %).
 A street seen from a driving car does not move as affine pieces parallel to the picture, as clusters do: this measures how far that goes. `best affine` is the median error that is left if each cluster's affine motion is fitted to the true flow of
@@ -10,7 +10,6 @@ Disparities are compared with the true ones.
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -164,16 +163,17 @@ def draw(data: Path, out: Path) -> None:
     figure.savefig(out, dpi=80)
 
 
-def main() -> None:
-    """Prints the table; draws the picture if asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, required=True, help="folder of recordings with truth")
-    parser.add_argument("--picture", type=Path, help="where a picture goes")
-    options = parser.parse_args()
-    print("\n".join(report.table_lines(rows(options.data))))
+def table(options: report.Options) -> report.Rows:
+    """The rows; draws the picture that `--picture` asks for."""
+    if options.data is None:
+        return []
     if options.picture is not None:
         draw(options.data, options.picture)
+    return rows(options.data)
 
+
+TABLES = {"recordings": report.Table("Stereo tracking, recordings", table)}
+ARGUMENTS = {"--picture": {"type": Path, "help": "file of a picture of the clusters"}}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

@@ -1,6 +1,6 @@
 """Trackers beside OpenCV's on scenes with exact truth and on recordings.
 
-    python -m benchmarks.tables.tracking [--quick] [--data FOLDER] [--trackers NAME ...] [--only TABLE ...]
+    python -m benchmarks.tables.tracking [--only TABLE ...] [--trackers NAME ...] [--quick]
 
 Every tracker gets the true box in the first frame (where a scene is not about a wrong one). A cell is the share of frames with intersection over union
 above 0.5 / the median error of the centre in px. "3x" ran on frames enlarged three times, the best case of OpenCV's trackers for so small a target.
@@ -8,26 +8,20 @@ above 0.5 / the median error of the centre in px. "3x" ran on frames enlarged th
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 
 from benchmarks import report
-from benchmarks.rivals.trackers import Tracker, everyone, ours
+from benchmarks.rivals.trackers import ARGUMENTS, Tracker, chosen, with_affine
 from benchmarks.scenes import tracking as scenes
 from benchmarks.scenes import tracking_hard as hard_scenes
 from benchmarks.scenes import tracking_large
-from benchmarks.scenes.tracking import Scene
-from benchmarks.scores.tracking import NEAR, Truth, scores
-from benchmarks.tables import tracking_further
-from benchmarks.tables import tracking_parts as tracking_flow
+from benchmarks.scenes.tracking import Scene, Truth
+from benchmarks.scores.tracking import NEAR, scores
 
 Row = dict[str, object]
 Figures = dict[str, float]
-NAMES = ("parts", "published", "noise", "contrast", "begin", "bars", "limits", "hard", "others win", "simulations", "sequences", "times", "large", "recordings")
-HARD_TITLE = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 BARS = {"success": ">= 1", "centre_error": "<= 0.10 (S3 0.20)", "displacement_error": "<= 0.08", "scale_error": "<= 0.06", "angle_error": "<= 5"}
 """Asked of `layered` on the published scenes."""
 LOCAL_BARS = {"sight_on3": ">= 1", "centre_error": "<= 1.6", "velocity_error": "<= 0.50"}
@@ -40,39 +34,6 @@ LAST = 10
 """Frames at the end that tell whether a target was followed to it."""
 KEPT = 0.9
 """Share of frames found from which on a target was not exchanged with its twin."""
-MEAN_ASKED = {"hard": ">= 0.97", "simulations": ">= 1"}
-"""Asked of the mean success of `layered`."""
-
-
-def sections(quick: bool, data: Path | None, trackers: list[Tracker] | None = None, names: Iterable[str] = NAMES) -> dict[str, list[Row]]:
-    """The tables by title; `quick` leaves out the 96 sequences, which only ours run through."""
-    chosen = everyone() if trackers is None else trackers
-    own = [tracker for tracker in chosen if tracker.name.startswith("jacoflow")]
-    makers: dict[str, tuple[str, Callable[[], list[Row]]]] = {
-        "parts": ("Tracking, parts of the gradient tracker", tracking_flow.table),
-        "published": ("Tracking, errors on scenes with published figures", lambda: published(chosen)),
-        "noise": ("Tracking, five other seeds of the noise, mean / worst", lambda: tracking_further.noise(own)),
-        "contrast": ("Tracking, share of frames found by contrast", lambda: tracking_further.contrast(own)),
-        "begin": ("Tracking, starts that are not exact (layered)", lambda: tracking_further.begin(own)),
-        "bars": ("Tracking, behind bars of other brightness, mean / worst", lambda: tracking_further.covered(own)),
-        "limits": ("Tracking, outlines and sizes at the limits, mean / worst", lambda: tracking_further.limits(with_affine(own))),
-        "hard": (HARD_TITLE, lambda: comparison(hard_scenes.hard(), chosen, MEAN_ASKED["hard"])),
-        "others win": ("Tracking, scenes in which others win", lambda: others_win(with_affine(chosen))),
-        "simulations": ("Tracking, Simulations 1 to 3", lambda: comparison(list(scenes.simulations()), chosen, MEAN_ASKED["simulations"])),
-        "sequences": ("Tracking, 96 sequences of Simulations 1 to 3", lambda: [] if quick else summary(list(scenes.sequences()), own)),
-        "times": ("Tracking, time of a frame", lambda: tracking_further.times(own)),
-        "large": ("Tracking, a large target", lambda: large(chosen)),
-        "recordings": ("Tracking, recordings", lambda: [] if data is None else recordings(data, chosen)),
-    }
-    made = {title: make() for name, (title, make) in makers.items() if name in names}
-    return {title: rows for title, rows in made.items() if rows}
-
-
-def with_affine(trackers: list[Tracker]) -> list[Tracker]:
-    """And `layered` with an affine model, where it is among them."""
-    if not any(tracker.name == "jacoflow layered" for tracker in trackers):
-        return trackers
-    return [*(Tracker(f"{each.name} affine", each.run) for each in ours(("layered",), model="affine")), *trackers]
 
 
 def run(scene: Scene, trackers: list[Tracker]) -> dict[str, Figures]:
@@ -159,36 +120,31 @@ def _means(figures: list[Figures]) -> Row:
     return {"followed": int(sum(each["followed"] for each in figures)), **means}
 
 
-def recordings(data: Path, trackers: list[Tracker]) -> list[Row]:
-    """Mean overlap, share of frames found and median error of the centre on recorded sequences."""
-    from benchmarks.scenes import tracking_recordings
-
-    if tracking_recordings.cv2 is None:
-        return [{"recording": "skipped: OpenCV, which reads the pictures, is missing"}]
-    rows: list[Row] = []
-    for each in tracking_recordings.read_all(data):
-        if isinstance(each, str):
-            rows.append({"recording": f"skipped {each}"})
-            continue
-        for tracker in trackers:
-            figures = scores(tracker.run(each.frames, each.start_box), each.truth)
-            kept = ("mean_overlap", "success", "centre_error", "milliseconds")
-            rows.append({"recording": each.name, "frames": len(each.frames), "tracker": tracker.name, **{name: figures[name] for name in kept}})
-    return rows
+def own(options: report.Options) -> list[Tracker]:
+    """Ours among the chosen ones."""
+    return [tracker for tracker in chosen(options) if tracker.name.startswith("jacoflow")]
 
 
-def main() -> None:
-    """Prints the tables asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="without the 96 sequences")
-    parser.add_argument("--data", type=Path, help="folder of recordings with truth")
-    parser.add_argument("--trackers", nargs="+", help="parts of the names of the trackers to run")
-    parser.add_argument("--only", choices=NAMES, nargs="+", default=NAMES, help="tables to print")
-    options = parser.parse_args()
-    chosen = [each for each in everyone() if options.trackers is None or any(part in each.name for part in options.trackers)]
-    for title, rows in sections(options.quick, options.data, chosen, options.only).items():
-        print(f"## {title}\n\n" + "\n".join(report.table_lines(rows)) + "\n")
-
+TABLES = {
+    "published": report.Table(
+        "Tracking, errors on scenes with published figures", lambda o: published(chosen(o))
+    ),
+    "hard": report.Table(
+        "Tracking, 28 hard scenes, share of frames found / median error of the centre in px",
+        lambda o: comparison(hard_scenes.hard(), chosen(o), ">= 0.97"),
+    ),
+    "others_win": report.Table(
+        "Tracking, scenes in which others win", lambda o: others_win(with_affine(chosen(o)))
+    ),
+    "simulations": report.Table(
+        "Tracking, Simulations 1 to 3", lambda o: comparison(list(scenes.simulations()), chosen(o), ">= 1")
+    ),
+    "sequences": report.Table(
+        "Tracking, 96 sequences of Simulations 1 to 3",
+        lambda o: [] if o.quick else summary(list(scenes.sequences()), own(o)),
+    ),
+    "large": report.Table("Tracking, a large target", lambda o: large(chosen(o))),
+}
 
 if __name__ == "__main__":
-    main()
+    report.main(__doc__, TABLES, ARGUMENTS)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from benchmarks import report
 from benchmarks.scenes.textures import Array, background
 
 Row = dict[str, object]
@@ -108,3 +109,9 @@ def accepted_flow(field: Any) -> Array:
 def inner_flow(field: Any) -> Array:
     """The accepted flow away from the frame's edges."""
     return accepted_flow(field)[MARGIN:-MARGIN, MARGIN:-MARGIN]
+
+
+TABLES = {"parts": report.Table("Tracking, parts of the gradient tracker", lambda _: table())}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)

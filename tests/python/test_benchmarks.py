@@ -120,11 +120,11 @@ def test_settings_are_called_with_their_options():
 def test_a_kept_table_takes_new_sections_and_keeps_the_others(tmp_path):
     one, other = {"processor": "A", "numpy": "2"}, {"processor": "B", "numpy": "2"}
     assert report.newest(tmp_path) is None
-    report.Record("2020-01-01", one, {"flow": [{"ms": 1.0}], "tracks": [{"ms": 2.0}], "motion": [{"ms": 3.0}]}).keep(tmp_path)
+    report.Record("2020-01-01", one, {"flow": [{"ms": 1.0}], "tracks": [{"ms": 2.0}], "motion": [{"ms": 3.0}]}).write(tmp_path)
     before = report.newest(tmp_path)
     assert before is not None
     updated = before.updated(report.Record("2020-01-02", other, {"tracks": [{"ms": 4.0}], "bars": [{"ms": 5.0}]}))
-    updated.keep(tmp_path)
+    updated.write(tmp_path)
     kept = report.newest(tmp_path)
     assert kept == updated and kept.date == "2020-01-02" and kept.machine == one
     assert list(kept.sections) == ["flow", "tracks", "bars", "motion"]

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.tables import motion3d_car
 from benchmarks.tables import motion3d_recordings as recordings
 
 DATA = Path(os.environ.get("JACOFLOW_DATA", "/nonexistent"))
@@ -13,7 +14,7 @@ DATA = Path(os.environ.get("JACOFLOW_DATA", "/nonexistent"))
 
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_a_drive_is_better_than_five_points_on_tracks():
-    rows = {str(row["method"]): row for row in recordings.drive(DATA)}
+    rows = {str(row["method"]): row for row in recordings.medians(DATA)}
     ours = rows["jacoflow, balanced flow"]
     assert ours["direction, deg"] < 0.6
     assert float(str(ours["pairs with measured truth"]).split(" / ")[1]) < 0.06
@@ -32,7 +33,7 @@ def test_halves_of_the_picture_differ_by_what_their_covariances_say():
 
 @pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
 def test_time_to_contact_agrees_with_the_laser():
-    rows = recordings.car(DATA)
+    rows = motion3d_car.car(DATA)
     trusted = [row for row in rows if row["status"] != "ill_conditioned"]
     assert len(trusted) >= 10
     off = np.array([row["off these frames, deviations"] for row in trusted], float)
@@ -44,7 +45,7 @@ def test_time_to_contact_agrees_with_the_laser():
 @pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
 def test_the_whole_scene_moves_straight_ahead_or_it_is_told():
     """A tank lorry overtakes on a quarter of the picture: together with the other side it would obey a sideways motion."""
-    for row in recordings.car(DATA):
+    for row in motion3d_car.car(DATA):
         straight = float(str(row["scene off straight ahead, deg"])) < 3
         assert straight or row["scene's status"] != "ok", row
         assert straight, row

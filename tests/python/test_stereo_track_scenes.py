@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes.stereo import Layer, Scene, cart, crossing, curved, passing, pillar, small, tiny, wall
+from benchmarks.scenes.stereo_chance import crossing_by_chance, labels, passing_by_chance
 from benchmarks.scores.stereo_tracking import gross
 from benchmarks.tables.stereo_tracking import follow
-from benchmarks.tables.stereo_tracking_chance import (
-    comings_back,
-    crossing_by_chance,
-    labels,
-    passing_by_chance,
-)
+from benchmarks.tables.stereo_tracking_chance import comings_back
 from benchmarks.tables.stereo_tracking_chance import scored as chance
 from jacoflow.track import StereoTracker
 

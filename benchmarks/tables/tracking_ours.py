@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.rivals.trackers import Tracker
+from benchmarks import report
+from benchmarks.rivals.trackers import Tracker, ours, with_affine
 from benchmarks.scenes import tracking as scenes
 from benchmarks.scenes import tracking_begin
 from benchmarks.scenes import tracking_hard as hard_scenes
@@ -16,13 +17,14 @@ from benchmarks.scenes.tracking import (
     TIMES,
     Plane,
     Scene,
+    Truth,
     circle,
     disc,
     figure,
     line,
     square,
 )
-from benchmarks.scores.tracking import Truth, scores
+from benchmarks.scores.tracking import scores
 
 Row = dict[str, object]
 NOISE_SEEDS = range(2, 7)
@@ -174,3 +176,19 @@ def _named(trackers: list[Tracker], *modes: str) -> list[Tracker]:
 
 def _scores(scene: Scene, tracker: Tracker) -> dict[str, float]:
     return scores(tracker.run(scene.frames(), scene.start_box), Truth.of(scene))
+
+
+TABLES = {
+    name: report.Table(f"Tracking, {title}", lambda _, rows=rows: rows(list(ours())))
+    for name, (title, rows) in {
+        "noise": ("five other seeds of the noise, mean / worst", noise),
+        "contrast": ("share of frames found by contrast", contrast),
+        "begin": ("starts that are not exact (layered)", begin),
+        "bars": ("behind bars of other brightness, mean / worst", covered),
+        "limits": ("outlines and sizes at the limits, mean / worst", lambda trackers: limits(with_affine(trackers))),
+        "times": ("time of a frame", times),
+    }.items()
+}
+
+if __name__ == "__main__":
+    report.main(__doc__, TABLES)
