@@ -1,11 +1,11 @@
 //! Small numerical parts that know nothing of images.
 
 pub(crate) mod dense;
-mod median;
 pub mod random;
 mod real;
 pub mod special;
+mod statistics;
 mod ziggurat;
 
-pub(crate) use median::{MAD_TO_STD, median};
 pub use real::Real;
+pub(crate) use statistics::{MAD_TO_STD, central_median, median, nearest_quantile, quantile, robust_std};

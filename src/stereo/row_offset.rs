@@ -12,6 +12,7 @@ use super::options::EdgeDisparityOptions;
 use super::semi_global::{Match, View};
 use crate::error::Result;
 use crate::image::{Border, GaussianSmoother, Interpolation};
+use crate::math::median;
 use crate::types::Frame;
 use rayon::prelude::*;
 
@@ -251,8 +252,7 @@ fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
     if residuals.len() < WINDOWS.0 {
         return None;
     }
-    let middle = residuals.len() / 2;
-    let scale = residuals.select_nth_unstable_by(middle, f64::total_cmp).1.max(MIN_RESIDUAL_SCALE);
+    let scale = median(&mut residuals)?.max(MIN_RESIDUAL_SCALE);
     // Summed in the order of the windows, independent of threads.
     let (mut moment, mut square) = (0.0, 0.0);
     for (window, misfit) in windows.iter().zip(&misfits) {

@@ -4,6 +4,7 @@ use super::data::{COUNT, DataOptions, DataTerm, ERROR, MOTION, Pool, VALID};
 use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::Space;
+use crate::math::median;
 use crate::simd::{Level, SimdReal};
 
 /// A motion must leave so many times less of the frames than the one that it replaces, what is usually left
@@ -31,7 +32,8 @@ impl<T: SimdReal> Comparison<'_, T> {
     /// explains the frames better; beside such sites both are blended. Whether there are such sites.
     pub fn take_better(&self, motion: &mut Planes<T>, other: &Planes<T>, apart: f64) -> bool {
         let (known, found) = (self.left(motion), self.left(other));
-        let usual = median(known.iter().copied().filter(|left| !left.is_nan()).collect());
+        let mut sorted: Vec<f64> = known.iter().copied().filter(|left| !left.is_nan()).collect();
+        let usual = median(&mut sorted).unwrap_or(0.0);
         let size = (motion.width, motion.height);
         let distance = |n: usize| {
             let [u, v] =
@@ -71,11 +73,6 @@ impl<T: SimdReal> Comparison<'_, T> {
         self.space.keep_small(data);
         left
     }
-}
-
-/// The upper median; nothing of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    crate::math::median(&mut values).unwrap_or(0.0)
 }
 
 /// The share of sites around one that win, by their nearness: half the weight along each axis is its own.
@@ -141,7 +138,5 @@ mod tests {
         let share = |x, y| share_around(&wins, (4, 3), (x, y));
         assert_eq!([share(1, 1), share(0, 1), share(2, 2), share(3, 1)], [0.25, 0.125, 0.0625, 0.0]);
         assert_eq!(share_around(&[true], (1, 1), (0, 0)), 1.0);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(Vec::new()), 0.0);
     }
 }

@@ -15,6 +15,7 @@ use super::levels::Compared;
 use super::locking::Locking;
 use super::memory::{Space, Workspace};
 use super::refine::{Evidence, Options, PITCH, refine};
+use crate::math::median;
 use crate::simd::SimdReal;
 
 /// Rounds of reweighing.
@@ -180,8 +181,7 @@ fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
         if rests.is_empty() || square <= f64::MIN_POSITIVE {
             return 0.0;
         }
-        let middle = rests.len() / 2;
-        usual = rests.select_nth_unstable_by(middle, f64::total_cmp).1.max(f64::MIN_POSITIVE);
+        usual = median(&mut rests).unwrap_or(0.0).max(f64::MIN_POSITIVE);
         share = (product / square).clamp(0.0, 1.0);
     }
     share

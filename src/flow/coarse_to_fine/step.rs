@@ -8,6 +8,7 @@ use super::grid::Planes;
 use super::levels::{Compared, PyramidLevel};
 use super::memory::Space;
 use super::resample::rederive;
+use crate::math::robust_std;
 use crate::simd::SimdReal;
 use std::ops::Range;
 
@@ -108,13 +109,9 @@ impl<T: SimdReal> Step<'_, T> {
 
     /// Robust standard deviation of residuals whose magnitudes these are.
     fn spread(&self, mut residuals: Vec<T>) -> Option<T> {
-        if residuals.is_empty() {
-            return None;
-        }
-        let middle = residuals.len() / 2;
-        residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
+        let spread = robust_std(&mut residuals)?;
         let least = (LEAST_SCALE * self.plan.range.contrast).max(f64::from(f32::MIN_POSITIVE));
-        Some(T::from_f64(1.4826 * residuals[middle].to_f64() + least))
+        Some(T::from_f64(spread + least))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::sharing::{in_common, sharing_among};
 use super::{Quantity, value_and_std};
 use crate::error::{Error, Result};
-use crate::math::Real;
+use crate::math::{MAD_TO_STD, Real, central_median};
 use crate::types::{FlowField, Rect, SamplingGrid};
 
 /// How the sites of a region are combined into one number.
@@ -167,19 +167,12 @@ fn weighted(sites: &[(f64, Option<f64>)], sharing: f64) -> Mean {
 
 fn median_of(mut values: Vec<f64>, sharing: f64) -> Mean {
     let count = values.len();
-    if count == 0 {
+    let Some(value) = central_median(&mut values) else {
         return Mean { value: f64::NAN, std: f64::NAN, count };
-    }
-    let value = median(&mut values);
+    };
     let mut deviations: Vec<f64> = values.iter().map(|v| (v - value).abs()).collect();
-    let spread = 1.4826 * median(&mut deviations);
+    let spread = MAD_TO_STD * central_median(&mut deviations).unwrap_or(f64::NAN);
     Mean { value, std: 1.2533 * spread * (sharing / count as f64).sqrt(), count }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
 #[cfg(test)]

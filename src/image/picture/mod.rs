@@ -27,6 +27,7 @@ pub use quiver::{Arrow, Quiver, arrows_on_grid};
 pub use wheel::{FlowColours, wheel_legend};
 
 use crate::error::{Error, Result};
+use crate::math::nearest_quantile;
 
 /// An RGB colour.
 pub type Rgb = [u8; 3];
@@ -104,11 +105,7 @@ fn check_plane<T>(name: &'static str, plane: &[T], width: usize, height: usize) 
 /// The `percentile` (0 to 100) of the finite values that `values` yields; 0 when there are none.
 fn percentile(values: impl Iterator<Item = f64>, percentile: f64) -> f64 {
     let mut finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    if finite.is_empty() {
-        return 0.0;
-    }
-    let rank = (percentile.clamp(0.0, 100.0) / 100.0 * (finite.len() - 1) as f64).round() as usize;
-    *finite.select_nth_unstable_by(rank, f64::total_cmp).1
+    nearest_quantile(&mut finite, percentile.clamp(0.0, 100.0) / 100.0).unwrap_or(0.0)
 }
 
 #[cfg(test)]

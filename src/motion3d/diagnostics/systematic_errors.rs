@@ -17,9 +17,10 @@ use super::correlated_noise::{Weighted, slopes};
 use super::rotation_prior::Known;
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::math::{median, quantile};
 use crate::motion3d::kernels::information;
 use crate::motion3d::model::motion::{Motion, Projection};
-use crate::motion3d::model::observations::{Observations, median, quantile};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::covariance::{Matrix5, inverse};
 use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2, Vector3};
@@ -109,10 +110,10 @@ impl CommonErrors {
                 variances.push(0.5 * covariance.trace());
             }
         }
-        let square = quantile(&mut squares, 1.0 - BEST);
+        let square = quantile(&mut squares, 1.0 - BEST).unwrap_or(0.0);
         // An error has two components. Flow that may be twice as long or none has no scale.
         let scale = if square > 0.0 { (2.0 / square).sqrt().min(1.0) } else { 1.0 };
-        Self { scale, offset: SHARE * median(&mut variances).sqrt() }
+        Self { scale, offset: SHARE * median(&mut variances).unwrap_or(0.0).sqrt() }
     }
 
     /// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not

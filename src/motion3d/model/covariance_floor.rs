@@ -5,7 +5,7 @@
 //! end of the most precise quarter of all points, no measurement is so much better than the others: the point
 //! counts as one of that quarter. A quarter of the points that are better together are believed.
 
-use super::observations::quantile;
+use crate::math::quantile;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen};
 
 /// The share of a usual variance below which one is no measurement's.
@@ -24,7 +24,7 @@ impl Belief {
     /// From the covariances of all points; those that are not finite do not count.
     pub fn new(covariances: impl Iterator<Item = Matrix2<f64>>) -> Self {
         let mut least: Vec<f64> = covariances.map(|given| smallest(&given)).filter(|v| v.is_finite()).collect();
-        Self { usual: quantile(&mut least, PRECISE) }
+        Self { usual: quantile(&mut least, PRECISE).unwrap_or(0.0) }
     }
 
     /// The covariance that a point counts with.
@@ -46,7 +46,7 @@ pub(crate) fn believed(covariances: &[f64], size: usize) -> Vec<f64> {
     let diagonal = |i: usize| {
         let mut own: Vec<f64> = covariances.iter().skip(i * (size + 1)).step_by(size * size).copied().collect();
         own.retain(|value| value.is_finite());
-        quantile(&mut own, PRECISE)
+        quantile(&mut own, PRECISE).unwrap_or(0.0)
     };
     let usual = DVector::from_fn(size, |i, _| diagonal(i));
     let one = |given: &[f64]| {

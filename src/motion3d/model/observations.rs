@@ -2,6 +2,7 @@
 
 use super::derotation::HalfTurn;
 use super::motion::Rows;
+use crate::math::{median, quantile};
 use crate::motion3d::diagnostics::rotation_prior::Known;
 use crate::motion3d::kernels::PLANES;
 use crate::simd::Level;
@@ -194,7 +195,7 @@ impl Observations {
     pub fn longest(&self) -> f64 {
         let few = (0..self.n).step_by(self.n.div_ceil(ENOUGH).max(1));
         let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
-        quantile(&mut stretches, FAR_FROM_ROUND)
+        quantile(&mut stretches, FAR_FROM_ROUND).unwrap_or(0.0)
     }
 
     /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
@@ -266,7 +267,7 @@ impl Observations {
     /// The median of `|f|`, in units of noise.
     pub fn median_flow(&self) -> f64 {
         let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
-        median(&mut lengths)
+        median(&mut lengths).unwrap_or(0.0)
     }
 }
 
@@ -277,18 +278,4 @@ fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let second = (covariance[(1, 1)] - below * below).sqrt();
     let positive = first > 0.0 && second > 0.0;
     positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
-}
-
-/// The median (the upper one of two), 0 of nothing; reorders the values.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    quantile(values, 0.5)
-}
-
-/// The value at a share of the sorted values, 0 of nothing; reorders the values.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let place = ((values.len() as f64 * share) as usize).min(values.len() - 1);
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }

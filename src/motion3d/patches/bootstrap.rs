@@ -7,10 +7,10 @@
 
 use super::shrinkage::shrunk;
 use super::system::System;
+use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::model::motion::{Motion, tangents};
-use crate::motion3d::model::observations::quantile;
 use crate::motion3d::solver::covariance::{Matrix5, inverse, plugged_in};
 use nalgebra::{SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub(crate) fn wider(
     }
     let repeated = |i: u64| distance(&again(system, motion, surfaces, rng.stream(i)), motion, weighted);
     let mut distances: Vec<f64> = (0..REPETITIONS).into_par_iter().map(repeated).collect();
-    (quantile(&mut distances, SHARE) / PLAUSIBLE).max(1.0)
+    (quantile(&mut distances, SHARE).unwrap_or(0.0) / PLAUSIBLE).max(1.0)
 }
 
 /// The same patches with new noise.

@@ -9,9 +9,10 @@
 use super::moving_objects::more_than_usual;
 use super::outlier_posterior::{BAND, Bin, DOUBLING, Strays};
 use super::{Consensus, INLIER};
+use crate::math::{median, quantile};
 use crate::motion3d::kernels::{Depths, depths};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Observations, median, quantile};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::Tree;
 use crate::motion3d::solver::refine::MANY;
 use rayon::prelude::*;
@@ -130,8 +131,8 @@ fn deviations(near: &[u32], differences: &[f64], obeys: &[bool], seen: &Depths) 
     let obeying = || near.iter().zip(differences).filter(|(k, _)| obeys[**k as usize] && known(**k));
     let mut sizes: Vec<f64> = obeying().map(|(_, difference)| difference.abs()).collect();
     let mut variances: Vec<f64> = obeying().map(|(&k, _)| 1.0 / seen.s2[k as usize]).collect();
-    let tau = quantile(&mut sizes, SHARE) / SHARE_DEVIATION;
-    let scene = (tau * tau - median(&mut variances)).max(0.0);
+    let tau = quantile(&mut sizes, SHARE).unwrap_or(0.0) / SHARE_DEVIATION;
+    let scene = (tau * tau - median(&mut variances).unwrap_or(0.0)).max(0.0);
     let unit = |k: u32| (scene + 1.0 / seen.s2[k as usize]).sqrt().max(tau);
     let deviation = |(&k, difference): (&u32, &f64)| if known(k) { difference / unit(k) } else { 0.0 };
     (near.iter().zip(differences).map(deviation).collect(), scene)
@@ -153,7 +154,7 @@ fn from_nearest(observations: &Observations, near: &[u32], obeys: &[bool], seen:
         around.extend(inliers.map(|other| seen.nu[other]));
         differences[tree.order()[place] as usize] = {
             let rejected = 1.0 - around.len() as f64 / NEAREST as f64;
-            (seen.nu[point(place as u32)] - median(&mut around), rejected)
+            (seen.nu[point(place as u32)] - median(&mut around).unwrap_or(0.0), rejected)
         };
     }
     differences
@@ -169,7 +170,7 @@ fn within_cells(tree: &Tree, cells: &[Range<usize>], near: &[u32], obeys: &[bool
                 depths.clear();
                 let members = tree.order()[cell.clone()].iter().map(|&k| k as usize);
                 depths.extend(members.filter(|&k| obeys[k]).map(|k| seen.nu[k]));
-                (median(&mut depths), 1.0 - depths.len() as f64 / cell.len() as f64)
+                (median(&mut depths).unwrap_or(0.0), 1.0 - depths.len() as f64 / cell.len() as f64)
             };
             cells.iter().map(middle).collect()
         })

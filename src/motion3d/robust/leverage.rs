@@ -2,9 +2,10 @@
 //! the ones that decide.
 
 use super::INLIER;
+use crate::math::median;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Observations, median};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::MotionEstimate;
 use crate::motion3d::solver::covariance::{Matrix5, inverse};
 use nalgebra::{Matrix2x3, SMatrix, Vector3};
@@ -43,7 +44,7 @@ fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) ->
     let seen = depths(observations, motion);
     let mut sizes: Vec<f64> =
         (0..observations.n).filter(|&k| !obeys(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
-    INLIER / (2.0 * median(&mut sizes).max(INLIER))
+    INLIER / (2.0 * median(&mut sizes).unwrap_or(0.0).max(INLIER))
 }
 
 /// The number that a Poisson variable of this mean exceeds in no more than 5 % of all cases.

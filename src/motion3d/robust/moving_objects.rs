@@ -2,9 +2,10 @@
 //! towards theirs.
 
 use super::{Consensus, LEAST, MANY, Rival, obeying};
+use crate::math::median;
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::{Motion, tangents};
-use crate::motion3d::model::observations::{Observations, median};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::covariance::{direction_block, inverse};
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::{Effort, refine};
@@ -105,7 +106,7 @@ pub(crate) fn inner(observations: &Observations, found: &Consensus) -> Option<In
 
 /// From which share of rejected neighbours on there are more than is usual among these; reorders them.
 pub(crate) fn more_than_usual(shares: &mut [f64]) -> f64 {
-    let usual = median(shares);
+    let usual = median(shares).unwrap_or(0.0);
     let deviation = (usual.max(1.0 / NEAREST as f64) * (1.0 - usual) / NEAREST as f64).sqrt();
     usual + MORE * deviation
 }

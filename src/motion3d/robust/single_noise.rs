@@ -2,9 +2,10 @@
 //! explanation as one of the points that happen to agree.
 
 use super::{Consensus, UNKNOWNS};
+use crate::math::median;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
-use crate::motion3d::model::observations::{Observations, median};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::likelihood::minima;
 
 /// The noise of all points if all obey one motion.
@@ -23,7 +24,7 @@ const TAILS: f64 = 1.5;
 pub(crate) fn one_noise(residuals: &[f64]) -> bool {
     let mut squares: Vec<f64> = residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).collect();
     let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-    mean <= TAILS * median(&mut squares) / std::f64::consts::LN_2
+    mean <= TAILS * median(&mut squares).unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
 /// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present

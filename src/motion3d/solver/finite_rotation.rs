@@ -8,12 +8,13 @@
 use super::likelihood::{close, different};
 use super::refine::{Effort, Minimum, refine};
 use super::starts::at_most;
+use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::correlated_noise::slopes;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::derotation::HalfTurn;
 use crate::motion3d::model::motion::{Motion, tangents};
-use crate::motion3d::model::observations::{Observations, quantile};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::whitening::Intake;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
@@ -268,7 +269,7 @@ fn likeliest(points: &Observations, rng: CounterRng) -> Option<Vector3<f64>> {
 /// The squared residual that decides between rotations: that of a point at the end of the nearest [`SHARE`].
 fn deciding(points: &Observations, w: &Vector3<f64>) -> f64 {
     let mut squares: Vec<f64> = (0..points.n).map(|k| left(points, k, w)).collect();
-    quantile(&mut squares, SHARE)
+    quantile(&mut squares, SHARE).unwrap_or(0.0)
 }
 
 fn left(points: &Observations, k: usize, w: &Vector3<f64>) -> f64 {

@@ -8,11 +8,12 @@
 use super::detect::detect_moving_target;
 use super::extent::{Ends, Extent, ends};
 use super::gauss_markov::{GaussMarkovFilter, Measurement};
-use super::local_flow::{LocalFlow, MAD, MeanFlow, median};
+use super::local_flow::{LocalFlow, MeanFlow, median};
 use super::options::{Control, GradientOptions};
 use super::rules::Rules;
 use super::window::{side, whole_pixels};
 use crate::image::Interpolation;
+use crate::math::MAD_TO_STD;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
 /// Pixels around the window that masks need.
@@ -290,7 +291,7 @@ impl LocalLoop {
     /// Three deviations of the accepted flow outside the target.
     fn automatic_eps(&self, flow: &LocalFlow) -> f64 {
         let mut sizes: Vec<f64> = self.around(flow).flat_map(|w| w.map(f64::abs)).collect();
-        (3.0 * MAD * median(&mut sizes)).max(LEAST_EPS)
+        (3.0 * MAD_TO_STD * median(&mut sizes)).max(LEAST_EPS)
     }
 
     /// Whether most of what is around the target moves, and is a good part of all that does: the camera

@@ -4,11 +4,10 @@
 use super::equations::Equations;
 use super::kernels::kernels_of;
 use crate::image::Interpolation;
+use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 
-/// Factor from the median of absolute deviations to a standard deviation, for Gaussian noise.
-pub(super) const MAD: f64 = 1.4826;
 /// Weakest gradient that counts, over the noise.
 const OVER_NOISE: f64 = 0.7;
 
@@ -64,7 +63,7 @@ pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>) -> f64 {
     let every = (first.data().len() / NOISE_SAMPLES).max(1) | 1;
     let pairs = first.data().iter().zip(second.data()).step_by(every);
     let mut differences: Vec<f64> = pairs.map(|(a, b)| (b - a).abs()).filter(|d| d.is_finite()).collect();
-    MAD * median(&mut differences) / std::f64::consts::SQRT_2
+    robust_std(&mut differences).unwrap_or(0.0) / std::f64::consts::SQRT_2
 }
 
 /// The middle value (the upper one of two); 0 of nothing.

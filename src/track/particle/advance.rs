@@ -11,6 +11,7 @@ use super::noise::{Noise, colour_gain};
 use super::prediction::FrameContext;
 use super::recovery::{Recovery, recover};
 use super::target::Target;
+use crate::math::quantile;
 use crate::math::random::CounterRng;
 
 /// Quantile of the similarity over the particles that stands for the target.
@@ -50,13 +51,13 @@ impl Target {
             self.estimate = mean;
             place = found.place;
         }
-        let similarities = self.similarities(context);
+        let mut similarities = self.similarities(context);
         let logs = self.log_likelihoods(own, context, place, &similarities);
         self.degenerate = !self.cloud.weigh(&logs);
         self.effective_sample_size = self.cloud.effective_sample_size();
         self.estimate = self.cloud.mean();
         self.is_new = false;
-        self.similarity = quantile(similarities, SIMILARITY_QUANTILE).unwrap_or(self.similarity);
+        self.similarity = quantile(&mut similarities, SIMILARITY_QUANTILE).unwrap_or(self.similarity);
     }
 
     /// Half of the particles take the motion of a track in the box, drawn by the probability of foreground.
@@ -142,10 +143,4 @@ impl Target {
         }
         .log_likelihoods(particles)
     }
-}
-
-/// The value that this share of some values does not exceed.
-fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    let at = (share * values.len() as f64) as usize;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }

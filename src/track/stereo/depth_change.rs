@@ -1,6 +1,6 @@
 //! Motion in depth at edge pixels: the disparity at the moved pixels less that at the pixels themselves.
 
-use crate::math::{MAD_TO_STD, median};
+use crate::math::{median, robust_std};
 use crate::types::Frame;
 
 /// Largest distance of the nearest edge pixel, px.
@@ -38,7 +38,7 @@ pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
     }
     let mut mean = median(values)?;
     let mut sizes: Vec<f64> = values.iter().map(|value| (value - mean).abs()).collect();
-    let deviation = (MAD_TO_STD * median(&mut sizes)?).max(MIN_DISPARITY_STD);
+    let deviation = robust_std(&mut sizes)?.max(MIN_DISPARITY_STD);
     for _ in 0..ROUNDS {
         let (mut sum, mut weights) = (0.0, 0.0);
         for value in &*values {

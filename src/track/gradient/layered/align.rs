@@ -4,7 +4,7 @@ use super::front::Front;
 use super::layers::{Background, Target};
 use super::level::{Level, STEP_MAX, Vote};
 use super::pose::{Increment, Pose};
-use crate::track::gradient::local_flow::{MAD, median};
+use crate::math::robust_std;
 use crate::types::Frame;
 use nalgebra::{SMatrix, SVector};
 
@@ -110,7 +110,7 @@ pub(super) struct Aligned {
 /// The residual's deviation, robustly.
 fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
     let mut sizes: Vec<f64> = votes.iter().map(|vote| vote.residual.abs()).collect();
-    (MAD * median(&mut sizes)).max(noise).max(LEAST_SHARE * range)
+    robust_std(&mut sizes).unwrap_or(0.0).max(noise).max(LEAST_SHARE * range)
 }
 
 /// Weighted normal equations `J'WJ` and `J'Wr`; outliers count little (S. Geman and D. McClure).

@@ -4,8 +4,9 @@ use super::layers::{Background, grown, holds, is_inside};
 use super::nearby::nearby;
 use super::patch::smooth;
 use crate::image::{Interpolation, cubic_at};
+use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
-use crate::track::gradient::local_flow::{MAD, median, shifted_into};
+use crate::track::gradient::local_flow::{median, shifted_into};
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -112,7 +113,7 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
     let mut changes: Vec<f64> = spread(previous.size(), hidden, SCATTER_SAMPLES).filter_map(change).collect();
     let middle = median(&mut changes);
     let mut off: Vec<f64> = changes.iter().map(|change| (change - middle).abs()).collect();
-    MAD * median(&mut off)
+    robust_std(&mut off).unwrap_or(0.0)
 }
 
 /// Means over squares of `factor` px, then a Gaussian.

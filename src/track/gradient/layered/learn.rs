@@ -5,8 +5,8 @@ use super::level::dilated;
 use super::look::View;
 use super::patch::smooth_known;
 use super::slanted::Slanted;
+use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
-use crate::track::gradient::local_flow::{MAD, median};
 use crate::types::Frame;
 
 /// Memory of the support.
@@ -156,6 +156,6 @@ pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Fra
     let every = (frame.data().len() / SAMPLES).max(1) | 1;
     let pairs = frame.data().iter().zip(previous.data()).step_by(every);
     let mut off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
-    let now = MAD * median(&mut off) / std::f64::consts::SQRT_2;
+    let now = robust_std(&mut off).unwrap_or(0.0) / std::f64::consts::SQRT_2;
     noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(LEAST_NOISE)
 }

@@ -6,7 +6,8 @@ use super::find::{DOUBT, Finding};
 use super::layers::grown;
 use super::light::Light;
 use super::{Layered, SURE, learn};
-use crate::track::gradient::local_flow::{MAD, median};
+use crate::math::robust_std;
+use crate::track::gradient::local_flow::median;
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
@@ -125,5 +126,5 @@ fn contrast(frame: &Frame<f64>, target: TargetBox) -> f64 {
     for value in &mut off {
         *value = (*value - middle).abs();
     }
-    MAD * median(&mut off)
+    robust_std(&mut off).unwrap_or(0.0)
 }

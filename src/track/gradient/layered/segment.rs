@@ -2,7 +2,7 @@
 
 use super::outset::Changes;
 use super::patch::smooth_known;
-use crate::track::gradient::local_flow::{MAD, median};
+use crate::math::robust_std;
 use crate::types::Frame;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -160,7 +160,7 @@ impl TargetLook {
         }
         let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
         let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
-        let scatter = MAD * median(&mut off);
+        let scatter = robust_std(&mut off).unwrap_or(0.0);
         (moving.len() >= FEWEST).then(|| Self {
             mean,
             scatter: scatter.max(changes.bar / 4.0),

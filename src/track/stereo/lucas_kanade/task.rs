@@ -2,7 +2,7 @@
 
 use super::super::cluster_motion::{PlaneMotion, middle};
 use super::{FINE, MAX_RESIDUAL, MAX_VOTERS, MIN_AFFINE_PIXELS, MIN_NOISE_STD, MIN_STEP, PRIOR_STD, SmoothedLevels};
-use crate::math::MAD_TO_STD;
+use crate::math::robust_std;
 use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
 
@@ -179,9 +179,7 @@ impl<'a> Task<'a> {
         if sizes.len() < 3 || 2 * sizes.len() < voters.len() {
             return None;
         }
-        let middle = sizes.len() / 2;
-        let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
-        Some((MAD_TO_STD * f64::from(median)).max(MIN_NOISE_STD))
+        Some(robust_std(&mut sizes)?.max(MIN_NOISE_STD))
     }
 
     /// Weighted normal equations of a step, weights `1 / (1 + (e / 2 s)^2)^2`.
