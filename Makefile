@@ -8,7 +8,7 @@ CI := --profile ci
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare ablation clean
+.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
 
 test: format clippy features rustdoc rust-test guide pytest stubtest typing examples
 	@echo "everything passed"
@@ -74,6 +74,11 @@ compare: CI := --release
 compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 	$(BIN)/python -m benchmarks.compare $(if $(DATA),--data $(DATA))
+
+# README's tables out of the newest file in benchmarks/results; the tests check that they are.
+readme: $(BIN)/maturin
+	$(BIN)/python -m pip install -q numpy
+	$(BIN)/python -m benchmarks.readme
 
 # What each heuristic buys: a build with the feature `ablation` in a virtual environment of its own.
 # ARGUMENTS are those of `python -m benchmarks.ablation`.

@@ -147,7 +147,7 @@ class Record:
         """Writes `<date>.json` with every row, and `<date>.md` with the short tables."""
         folder.mkdir(parents=True, exist_ok=True)
         record = {"date": self.date, "machine": self.machine, "sections": self.sections, "elsewhere": self.elsewhere}
-        for ending, text in (("md", self.markdown()), ("json", json.dumps(record, indent=1) + "\n")):
+        for ending, text in (("md", self.markdown()), ("json", one_row_a_line(record))):
             temporary = folder / f".{self.date}.{ending}"
             temporary.write_text(text, encoding="utf-8")
             temporary.replace(folder / f"{self.date}.{ending}")
@@ -170,6 +170,16 @@ class Record:
         if left_out:
             parts += [f"## In {self.date}.json only", "", *left_out, ""]
         return "\n".join(parts)
+
+
+def one_row_a_line(record: dict[str, Any]) -> str:
+    """JSON with one line for each row of a table, so that differences between files can be read."""
+    titles = []
+    for title, rows in record["sections"].items():
+        body = ",\n".join("   " + json.dumps(row) for row in rows)
+        titles.append(f"  {json.dumps(title)}: [\n{body}\n  ]")
+    others = [f' {json.dumps(key)}: {json.dumps(value)}' for key, value in record.items() if key != "sections"]
+    return "{\n" + ",\n".join([*others, ' "sections": {\n' + ",\n".join(titles) + "\n }"]) + "\n}\n"
 
 
 def newest(folder: Path = RESULTS) -> Record | None:

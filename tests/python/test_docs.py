@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 import jacoflow
+from benchmarks import readme, report
 from jacoflow import _jacoflow
 
+ROOT = Path(__file__).parents[2]
 PACKAGE = Path(jacoflow.__file__).parent
 MODULES = ["jacoflow", *(f"jacoflow.{module.name}" for module in pkgutil.iter_modules([str(PACKAGE)]))]
 SHAPES_OR_UNITS = re.compile(r"\((\.\.\.|H|N|T|B|n|m|2 n|6|12|count)\b|\(\.\.\.,|/frame|/s\b|\bpx\b|\bunits?\b|grey level|rad\b|frames", re.IGNORECASE)
@@ -79,13 +81,24 @@ def test_examples_in_docstrings_run(name):
 @pytest.mark.parametrize("name", ["README.md"])
 def test_python_in_the_readme_runs(name, tmp_path, monkeypatch):
     """Every ```python block of the README, one after another in one namespace."""
-    path = Path(__file__).parents[2] / name
+    path = ROOT / name
     blocks = re.findall(r"^```python\n(.*?)^```", path.read_text(), re.DOTALL | re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     namespace: dict[str, object] = {}
     for block in blocks:
         if "# not run" not in block:
             exec(compile(block, str(path), "exec"), namespace)
+
+
+def test_tables_of_the_readme_are_those_of_the_kept_results():
+    record = report.newest()
+    assert record is not None
+    text = (ROOT / "README.md").read_text()
+    assert text == readme.written(text, record), "make readme"
+    # Every table is in the README, and the text file of the results is short.
+    assert set(re.findall(r"<!-- table: (\w+) -->", text)) == set(readme.TABLES)
+    summary = report.RESULTS / f"{record.date}.md"
+    assert summary.read_text() == record.markdown() and len(summary.read_text().splitlines()) <= report.SUMMARY_LINES
 
 
 def test_defaults_are_the_cores(tmp_path):
