@@ -2,10 +2,10 @@
 
     python -m benchmarks.compare [--quick] [--only SECTION ...] [--data FOLDER] [--out FOLDER] [--simd avx2]
 
-Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so. `--data`
-(or JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables are left out. All sections
-together make a new dated file in `benchmarks/results`. With `--only` the tables are printed; `--out FOLDER` writes
-them into the newest file there, beside the tables that it has.
+Needs jacoflow and, for the other side, `pip install "jacoflow[bench]"`; rows whose rival is missing say so.
+`--data` (or JACOFLOW_DATA) is a folder of recordings with known truth; without it their tables are left out.
+All sections together make a new dated file in `benchmarks/results`. With `--only` the tables are printed;
+`--out FOLDER` writes them into the newest file there, beside the tables that it has.
 """
 
 from __future__ import annotations
@@ -31,11 +31,21 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "motion3d": tuple(
         f"motion3d_{part}"
         for part in (
-            "fixed", "published", "six", "claims", "honesty", "coverage", "layouts", "fields", "speed",
-            "recordings", "drive", "car",
+            "fixed",
+            "published",
+            "six",
+            "claims",
+            "honesty",
+            "coverage",
+            "layouts",
+            "fields",
+            "speed",
+            "recordings",
+            "drive",
+            "car",
         )
     ),
-}  # fmt: skip
+}
 """Section -> modules of `benchmarks.tables`, whose `TABLES` it has."""
 
 

@@ -4,8 +4,9 @@
     python benchmarks/fingerprint.py --write benchmarks/fingerprint.json
     python benchmarks/fingerprint.py --compare benchmarks/fingerprint.json   # fails where a hash differs
 
-Computed without vector instructions (`JACOFLOW_SIMD=scalar`), so that the hashes do not depend on the processor.
-They may depend on the C library, whose elementary functions round differently from version to version.
+Computed without vector instructions (`JACOFLOW_SIMD=scalar`), so that the hashes do not depend on the
+processor. They may depend on the C library, whose elementary functions round differently from version to
+version.
 """
 
 from __future__ import annotations
@@ -48,7 +49,12 @@ def digest(values: list[Any]) -> str:
 def texture(height: int, width: int, seed: int) -> np.ndarray:
     """Blurred random cells, grey levels 0 to 255."""
     rng = np.random.default_rng(seed)
-    cells = rng.integers(30, 220, (height // 4 + 1, width // 4 + 1)).repeat(4, 0).repeat(4, 1)[:height, :width].astype(float)
+    cells = (
+        rng.integers(30, 220, (height // 4 + 1, width // 4 + 1))
+        .repeat(4, 0)
+        .repeat(4, 1)[:height, :width]
+        .astype(float)
+    )
     for axis in (0, 1):
         cells = (np.roll(cells, 1, axis) + 2 * cells + np.roll(cells, -1, axis)) / 4
     return cells
@@ -64,13 +70,19 @@ def fields() -> Named:
     shifted = np.stack([np.roll(texture(120, 140, 1), 5 * k, 1) for k in range(3)]).astype(np.uint8)
     for preset in ("fast", "balanced", "accurate"):
         yield f"field {preset} vortex", field_parts(jacoflow.estimate(vortex[:3], preset=preset, threads=1))
-        yield f"field {preset} shifted pair", field_parts(jacoflow.estimate(list(shifted[:2]), preset=preset, threads=1))
+        yield (
+            f"field {preset} shifted pair",
+            field_parts(jacoflow.estimate(list(shifted[:2]), preset=preset, threads=1)),
+        )
     yield "field balanced float64", field_parts(jacoflow.estimate(disc.astype(float), threads=1))
     for method in ("windowed", "instantaneous", "lucas_kanade", "horn_schunck"):
         yield f"field {method}", field_parts(jacoflow.estimate(vortex[:3], method=method, threads=1))
     yield "field recursive", field_parts(jacoflow.estimate(vortex, temporal="recursive", threads=1))
     field = jacoflow.estimate(disc, fps=25.0, threads=1)[0]
-    yield "derived", [field.value(name) for name in jacoflow.quantities()] + [field.std("curl"), field.std("divergence")]
+    yield (
+        "derived",
+        [field.value(name) for name in jacoflow.quantities()] + [field.std("curl"), field.std("divergence")],
+    )
     for profile in ("patent", "measured"):
         filtered = jacoflow.FlowFilter(profile=profile, threads=1)
         for frame in disc:
@@ -100,7 +112,8 @@ def tracks() -> Named:
 
 
 def stereo_views(count: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Left and right views, 120 x 160: a wall at disparity 4 and a box at disparity 10 that goes 3 px right a step."""
+    """Left and right views, 120 x 160: a wall at disparity 4 and a box at disparity 10 that goes 3 px
+    right a step."""
     rng = np.random.default_rng(7)
     wall, box = texture(120, 200, 3), texture(50, 40, 4)
     for t in range(count):
@@ -147,7 +160,10 @@ def motions() -> Named:
             found = jacoflow.motion3d.estimate_motion(points, flow, CAMERA, method=method, threads=1)
             yield f"motion {method} {seed}", motion_parts(found)
         points, flow = scene(seed, 0.3)
-        yield f"motion robust {seed}", motion_parts(jacoflow.motion3d.estimate_motion(points, flow, CAMERA, robust=True, threads=1))
+        yield (
+            f"motion robust {seed}",
+            motion_parts(jacoflow.motion3d.estimate_motion(points, flow, CAMERA, robust=True, threads=1)),
+        )
 
 
 def mixtures() -> Named:
@@ -171,10 +187,14 @@ GROUPS: dict[str, Callable[[], Named]] = {
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--only", nargs="+", choices=list(GROUPS), default=list(GROUPS))
     parser.add_argument("--write", type=Path, help="JSON file for the hashes")
-    parser.add_argument("--compare", type=Path, help="JSON file of earlier hashes; exit status 1 where one differs")
+    parser.add_argument(
+        "--compare", type=Path, help="JSON file of earlier hashes; exit status 1 where one differs"
+    )
     arguments = parser.parse_args()
     found = {}
     for group in arguments.only:
@@ -186,7 +206,11 @@ def main() -> int:
     if arguments.compare:
         before = json.loads(arguments.compare.read_text())
         different = [name for name, value in found.items() if before.get(name) != value]
-        print(f"{len(found) - len(different)} of {len(found)} as before", *(f"differs: {name}" for name in different), sep="\n")
+        print(
+            f"{len(found) - len(different)} of {len(found)} as before",
+            *(f"differs: {name}" for name in different),
+            sep="\n",
+        )
         return 1 if different else 0
     return 0
 

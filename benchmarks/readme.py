@@ -2,8 +2,8 @@
 
     python -m benchmarks.readme [--check]
 
-A table stands between `<!-- table: NAME -->` and `<!-- end -->`; NAME is a key of `TABLES` here. `--check` changes
-nothing and fails where README.md is not what this command would write. `make readme` runs it.
+A table stands between `<!-- table: NAME -->` and `<!-- end -->`; NAME is a key of `TABLES` here. `--check`
+changes nothing and fails where README.md is not what this command would write. `make readme` runs it.
 """
 
 from __future__ import annotations
@@ -56,7 +56,11 @@ MATCHERS = {
     "OpenCV SGBM": "OpenCV SGBM",
     "OpenCV SGBM, rows aligned": "OpenCV SGBM, rows aligned for it",
 }
-RECORDED_MATCHERS = {"sgm, rows given": "`edge_disparity`", "OpenCV SGBM": "OpenCV SGBM", "OpenCV BM 15": "OpenCV BM"}
+RECORDED_MATCHERS = {
+    "sgm, rows given": "`edge_disparity`",
+    "OpenCV SGBM": "OpenCV SGBM",
+    "OpenCV BM 15": "OpenCV BM",
+}
 HARD = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 SCENES = "Particle tracker, ten scenes"
 CHANCE = "3-D motion: what is said of scenes by chance"
@@ -78,12 +82,17 @@ def flow(record: Record) -> list[str]:
     """Errors on recordings, and times of a pair on one thread."""
     body = []
     for sample, name in RECORDINGS.items():
-        rows = [where(record.sections["Accuracy on recordings"], sample=sample, method=method) for method in FLOWS]
+        rows = [
+            where(record.sections["Accuracy on recordings"], sample=sample, method=method) for method in FLOWS
+        ]
         body.append([name, *(_both(row, "end_point_error", 3, "jacobian_error", 4) for row in rows)])
     for size in ("640 x 480", "1920 x 1080"):
         times = record.sections[f"Flow per second, {size}"]
         # All are timed on a pair; with three frames only `balanced` is.
-        pairs = [method if method.startswith("OpenCV") else method.removesuffix(", pair") + ", pair" for method in FLOWS]
+        pairs = [
+            method if method.startswith("OpenCV") else method.removesuffix(", pair") + ", pair"
+            for method in FLOWS
+        ]
         pairs[list(FLOWS).index("coarse to fine, balanced")] = "coarse to fine, balanced"
         found = [where(times, method=method, threads=1).get("milliseconds") for method in pairs]
         body.append([f"ms, {size}, one thread", *(number(each, 0) for each in found)])
@@ -98,7 +107,10 @@ def _both(row: dict[str, object], first: str, digits: int, second: str, more: in
 def tracking(record: Record) -> list[str]:
     """Shares of frames found, times and overlaps on recordings."""
     body = []
-    for title, name in ((HARD, "28 hard scenes"), ("Tracking, Simulations 1 to 3", "24 simulations of the paper's kind")):
+    for title, name in (
+        (HARD, "28 hard scenes"),
+        ("Tracking, Simulations 1 to 3", "24 simulations of the paper's kind"),
+    ):
         means = where(record.sections[title], scene="mean success")
         body.append([name, *(number(means.get(tracker)) for tracker in TRACKERS)])
     twins = where(record.sections["Tracking, scenes in which others win"], scene="crossings kept, of 14")
@@ -121,7 +133,9 @@ def particles(record: Record) -> list[str]:
     body.append(["ten scenes: targets kept, % / mean overlap", *cells])
     campus = record.sections["Particle tracker, TUD-Campus"]
     means = [[_mean(campus, tracker, name) for name in ("MOTA", "IDF1")] for tracker in PARTICLE_TRACKERS]
-    body.append(["TUD-Campus (eight people): MOTA / IDF1", *(f"{number(a, 2)} / {number(b, 2)}" for a, b in means)])
+    body.append(
+        ["TUD-Campus (eight people): MOTA / IDF1", *(f"{number(a, 2)} / {number(b, 2)}" for a, b in means)]
+    )
     recorded = record.sections["Particle tracker, other recordings"]
     for name in dict.fromkeys(str(row["recording"]) for row in recorded):
         own = [row for row in recorded if row["recording"] == name]
@@ -146,13 +160,25 @@ def stereo(record: Record) -> list[str]:
     """Outliers and accepted pixels without a match, on the synthetic scenes."""
     rows = record.sections["Disparity of edge pixels, scenes with exact truth"]
     body = [
-        [name, *(_both(where(rows, scene=scene, method=method), "outliers", 3, "occluded", 3) for scene in STEREO_SCENES)]
+        [
+            name,
+            *(
+                _both(where(rows, scene=scene, method=method), "outliers", 3, "occluded", 3)
+                for scene in STEREO_SCENES
+            ),
+        ]
         for method, name in MATCHERS.items()
     ]
     recorded = record.sections["Disparity of edge pixels, recordings"]
     names = list(dict.fromkeys(str(row["recording"]) for row in recorded if "method" in row))
     more = [
-        [name, *(_both(where(recorded, recording=each, method=method), "outliers", 3, "density", 2) for each in names)]
+        [
+            name,
+            *(
+                _both(where(recorded, recording=each, method=method), "outliers", 3, "density", 2)
+                for each in names
+            ),
+        ]
         for method, name in RECORDED_MATCHERS.items()
     ]
     return [
@@ -188,7 +214,11 @@ def motion(record: Record) -> list[str]:
         ["random scenes", "status `ok`", "of these wrong", "95 % ellipses that hold the truth"],
         [[str(total["trials"]), f"{100 * share:.1f} %", str(total["wrong"]), number(total["holds"])]],
     )
-    methods = {"efficient": "`estimate_motion`", "USAC_MAGSAC": "OpenCV MAGSAC", "5-point RANSAC": "OpenCV RANSAC"}
+    methods = {
+        "efficient": "`estimate_motion`",
+        "USAC_MAGSAC": "OpenCV MAGSAC",
+        "5-point RANSAC": "OpenCV RANSAC",
+    }
     body = [[str(row["case"]), *(str(row[method]) for method in methods)] for row in record.sections[VIEWS]]
     return [*first, "", *lines(["median / rms error of the direction, degrees", *methods.values()], body)]
 
@@ -204,7 +234,8 @@ def parts(record: Record) -> list[str]:
     rows = record.sections["Weighted mixtures, a round"]
     sizes = {"components": 12, "points": 5000, "dimensions": 3}
     found = [
-        where(rows, method=method, **sizes)["milliseconds_per_round"] for method in ("jacoflow, 1 thread", "scikit-learn")
+        where(rows, method=method, **sizes)["milliseconds_per_round"]
+        for method in ("jacoflow, 1 thread", "scikit-learn")
     ]
     name = "weighted mixture, 12 components, 5000 points, 3 dimensions, ms a round"
     body.append([name, number(found[0], 2), f"{number(found[1], 1)} (scikit-learn)"])
@@ -224,7 +255,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
 
 
 def written(text: str, record: Record) -> str:
-    """The README with its tables made anew."""
+    """The README with its tables written from the record."""
 
     def block(match: re.Match[str]) -> str:
         maker, needed = TABLES[match.group(2)]
@@ -240,7 +271,9 @@ def written(text: str, record: Record) -> str:
 
 def main() -> int:
     """Writes or checks README.md."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--check", action="store_true", help="fail where README.md would change")
     is_check = parser.parse_args().check
     record = newest()

@@ -1,6 +1,8 @@
-"""What all tables share: options, rows as text, means with standard errors, the machine, the dated result file.
+"""What all tables share: options, rows as text, means with standard errors, the machine, the dated result
+file.
 
-A module of `benchmarks.tables` ends with a dictionary `TABLES` of `Table` by name, and `main(__doc__, TABLES)`.
+A module of `benchmarks.tables` ends with a dictionary `TABLES` of `Table` by name, and `main(__doc__,
+TABLES)`.
 """
 
 from __future__ import annotations
@@ -41,14 +43,20 @@ class Table:
     rows: Callable[[Options], Rows]
 
 
-def parser(doc: str | None, names: Iterable[str], arguments: Mapping[str, dict[str, Any]]) -> argparse.ArgumentParser:
+def parser(
+    doc: str | None, names: Iterable[str], arguments: Mapping[str, dict[str, Any]]
+) -> argparse.ArgumentParser:
     """The options of every table, and `arguments` of a module's own: flag -> what `add_argument` takes."""
     made = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     names = tuple(names)
-    made.add_argument("--only", choices=names, nargs="+", default=names, metavar="NAME", help=", ".join(names))
+    made.add_argument(
+        "--only", choices=names, nargs="+", default=names, metavar="NAME", help=", ".join(names)
+    )
     made.add_argument("--quick", action="store_true", help="fewer rounds, scenes and trials")
     made.add_argument("--trials", type=int, help="trials of each table instead of its own number")
-    made.add_argument("--data", type=Path, default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth")
+    made.add_argument(
+        "--data", type=Path, default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth"
+    )
     made.add_argument("--out", type=Path, help="folder of the dated file that the tables are written into")
     for flag, how in arguments.items():
         made.add_argument(flag, **how)
@@ -62,8 +70,11 @@ def default_options(quick: bool, data: Path | None, arguments: Mapping[str, dict
     return options
 
 
-def main(doc: str | None, tables: Mapping[str, Table], arguments: Mapping[str, dict[str, Any]] | None = None) -> None:
-    """Prints the tables chosen on the command line; with `--out` they replace those of the newest dated file there."""
+def main(
+    doc: str | None, tables: Mapping[str, Table], arguments: Mapping[str, dict[str, Any]] | None = None
+) -> None:
+    """Prints the tables chosen on the command line; with `--out` they replace those of the newest dated
+    file there."""
     options = parser(doc, tables, arguments or {}).parse_args()
     options.data = None if options.data is None else Path(options.data)
     sections: dict[str, Rows] = {}
@@ -99,7 +110,8 @@ def table_lines(rows: Rows) -> list[str]:
     """The rows as a table; a cell is empty where a row has no such column."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     return lines(
-        [name.replace("_", " ") for name in columns], [[show(row.get(name, "")) for name in columns] for row in rows]
+        [name.replace("_", " ") for name in columns],
+        [[show(row.get(name, "")) for name in columns] for row in rows],
     )
 
 
@@ -146,7 +158,12 @@ class Record:
     def write(self, folder: Path) -> None:
         """Writes `<date>.json` with every row, and `<date>.md` with the short tables."""
         folder.mkdir(parents=True, exist_ok=True)
-        record = {"date": self.date, "machine": self.machine, "sections": self.sections, "elsewhere": self.elsewhere}
+        record = {
+            "date": self.date,
+            "machine": self.machine,
+            "sections": self.sections,
+            "elsewhere": self.elsewhere,
+        }
         for ending, text in (("md", self.markdown()), ("json", one_row_a_line(record))):
             temporary = folder / f".{self.date}.{ending}"
             temporary.write_text(text, encoding="utf-8")
@@ -164,7 +181,11 @@ class Record:
                 continue
             parts += [f"## {title}", ""]
             if title in self.elsewhere:
-                other = {key: value for key, value in self.elsewhere[title].items() if self.machine.get(key) != value}
+                other = {
+                    key: value
+                    for key, value in self.elsewhere[title].items()
+                    if self.machine.get(key) != value
+                }
                 parts += [f"Measured on another machine: {machine_line(other)}", ""]
             parts += [*(table_lines(rows) if rows else ["Skipped: the rival is missing."]), ""]
         if left_out:
@@ -178,7 +199,9 @@ def one_row_a_line(record: dict[str, Any]) -> str:
     for title, rows in record["sections"].items():
         body = ",\n".join("   " + json.dumps(row) for row in rows)
         titles.append(f"  {json.dumps(title)}: [\n{body}\n  ]")
-    others = [f' {json.dumps(key)}: {json.dumps(value)}' for key, value in record.items() if key != "sections"]
+    others = [
+        f" {json.dumps(key)}: {json.dumps(value)}" for key, value in record.items() if key != "sections"
+    ]
     return "{\n" + ",\n".join([*others, ' "sections": {\n' + ",\n".join(titles) + "\n }"]) + "\n}\n"
 
 

@@ -24,18 +24,21 @@ class Setting:
     frames: int = 3
     """The most frames it is given: 2 for a pair even where there are three."""
     moment: float = 0.5
-    """Where between the two frames of a pair its field belongs: 0 the first, 0.5 the middle. Three frames: always the middle one."""
+    """Where between the two frames of a pair its field belongs: 0 the first, 0.5 the middle. Three frames:
+    always the middle one."""
     forward: bool = False
-    """Whether three frames tell the step from the middle one to the next, and not the mean of both steps."""
+    """Whether three frames give the step from the middle one to the next, not the mean of both steps."""
     window: float | None = None
-    """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it chooses one at each pixel."""
+    """Its window, the standard deviation of a Gaussian in px, for the noise bound; None: it chooses one at
+    each pixel."""
 
     def field(self, frames: Sequence[NDArray[Any]], **more: Any) -> jacoflow.FlowField:
         """The estimate from two or three frames."""
         return jacoflow.estimate(frames, **{**self.options, **more})
 
     def plain_windows(self, frames: Sequence[NDArray[Any]]) -> float | Array:
-        """Its window, or those it chose for the slopes, (H, W), px: the plain Gaussian ones as noisy as those of fourth order that it uses."""
+        """Its window, or those it chose for the slopes, (H, W), px: the plain Gaussian ones as noisy as
+        those of fourth order that it uses."""
         if self.window is not None:
             return self.window
         chosen = self.field(frames, diagnostics=True).window
@@ -50,21 +53,45 @@ class Setting:
 
 def windowed(smooth: float, window: float, **more: Any) -> Setting:
     """The single-level windowed estimator."""
-    options = {"method": "windowed", "smooth": smooth, "window_sigma": window, "covariance": False, "precision": "float64", **more}
-    return Setting(f"windowed, one level, smoothed {smooth:g} px, window {window:g} px", options, window=window)
+    options = {
+        "method": "windowed",
+        "smooth": smooth,
+        "window_sigma": window,
+        "covariance": False,
+        "precision": "float64",
+        **more,
+    }
+    return Setting(
+        f"windowed, one level, smoothed {smooth:g} px, window {window:g} px", options, window=window
+    )
 
 
 def coarse_to_fine(preset: str, frames: int = 3) -> Setting:
     """The estimator for everyday frames."""
     options = {"method": "coarse_to_fine", "preset": preset, "covariance": False}
-    return Setting(f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""), options, frames=frames, moment=0.0, forward=True)
+    return Setting(
+        f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""),
+        options,
+        frames=frames,
+        moment=0.0,
+        forward=True,
+    )
 
 
 PRESETS = ("fast", "balanced", "accurate")
-RECORDINGS = [windowed(1.5, 4.0), windowed(2.5, 6.0), *(coarse_to_fine(preset) for preset in PRESETS), coarse_to_fine("balanced", frames=2)]
+RECORDINGS = [
+    windowed(1.5, 4.0),
+    windowed(2.5, 6.0),
+    *(coarse_to_fine(preset) for preset in PRESETS),
+    coarse_to_fine("balanced", frames=2),
+]
 """The same for every recording."""
 
-CONTROLLED = [windowed(1.5, 4.0, rows="brightness"), coarse_to_fine("balanced", frames=2), coarse_to_fine("balanced")]
+CONTROLLED = [
+    windowed(1.5, 4.0, rows="brightness"),
+    coarse_to_fine("balanced", frames=2),
+    coarse_to_fine("balanced"),
+]
 """The same for every scene with exact truth."""
 
 SPEED = [

@@ -3,11 +3,11 @@
     make ablation ARGUMENTS="--only edges"
     python -m benchmarks.ablation [--only SYSTEM or SYSTEM.RULE ...] [--keep FILE] [--data FOLDER]
 
-Needs jacoflow built with the feature `ablation`. Every run is a child process on one thread with the environment
-variable JACOFLOW_WITHOUT. `--keep` names a JSON file: runs that it holds are not repeated, new ones are added to it.
-The difference is "without minus with", paired by scene or seed, with its standard error. Verdict: a heuristic
-`pays` if some row is worse without it by more than two standard errors; it `harms` if none is worse and some row is
-better by as much; otherwise it has `no effect`.
+Needs jacoflow built with the feature `ablation`. Every run is a child process on one thread with the
+environment variable JACOFLOW_WITHOUT. `--keep` names a JSON file: runs that it holds are not repeated, new
+ones are added to it. The difference is "without minus with", paired by scene or seed, with its standard
+error. Verdict: a heuristic `pays` if some row is worse without it by more than two standard errors; it
+`harms` if none is worse and some row is better by as much; else it has `no effect`.
 """
 
 from __future__ import annotations
@@ -28,19 +28,30 @@ Values = dict[str, list[float]]
 THRESHOLD = 2.0
 """Standard errors from which on a difference counts."""
 RESULT = "RESULT "
-"""First word of the child's line of results; whatever else it prints is left out."""
-PROGRAM = f"import importlib, json, sys; print({RESULT!r} + json.dumps(importlib.import_module(sys.argv[1]).rows()))"
+"""First word of the line of results that a child prints."""
+PROGRAM = f"""
+import importlib, json, sys
+print({RESULT!r} + json.dumps(importlib.import_module(sys.argv[1]).rows()))
+"""
 
 
 def main() -> None:
     """Prints a table for each heuristic and a summary."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--only", nargs="+", help="systems (`edges`) or heuristics (`edges.contrast`)")
     parser.add_argument("--keep", type=Path, help="JSON file of the runs, read and added to")
-    parser.add_argument("--data", default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth")
+    parser.add_argument(
+        "--data", default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth"
+    )
     options = parser.parse_args()
-    chosen = {name: why for name, why in heuristics() if options.only is None or is_chosen(name, options.only)}
-    kept: dict[str, Values] = json.loads(options.keep.read_text()) if options.keep and options.keep.exists() else {}
+    chosen = {
+        name: why for name, why in heuristics() if options.only is None or is_chosen(name, options.only)
+    }
+    kept: dict[str, Values] = (
+        json.loads(options.keep.read_text()) if options.keep and options.keep.exists() else {}
+    )
 
     def values(system: str, without: str) -> Values:
         key = without or system
@@ -57,7 +68,10 @@ def main() -> None:
             continue
         larger = getattr(importlib.import_module(f"benchmarks.ablation.{system}"), "LARGER_IS_BETTER", ())
         rows = comparison(values(system, ""), values(system, name), larger)
-        print(f"## {name}: {why}\n\n" + "\n".join(report.table_lines(rows)) + f"\n\n{verdict(rows)}\n", flush=True)
+        print(
+            f"## {name}: {why}\n\n" + "\n".join(report.table_lines(rows)) + f"\n\n{verdict(rows)}\n",
+            flush=True,
+        )
         summary.append({"heuristic": name, "purpose": why, "verdict": verdict(rows)})
     print("## Summary\n\n" + "\n".join(report.table_lines(summary)))
 
@@ -90,7 +104,8 @@ def run(system: str, without: str, data: str | None) -> Values:
 
 
 def comparison(with_it: Values, without: Values, larger_is_better: Sequence[str]) -> report.Rows:
-    """One row for each figure: means, paired difference, its standard error, and whether it is better or worse."""
+    """One row for each figure: means, paired difference, its standard error, and whether it is better or
+    worse."""
     rows: report.Rows = []
     for name, before in with_it.items():
         after = without[name]
@@ -100,7 +115,16 @@ def comparison(with_it: Values, without: Values, larger_is_better: Sequence[str]
         is_clear = abs(mean) > THRESHOLD * error
         effect = ("worse" if loss > 0 else "better") if is_clear else "-"
         ends = {"with": report.mean_and_error(before)[0], "without": report.mean_and_error(after)[0]}
-        rows.append({"row": name, "n": len(before), **ends, "difference": mean, "standard error": error, "without it": effect})
+        rows.append(
+            {
+                "row": name,
+                "n": len(before),
+                **ends,
+                "difference": mean,
+                "standard error": error,
+                "without it": effect,
+            }
+        )
     return rows
 
 

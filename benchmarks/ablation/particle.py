@@ -1,4 +1,5 @@
-"""The particle tracker on recordings of the ten synthetic scenes and of people and joggers: targets kept, overlap, time.
+"""The particle tracker on recordings of the ten synthetic scenes and of people and joggers: targets kept,
+overlap, time.
 
 JACOFLOW_ABLATION=quick takes the three hardest scenes and no recordings.
 """

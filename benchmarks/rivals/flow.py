@@ -1,4 +1,4 @@
-"""OpenCV's flows, and Jacobians made from them with the smoothing that suits them best."""
+"""OpenCV's flows, and their Jacobians after the smoothing that suits them best."""
 
 from __future__ import annotations
 
@@ -25,27 +25,35 @@ ORDERS = (1, 2, 3, 4)
 
 
 def farneback(first: Picture, second: Picture) -> Array:
-    """Farneback's flow with the settings usual in examples: half size a level, 5 levels, window 15, 3 iterations, neighbourhood 5, sigma 1.1."""
+    """Farneback's flow with the settings usual in examples: half size a level, 5 levels, window 15, 3
+    iterations, neighbourhood 5, sigma 1.1."""
     return cv2.calcOpticalFlowFarneback(first, second, None, 0.5, 5, 15, 3, 5, 1.1, 0).astype(float)
 
 
 def dis(first: Picture, second: Picture) -> Array:
     """Dense inverse search, preset medium."""
-    return cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM).calc(first, second, None).astype(float)
+    return (
+        cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM).calc(first, second, None).astype(float)
+    )
 
 
-RIVALS: dict[str, Callable[[Picture, Picture], Array]] = {"OpenCV DIS medium": dis, "OpenCV Farneback": farneback}
+RIVALS: dict[str, Callable[[Picture, Picture], Array]] = {
+    "OpenCV DIS medium": dis,
+    "OpenCV Farneback": farneback,
+}
 
 
 def gaussian_fits(flow: Array) -> Iterator[tuple[dict[str, object], Array, Array]]:
-    """The flow smoothed by each Gaussian, and its derivative: setting, flow (H, W, 2), Jacobian (H, W, 2, 2)."""
+    """The flow smoothed by each Gaussian, and its derivative: setting, flow (H, W, 2), Jacobian (H, W, 2,
+    2)."""
     for sigma in SIGMAS:
         smooth = cv2.GaussianBlur(flow, (0, 0), sigma)
         yield {"sigma": sigma}, smooth, differences(smooth)
 
 
 def savitzky_golay_fits(flow: Array) -> Iterator[tuple[dict[str, object], Array, Array]]:
-    """Polynomials fitted to each window of the flow (along rows, then columns): setting, flow and Jacobian in the middle of the window."""
+    """Polynomials fitted to each window of the flow (along rows, then columns): setting, flow and Jacobian
+    in the middle of the window."""
     from scipy.signal import savgol_filter
 
     def fit(window: int, order: int, along_x: int, along_y: int) -> Array:
@@ -59,6 +67,8 @@ def savitzky_golay_fits(flow: Array) -> Iterator[tuple[dict[str, object], Array,
                 yield {"window": window, "order": order}, fit(window, order, 0, 0), jacobian
 
 
-def best(fits: Iterator[tuple[dict[str, object], Array, Array]], error: Callable[[Array, Array], float]) -> tuple[dict[str, object], Array, Array]:
-    """The fit with the least `error(flow, jacobian)`: a choice made with the truth, which a user has not."""
+def best(
+    fits: Iterator[tuple[dict[str, object], Array, Array]], error: Callable[[Array, Array], float]
+) -> tuple[dict[str, object], Array, Array]:
+    """The fit with the least `error(flow, jacobian)`: chosen with the truth, which a user does not have."""
     return min(fits, key=lambda each: error(each[1], each[2]))

@@ -1,11 +1,13 @@
-"""The affine-flow unscented filter of WO2010/098160, written a second time: NumPy and filterpy, one pixel, nothing shared with jacoflow.
+"""The affine-flow unscented filter of WO2010/098160, written a second time: NumPy and filterpy, one pixel,
+nothing shared with jacoflow.
 
-It is the yardstick for the compiled filter. Run it to see the reference experiment (embodiment 2: the brightness ramp turning about
-the origin, quantised and smoothed, watched at (60, 80)) in numbers:
+It is the yardstick for the compiled filter. Run it to see the reference experiment (embodiment 2: the
+brightness ramp turning about the origin, quantised and smoothed, watched at (60, 80)) in numbers:
 
     python -m benchmarks.rivals.flow_filter [--save FOLDER]
 
-State ``q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)``; measurement: the nine brightness values around the pixel, row by row.
+State ``q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)``; measurement: the nine brightness values
+around the pixel, row by row.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ PIXEL = (60, 80)
 
 
 def ramp(t: float, origin: tuple[int, int], size: int = 64) -> Array:
-    """Brightness of the turning ramp at time ``t`` (frames) in a ``size`` x ``size`` window whose corner is the scene point ``origin``; (45)."""
+    """Brightness of the turning ramp at time ``t`` (frames) in a ``size`` x ``size`` window whose corner
+    is the scene point ``origin``; (45)."""
     y, x = np.mgrid[0:size, 0:size].astype(float)
     return 0.2 * ((x + origin[0]) * np.cos(OMEGA * t) + (y + origin[1]) * np.sin(OMEGA * t)) + 128.0
 
@@ -69,13 +72,15 @@ def ramp_measurements(frames: int, quantise: bool = True, sigma: float | None = 
 
 
 def observation_matrix() -> Array:
-    """Rows ``[1, ex, ey, ex^2/2, ex ey, ey^2/2]`` for the nine offsets, then zeros for the motion; shape (9, 12); (40)-(43)."""
+    """Rows ``[1, ex, ey, ex^2/2, ex ey, ey^2/2]`` for the nine offsets, then zeros for the motion; shape
+    (9, 12); (40)-(43)."""
     rows = [[1, x, y, x * x / 2, x * y, y * y / 2, 0, 0, 0, 0, 0, 0] for y in (-1, 0, 1) for x in (-1, 0, 1)]
     return np.array(rows, dtype=float)
 
 
 def rate(q: Array) -> Array:
-    """``q'`` of the affine-flow system (11) for one state (12,). Plain numbers: for twelve of them that is several times faster than arrays."""
+    """``q'`` of the affine-flow system (11) for one state (12,). Plain numbers: for twelve of them that is
+    several times faster than arrays."""
     _, ix, iy, ixx, ixy, iyy, u, v, u_x, v_x, u_y, v_y = q.tolist()
     return np.array(
         (
@@ -96,7 +101,8 @@ def rate(q: Array) -> Array:
 
 
 def transition(q: Array, noise: Array | float = 0.0, dt: float = 1.0) -> Array:
-    """One frame of ``q' = f(q) + noise`` by one classical Runge-Kutta step, the noise held constant inside it."""
+    """One frame of ``q' = f(q) + noise`` by one classical Runge-Kutta step, the noise held constant inside
+    it."""
     k1 = rate(q) + noise
     k2 = rate(q + 0.5 * dt * k1) + noise
     k3 = rate(q + 0.5 * dt * k2) + noise
@@ -114,7 +120,8 @@ def root_with_motion_first(covariance: Array) -> Array:
 
 @dataclass
 class Settings:
-    """What the patent fixes (Q, R, zero start) and what it leaves open (initial covariance, sigma-point constants)."""
+    """What the patent fixes (Q, R, zero start) and what it leaves open (initial covariance, sigma-point
+    constants)."""
 
     process_noise: Array
     measurement_noise: float
@@ -132,9 +139,10 @@ class Settings:
 class ReferenceFilter:
     """filterpy's unscented filter set up for one pixel: ``step(z)`` predicts and updates.
 
-    ``augmented``: sigma points of the state with its process noise (24 dimensions, 49 points), else 12 dimensions and additive Q (25 points).
-    ``motion_first``: the square root that spreads the points takes the motion before the brightness, as jacoflow's form "fast" does. Beyond
-    second order the points depend on it: with the patent's constants filterpy's own order, brightness first, follows the ramp more closely.
+    ``augmented``: sigma points of the state with its process noise (24 dimensions, 49 points), else 12
+    dimensions and additive Q (25 points). ``motion_first``: the square root that spreads the points takes the
+    motion before the brightness, as jacoflow's form "fast" does. Beyond second order the points depend on it:
+    with the patent's constants filterpy's own order, brightness first, follows the ramp more closely.
     """
 
     def __init__(self, settings: Settings, *, augmented: bool, motion_first: bool = False) -> None:
@@ -170,9 +178,11 @@ class ReferenceFilter:
         self.filter.P[12:, 12:] = np.diag(self.settings.process_noise)
 
     def step(self, z: Array) -> tuple[Array, Array]:
-        """Predicts over one frame and updates with nine brightness values; returns mean (12,) and covariance (12, 12)."""
+        """Predicts over one frame and updates with nine brightness values; returns mean (12,) and
+        covariance (12, 12)."""
         self.filter.predict()
-        # Some releases keep the points that were moved, which leaves Q out of the innovation covariance of the additive form.
+        # Some releases keep the points that were moved, which leaves Q out of the innovation covariance of
+        # the additive form.
         self.filter.sigmas_f = self.filter.points_fn.sigma_points(self.filter.x, self.filter.P)
         self.filter.update(z)
         mean = self.filter.x[:12].copy()
@@ -182,7 +192,9 @@ class ReferenceFilter:
         return mean, covariance
 
 
-def run(measurements: Array, settings: Settings, *, augmented: bool, motion_first: bool = False) -> tuple[Array, Array]:
+def run(
+    measurements: Array, settings: Settings, *, augmented: bool, motion_first: bool = False
+) -> tuple[Array, Array]:
     """Means (T, 12) and covariances (T, 12, 12) after each frame."""
     estimator = ReferenceFilter(settings, augmented=augmented, motion_first=motion_first)
     states = [estimator.step(z) for z in measurements]
@@ -190,7 +202,8 @@ def run(measurements: Array, settings: Settings, *, augmented: bool, motion_firs
 
 
 def settle_frame(means: Array, tolerance: float = 0.25) -> int:
-    """The last frame at which u or v is off by ``tolerance`` px/frame or more: from the next one on both stay inside."""
+    """The last frame at which u or v is off by ``tolerance`` px/frame or more: from the next one on both
+    stay inside."""
     off = np.abs(means[:, 6:8] - true_motion()[:2]).max(axis=1) >= tolerance
     return int(np.flatnonzero(off)[-1]) if off.any() else -1
 
@@ -201,19 +214,26 @@ def report(name: str, means: Array) -> str:
     late = means[200:, 6:] - true_motion()
     lines = [
         f"{name}:",
-        f"  after frame 0: I {means[0, 0]:.6f}  Ix {means[0, 1]:.9f}  Iy {means[0, 2]:.2e}  m {np.abs(means[0, 6:]).max():.1e}",
+        f"  after frame 0: I {means[0, 0]:.6f}  Ix {means[0, 1]:.9f}  Iy {means[0, 2]:.2e}"
+        f"  m {np.abs(means[0, 6:]).max():.1e}",
         f"  after frame 1: u {means[1, 6]:.5f}  v {means[1, 7]:.5f}  v_y {means[1, 11]:.5f}",
         f"  last frame off by 0.25 px or more: {settle_frame(means)}",
-        "  frames 200-399, rms error: " + "  ".join(f"{n} {e:.4f}" for n, e in zip(names, np.sqrt((late**2).mean(axis=0)))),
-        "  frames 200-399, bias:      " + "  ".join(f"{n} {e:+.4f}" for n, e in zip(names, late.mean(axis=0))),
+        "  frames 200-399, rms error: "
+        + "  ".join(f"{n} {e:.4f}" for n, e in zip(names, np.sqrt((late**2).mean(axis=0)))),
+        "  frames 200-399, bias:      "
+        + "  ".join(f"{n} {e:+.4f}" for n, e in zip(names, late.mean(axis=0))),
     ]
     return "\n".join(lines)
 
 
 def main() -> None:
     """Prints the reference experiment's figures; ``--save`` keeps states and covariances of some frames."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--save", type=Path, help="folder for .npz files with the measurements, means and some covariances")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--save", type=Path, help="folder for .npz files with the measurements, means and some covariances"
+    )
     options = parser.parse_args()
     measurements = ramp_measurements(400)
     for augmented in (True, False):

@@ -20,13 +20,18 @@ METHODS = {"5-point RANSAC": "RANSAC", "USAC_MAGSAC": "USAC_MAGSAC", "USAC_ACCUR
 
 
 def two_view(points: Array, flow: Array, camera: Array, sigma: float, method: str) -> tuple[Array, Array]:
-    """(translation direction, rotation matrix) of `findEssentialMat` and `recoverPose`; threshold 2 sigma px. NaN where it finds none."""
+    """(translation direction, rotation matrix) of `findEssentialMat` and `recoverPose`; threshold 2 sigma
+    px. NaN where it finds none."""
     first, second = np.ascontiguousarray(points), np.ascontiguousarray(points + flow)
     cv2.setRNGSeed(0)
-    essential, mask = cv2.findEssentialMat(first, second, camera, method=getattr(cv2, method), prob=0.999, threshold=2 * sigma)
+    essential, mask = cv2.findEssentialMat(
+        first, second, camera, method=getattr(cv2, method), prob=0.999, threshold=2 * sigma
+    )
     if essential is None or essential.shape != (3, 3):
         return np.full(3, np.nan), np.full((3, 3), np.nan)
-    _, turn, direction, _, _ = cv2.recoverPose(essential, first, second, camera, distanceThresh=1e7, mask=mask)
+    _, turn, direction, _, _ = cv2.recoverPose(
+        essential, first, second, camera, distanceThresh=1e7, mask=mask
+    )
     return direction.ravel(), turn
 
 
@@ -49,7 +54,8 @@ def _rotation(points: Array, flow: Array, u: Array) -> Array:
 
 
 def _constraint(points: Array, flow: Array) -> tuple[Array, Array]:
-    """Rows of the differential epipolar constraint `u . (xi' x eta) + eta^t S eta = 0` with xi' = (flow, 0): those of u (N, 3) and those of the symmetric S (N, 6)."""
+    """Rows of the differential epipolar constraint `u . (xi' x eta) + eta^t S eta = 0` with xi' = (flow,
+    0): those of u (N, 3) and those of the symmetric S (N, 6)."""
     eta = np.column_stack([points, np.ones(len(points))])
     speed = np.column_stack([flow, np.zeros(len(points))])
     x, y, z = eta.T
@@ -63,24 +69,30 @@ def _without(rows: Array, others: Array) -> Array:
 
 
 def linear(points: Array, flow: Array) -> Array:
-    """Direction by linear subspaces (A. Jepson, D. Heeger 1991): combinations of the constraints in which no quadratic part is left are linear in u alone."""
+    """Direction by linear subspaces (A. Jepson, D. Heeger 1991): combinations of the constraints in which
+    no quadratic part is left are linear in u alone."""
     rows, quadratic = _constraint(points, flow)
     u = np.linalg.svd(_without(rows, quadratic), full_matrices=False)[2][-1]
     return _best(_before(points, flow, _rotation(points, flow, u)), u)
 
 
 def unbiased(points: Array, flow: Array, rounds: int = 10) -> Array:
-    """The same with weights `1 / |G u|^2` and a ratio of sums, in which the noise takes no side: the least generalised eigenvalue, iterated. With noisy flow the iteration does not settle: its errors depend on the number of rounds."""
+    """The same with weights `1 / |G u|^2` and a ratio of sums, in which the noise takes no side: the least
+    generalised eigenvalue, iterated. With noisy flow the iteration does not settle: its errors depend on
+    the number of rounds."""
     rows, quadratic = _constraint(points, flow)
     g, _ = scenes.rows(points)
-    # cross(noise, eta) = (n_y, -n_x, n_x y - n_y x): its products have the expectation sigma^2 G^t G; the quadratic part has no noise.
+    # cross(noise, eta) = (n_y, -n_x, n_x y - n_y x): its products have the expectation sigma^2 G^t G; the
+    # quadratic part has no noise.
     shares = np.einsum("nij,nik->njk", g, g)
     u = linear(points, flow)
     for _ in range(rounds):
         weights = 1 / np.maximum(((g @ u) ** 2).sum(1), 1e-6)
         root = np.sqrt(weights)[:, None]
         inner = _without(root * rows, root * quadratic)
-        values, vectors = np.linalg.eig(np.linalg.solve(np.einsum("n,njk->jk", weights, shares), inner.T @ inner))
+        values, vectors = np.linalg.eig(
+            np.linalg.solve(np.einsum("n,njk->jk", weights, shares), inner.T @ inner)
+        )
         following = np.real(vectors[:, np.argmin(np.real(values))])
         u = following / np.linalg.norm(following)
     return _best(_before(points, flow, _rotation(points, flow, u)), u)

@@ -1,4 +1,5 @@
-"""Trackers of several targets in colour frames under one roof: the particle tracker, and OpenCV's, one for each target."""
+"""Trackers of several targets in colour frames under one roof: the particle tracker, and OpenCV's, one for
+each target."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ class Contestant:
 
     name: str
     follow: Callable[[Sequence, int], Array]
-    """Boxes (T, K, 4) of a sequence's targets with a seed; NaN before the start, where it reports none and from where the centre has left the picture on."""
+    """Boxes (T, K, 4) of a sequence's targets with a seed; NaN before the start, where it reports none and
+    from where the centre has left the picture on."""
     random: bool = False
     """Whether the seed matters."""
 
@@ -48,7 +50,9 @@ class Settings:
         boxes, starts = np.full(sequence.boxes.shape, np.nan), sequence.starts
         first = int(starts.min())
         begun = {k: sequence.boxes[first, k] for k in np.flatnonzero(starts == first).tolist()}
-        tracker = ParticleTracker(sequence.frames[first], begun, mode=self.mode, random_state=seed, **self.options)
+        tracker = ParticleTracker(
+            sequence.frames[first], begun, mode=self.mode, random_state=seed, **self.options
+        )
         boxes[first, list(begun)] = sequence.boxes[first, list(begun)]
         ended: set[int] = set()
         for t in range(first + 1, len(sequence.frames)):
@@ -105,7 +109,8 @@ def _follow_one(create: Callable[[], Any], sequence: Sequence, pictures: list[Fr
 
 
 def _begun(create: Callable[[], Any], picture: Frames, box: Box) -> Any:
-    """A tracker that has been given its target; where it refuses a box that is partly outside, the part in the picture."""
+    """A tracker that has been given its target; where it refuses a box that is partly outside, the part in
+    the picture."""
     left, top, width, height = to_opencv(box)
     right, bottom = min(left + width, picture.shape[1]), min(top + height, picture.shape[0])
     inside = (max(left, 0), max(top, 0), right - max(left, 0), bottom - max(top, 0))

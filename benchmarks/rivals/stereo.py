@@ -37,24 +37,31 @@ def edge_pixels(left: Picture) -> Mask:
 
 
 def ours(name: str, asked: str | None = None, align: bool = False, **options: object) -> Matcher:
-    """One of our methods; `align`: told the true row offset."""
+    """One of our methods; `align`: with the true row offset."""
 
     def match(pair: Pair) -> NDArray[np.floating]:
         told = {"row_offset": pair.row_offset} if align else {}
-        return jacoflow.stereo.edge_disparity(pair.left, pair.right, disparity_range=pair.disparity_range, **told, **options).disparity
+        return jacoflow.stereo.edge_disparity(
+            pair.left, pair.right, disparity_range=pair.disparity_range, **told, **options
+        ).disparity
 
     return Matcher(name, match, asked)
 
 
 def _with_opencv(pair: Pair, make: Callable[[int, int], object], align: bool) -> NDArray[np.floating]:
-    """OpenCV's disparity; what it has no answer for is NaN. Views are widened so that every column can be matched."""
+    """OpenCV's disparity; what it has no answer for is NaN. Views are widened so that every column can be
+    matched."""
     low, high = pair.disparity_range
     number = int(np.ceil((high - low + 1) / 16)) * 16
     right = pair.right
     if align and pair.row_offset:
-        right = np.rint(shift(right.astype(float), (-pair.row_offset, 0), order=1, mode="nearest")).astype(np.uint8)
+        right = np.rint(shift(right.astype(float), (-pair.row_offset, 0), order=1, mode="nearest")).astype(
+            np.uint8
+        )
     margin = max(abs(low), abs(low + number)) + 16
-    wide = [cv2.copyMakeBorder(view, 0, 0, margin, margin, cv2.BORDER_REPLICATE) for view in (pair.left, right)]
+    wide = [
+        cv2.copyMakeBorder(view, 0, 0, margin, margin, cv2.BORDER_REPLICATE) for view in (pair.left, right)
+    ]
     raw = make(low, number).compute(wide[0], wide[1]).astype(float) / 16
     raw = raw[:, margin:-margin]
     return np.where(raw < low, np.nan, raw)
@@ -63,7 +70,15 @@ def _with_opencv(pair: Pair, make: Callable[[int, int], object], align: bool) ->
 def semi_global(low: int, number: int) -> object:
     """SGBM with 5 x 5 blocks and the penalties of its manual."""
     return cv2.StereoSGBM_create(
-        minDisparity=low, numDisparities=number, blockSize=5, P1=8 * 25, P2=32 * 25, disp12MaxDiff=1, uniquenessRatio=5, speckleWindowSize=50, speckleRange=2
+        minDisparity=low,
+        numDisparities=number,
+        blockSize=5,
+        P1=8 * 25,
+        P2=32 * 25,
+        disp12MaxDiff=1,
+        uniquenessRatio=5,
+        speckleWindowSize=50,
+        speckleRange=2,
     )
 
 

@@ -1,4 +1,5 @@
-"""Trackers under one roof: OpenCV's and ours, each begun with the exact box and given one frame after the other."""
+"""Trackers under one roof: OpenCV's and ours, each begun with the exact box and given one frame after the
+other."""
 
 from __future__ import annotations
 
@@ -43,14 +44,21 @@ class Tracker:
 
 def chosen(options: Namespace) -> list[Tracker]:
     """Every tracker whose name holds one of the parts in `--trackers`."""
-    return [each for each in everyone() if options.trackers is None or any(part in each.name for part in options.trackers)]
+    return [
+        each
+        for each in everyone()
+        if options.trackers is None or any(part in each.name for part in options.trackers)
+    ]
 
 
 def with_affine(trackers: list[Tracker]) -> list[Tracker]:
     """The trackers; `layered` with an affine model first if `layered` is among them."""
     if not any(tracker.name == "jacoflow layered" for tracker in trackers):
         return trackers
-    return [*(Tracker(f"{each.name} affine", each.run) for each in ours(("layered",), model="affine")), *trackers]
+    return [
+        *(Tracker(f"{each.name} affine", each.run) for each in ours(("layered",), model="affine")),
+        *trackers,
+    ]
 
 
 def everyone() -> list[Tracker]:
@@ -110,7 +118,8 @@ def rivals() -> Iterator[Tracker]:
 
 
 def creator(name: str) -> Callable[[], Any] | None:
-    """What makes the tracker: in the main name space, or among the older ones; None where this OpenCV has neither."""
+    """What makes the tracker: in the main name space, or among the older ones; None where this OpenCV has
+    neither."""
     for place in (cv2, getattr(cv2, "legacy", None)):
         create = getattr(place, f"Tracker{name}_create", None)
         if create is not None:
@@ -124,8 +133,9 @@ def _runner(create: Callable[[], Any], times: int) -> Callable[[Frames, Box], Tr
 
 
 def _run_rival(create: Callable[[], Any], times: int, frames: Frames, box: Box) -> Track:
-    """One of OpenCV's trackers through the frames. Enlarging them is not counted in its time; where it reports a failure or raises an error its last box stands."""
-    # They were made for colour.
+    """One of OpenCV's trackers through the frames. Enlarging them is not counted in its time; where it
+    reports a failure or raises an error its last box stands."""
+    # They expect colour.
     pictures = [cv2.cvtColor(_enlarged(frame, times), cv2.COLOR_GRAY2BGR) for frame in frames]
     boxes = [box]
 
@@ -143,7 +153,9 @@ def _run_rival(create: Callable[[], Any], times: int, frames: Frames, box: Box) 
     time = timing.once(work)
     track = np.array(boxes, float)
     centres = track[:, :2] + track[:, 2:] / 2
-    return Track(track, np.diff(centres, axis=0, prepend=np.nan), milliseconds=1000 * time.busiest / (len(frames) - 1))
+    return Track(
+        track, np.diff(centres, axis=0, prepend=np.nan), milliseconds=1000 * time.busiest / (len(frames) - 1)
+    )
 
 
 def next_box(tracker: Any, picture: Frames, times: int) -> Box | None:
@@ -161,8 +173,11 @@ def _enlarged(frame: Frames, times: int) -> Frames:
 
 
 def to_opencv(box: Box, times: int = 1) -> tuple[int, int, int, int]:
-    """Our box as OpenCV's: whole pixels, counted from the corner of the first pixel and not from its centre."""
-    x, y, width, height = (int(np.floor(times * each + 0.5)) for each in (box[0] + 0.5, box[1] + 0.5, box[2], box[3]))
+    """Our box as OpenCV's: whole pixels, counted from the corner of the first pixel and not from its
+    centre."""
+    x, y, width, height = (
+        int(np.floor(times * each + 0.5)) for each in (box[0] + 0.5, box[1] + 0.5, box[2], box[3])
+    )
     return x, y, width, height
 
 

@@ -19,7 +19,8 @@ SIZE = 256
 
 @dataclass(frozen=True)
 class Case:
-    """A scene: a noise texture moved by waves of about `wavelength` px, at most `speed` px/frame fast in the frame, seen by an 8-bit camera."""
+    """A scene: a noise texture moved by waves of about `wavelength` px, at most `speed` px/frame fast in
+    the frame, seen by an 8-bit camera."""
 
     wavelength: float
     speed: float
@@ -30,13 +31,30 @@ class Case:
     def scene(self, origin: tuple[float, float] = (0.0, 0.0)) -> scenes.Scene:
         """The scene through a window at `origin`."""
         rms = self.speed / fastest(self.wavelength, self.seed)
-        return scenes.Scene("waves", width=SIZE, height=SIZE, origin=origin, random_state=self.seed, carrier="noise", speed=rms, wavelength=self.wavelength)
+        return scenes.Scene(
+            "waves",
+            width=SIZE,
+            height=SIZE,
+            origin=origin,
+            random_state=self.seed,
+            carrier="noise",
+            speed=rms,
+            wavelength=self.wavelength,
+        )
 
 
 @functools.cache
 def fastest(wavelength: float, seed: int) -> float:
     """The greatest speed in the frame of a field whose root-mean-square speed is 1 px/frame."""
-    unit = scenes.Scene("waves", width=SIZE, height=SIZE, random_state=seed, carrier="speckle", speed=1.0, wavelength=wavelength)
+    unit = scenes.Scene(
+        "waves",
+        width=SIZE,
+        height=SIZE,
+        random_state=seed,
+        carrier="speckle",
+        speed=1.0,
+        wavelength=wavelength,
+    )
     return float(np.linalg.norm(unit.truth(0.0).flow, axis=-1).max())
 
 
@@ -53,7 +71,9 @@ def frame(case: Case, t: float) -> Picture:
 
 
 @functools.cache
-def truth(wavelength: float, speed: float, seed: int, t: float, between: tuple[float, float]) -> tuple[Array, Array]:
+def truth(
+    wavelength: float, speed: float, seed: int, t: float, between: tuple[float, float]
+) -> tuple[Array, Array]:
     """Exact mean flow and Jacobian between the frames at the pixels of time t."""
     field = Case(wavelength, speed, 0.0, seed).scene().truth(t, between=between)
     return field.flow, field.jacobian
@@ -61,14 +81,20 @@ def truth(wavelength: float, speed: float, seed: int, t: float, between: tuple[f
 
 @functools.cache
 def gradient(wavelength: float, speed: float, seed: int, t: float) -> Array:
-    """Exact brightness gradient (H, W, 2) at a time, grey levels/px: differences over 0.02 px of the scene itself."""
+    """Exact brightness gradient (H, W, 2) at a time, grey levels/px: differences over 0.02 px of the scene
+    itself."""
     case, h = Case(wavelength, speed, 0.0, seed), 0.01
     along_x, along_y = (
-        (case.scene((dx, dy)).frame(t) - case.scene((-dx, -dy)).frame(t)) / (2 * h) for dx, dy in ((h, 0.0), (0.0, h))
+        (case.scene((dx, dy)).frame(t) - case.scene((-dx, -dy)).frame(t)) / (2 * h)
+        for dx, dy in ((h, 0.0), (0.0, h))
     )
     return np.stack([along_x, along_y], axis=-1)
 
 
-def cases(wavelengths: tuple[float, ...] = (64.0, 256.0), speeds: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0), noises: tuple[float, ...] = (0.0, 3.0)) -> list[Case]:
+def cases(
+    wavelengths: tuple[float, ...] = (64.0, 256.0),
+    speeds: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0),
+    noises: tuple[float, ...] = (0.0, 3.0),
+) -> list[Case]:
     """Every combination."""
     return [Case(*each) for each in itertools.product(wavelengths, speeds, noises)]

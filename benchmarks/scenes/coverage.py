@@ -1,7 +1,7 @@
 """Synthetic scenes for the coverage of 95 % intervals: textures times motions times noise.
 
-The constants of the covariance were fitted on the scenes `FITTED`; `HELD_OUT` differ in seed, size, texture, motion
-and noise.
+The constants of the covariance were fitted on the scenes `FITTED`; `HELD_OUT` differ in seed, size, texture,
+motion and noise.
 """
 
 from __future__ import annotations
@@ -29,14 +29,23 @@ class Family:
 
     def frames(self, size: tuple[int, int], noise: float, seed: int, count: int) -> tuple[list[Array], Any]:
         """What an 8-bit camera sees, and the exact mean flow at the pixels that the estimate belongs to."""
-        scene = scenes.Scene(self.motion, width=size[0], height=size[1], random_state=seed, carrier=self.carrier, **self.parameters)
+        scene = scenes.Scene(
+            self.motion,
+            width=size[0],
+            height=size[1],
+            random_state=seed,
+            carrier=self.carrier,
+            **self.parameters,
+        )
         camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
         times = (0.0, 1.0) if count == 2 else (-1.0, 0.0, 1.0)
         pictures = [camera.apply_u8(scene.frame(t), index=int(t) + 8) for t in times]
         return pictures, scene.truth(0.0, between=(0.0, 1.0))
 
 
-def affine(u: float, v: float, u_x: float = 0.0, v_x: float = 0.0, u_y: float = 0.0, v_y: float = 0.0) -> tuple[str, dict[str, float]]:
+def affine(
+    u: float, v: float, u_x: float = 0.0, v_x: float = 0.0, u_y: float = 0.0, v_y: float = 0.0
+) -> tuple[str, dict[str, float]]:
     """The scene of one affine motion."""
     return "affine", {"u": u, "v": v, "u_x": u_x, "v_x": v_x, "u_y": u_y, "v_y": v_y}
 
@@ -49,7 +58,11 @@ MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
     "waves": ("waves", {"speed": 1.5, "wavelength": 128.0}),
     "turbulence": ("turbulence", {"speed": 2.0, "longest": 192.0}),
 }
-CARRIERS: dict[str, tuple[str, dict[str, float]]] = {"noise": ("noise", {}), "speckle": ("speckle", {}), "particles": ("particles", {})}
+CARRIERS: dict[str, tuple[str, dict[str, float]]] = {
+    "noise": ("noise", {}),
+    "speckle": ("speckle", {}),
+    "particles": ("particles", {}),
+}
 OTHER_MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
     "slide": affine(0.31, 0.62),
     "spin": affine(2.7, -4.4, -0.004, 0.03, -0.03, -0.004),
@@ -73,7 +86,9 @@ def families(
     """Every combination."""
     return [
         Family(carrier, motion, f"{texture}, {moving}", {**look, **path})
-        for (texture, (carrier, look)), (moving, (motion, path)) in itertools.product(carriers.items(), motions.items())
+        for (texture, (carrier, look)), (moving, (motion, path)) in itertools.product(
+            carriers.items(), motions.items()
+        )
     ]
 
 

@@ -110,8 +110,19 @@ def displaced(pixels: np.ndarray, nu: np.ndarray, u: np.ndarray, w: np.ndarray) 
     return after[:, :2] / after[:, 2:]
 
 
-def two_views(scene: str, name: str, sigma: float, median: float, seed: int, *, n: int = 1000, outliers: float = 0.0, mover: float = 0.0) -> Scene:
-    """Exact two-view motion in a 640 x 480 picture, f = 500 px; `median`: median translational flow, px; `sigma` px of noise."""
+def two_views(
+    scene: str,
+    name: str,
+    sigma: float,
+    median: float,
+    seed: int,
+    *,
+    n: int = 1000,
+    outliers: float = 0.0,
+    mover: float = 0.0,
+) -> Scene:
+    """Exact two-view motion in a 640 x 480 picture, f = 500 px; `median`: median translational flow, px;
+    `sigma` px of noise."""
     rng = np.random.default_rng(seed)
     u, w = motion(name)
     w = w / 2
@@ -127,7 +138,10 @@ def two_views(scene: str, name: str, sigma: float, median: float, seed: int, *, 
         distance = np.abs(pixels - [200, 260]).max(1)
         inliers = distance > np.quantile(distance, mover)
         direction = np.array([-0.8, 0.1, 0.3])
-        other = displaced(pixels, 1.5 * nu, direction / np.linalg.norm(direction), np.array([0, 0.01, 0.02])) - pixels
+        other = (
+            displaced(pixels, 1.5 * nu, direction / np.linalg.norm(direction), np.array([0, 0.01, 0.02]))
+            - pixels
+        )
         flow = np.where(inliers[:, None], flow, other)
     flow = flow + sigma * rng.normal(size=(n, 2))
     if outliers:
@@ -137,8 +151,11 @@ def two_views(scene: str, name: str, sigma: float, median: float, seed: int, *, 
     return Scene(pixels, flow, nu, u, w, sigma, K, inliers)
 
 
-def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float, noise: int | None = None) -> tuple[Scene, np.ndarray, np.ndarray]:
-    """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in px, Jacobians (N, 2, 2), covariances (N, 6, 6).
+def patches(
+    name: str, n: int, radius: float, sigma: float, seed: int, h: float, noise: int | None = None
+) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in
+    px, Jacobians (N, 2, 2), covariances (N, 6, 6).
 
     `noise`: a seed of its own for the noise, to draw it again on the same layout.
     """
@@ -153,8 +170,16 @@ def patches(name: str, n: int, radius: float, sigma: float, seed: int, h: float,
     t = g @ u
     one = np.ones(n)
     flow = nu[:, None] * t + r @ w
-    along_x = slants[:, :1] * t - nu[:, None] * u[2] * [1, 0] + np.stack([-y * w[0] + 2 * x * w[1], y * w[1] + one * w[2]], -1)
-    along_y = slants[:, 1:] * t - nu[:, None] * u[2] * [0, 1] + np.stack([-x * w[0] - one * w[2], -2 * y * w[0] + x * w[1]], -1)
+    along_x = (
+        slants[:, :1] * t
+        - nu[:, None] * u[2] * [1, 0]
+        + np.stack([-y * w[0] + 2 * x * w[1], y * w[1] + one * w[2]], -1)
+    )
+    along_y = (
+        slants[:, 1:] * t
+        - nu[:, None] * u[2] * [0, 1]
+        + np.stack([-x * w[0] - one * w[2], -2 * y * w[0] + x * w[1]], -1)
+    )
     slope = np.sqrt(3) * sigma / radius
     rng = rng if noise is None else np.random.default_rng((seed, noise))
     jacobian = np.stack([along_x, along_y], -1) + slope * rng.normal(size=(n, 2, 2))

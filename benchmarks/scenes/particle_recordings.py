@@ -29,7 +29,8 @@ class Sequence:
     frames: Frames
     """(T, H, W, 3), red, green and blue."""
     boxes: Array
-    """(T, K, 4), left, top, width, height, px, with left = centre - width / 2; NaN where a target has no truth."""
+    """(T, K, 4), left, top, width, height, px, with left = centre - width / 2; NaN where a target has no
+    truth."""
 
     @property
     def starts(self) -> NDArray[np.intp]:
@@ -44,7 +45,8 @@ class Sequence:
 
 
 def campus(data: Path) -> Sequence | None:
-    """Eight people who hide each other before a still camera: folder `track_mot15/TUD-Campus`, 640 x 480; None where it is missing."""
+    """Eight people who hide each other before a still camera: folder `track_mot15/TUD-Campus`, 640 x 480;
+    None where it is missing."""
     folder = data / "track_mot15" / CAMPUS
     if cv2 is None or not (folder / "gt" / "gt.txt").exists():
         return None
@@ -60,7 +62,10 @@ def campus(data: Path) -> Sequence | None:
 def halved(sequence: Sequence) -> Sequence:
     """At half the size, each pixel the mean of four."""
     height, width = sequence.frames.shape[1:3]
-    frames = [cv2.resize(frame, (width // 2, height // 2), interpolation=cv2.INTER_AREA) for frame in sequence.frames]
+    frames = [
+        cv2.resize(frame, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        for frame in sequence.frames
+    ]
     # Pixel centres lie at integers: the corner of the first pixel, at -0.5, stays where it is.
     boxes = np.concatenate([(sequence.boxes[..., :2] + 0.5) / 2 - 0.5, sequence.boxes[..., 2:] / 2], axis=-1)
     return Sequence(sequence.name, np.stack(frames), boxes)
@@ -76,12 +81,18 @@ def single(data: Path) -> Iterator[Sequence]:
         if pictures and tracks:
             frames = np.stack([cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB) for path in pictures])
             count = min(len(frames), *(len(track) for track in tracks))
-            yield Sequence(folder.name, frames[:count], _from_corner_1(np.stack([track[:count] for track in tracks], axis=1)))
+            yield Sequence(
+                folder.name,
+                frames[:count],
+                _from_corner_1(np.stack([track[:count] for track in tracks], axis=1)),
+            )
 
 
 def _read_boxes(path: Path) -> Array:
     """Lines x, y, width, height, with commas or blanks."""
-    return np.array([line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()], float)
+    return np.array(
+        [line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()], float
+    )
 
 
 def _from_corner_1(boxes: Array) -> Array:

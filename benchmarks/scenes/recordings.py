@@ -59,7 +59,12 @@ def _rubber_whale(data: Path) -> Sample:
 
 def _dimetrodon(data: Path) -> Sample:
     folder = data / "middlebury_flow" / "Dimetrodon"
-    return Sample("Dimetrodon", [read_grey(folder / f"frame{k}.png") for k in (10, 11)], 0, read_flo(folder / "flow10.flo"))
+    return Sample(
+        "Dimetrodon",
+        [read_grey(folder / f"frame{k}.png") for k in (10, 11)],
+        0,
+        read_flo(folder / "flow10.flo"),
+    )
 
 
 def _yosemite(data: Path) -> Sample:
@@ -67,11 +72,15 @@ def _yosemite(data: Path) -> Sample:
 
     folder = data / "yosemite"
     stored = loadmat(next(folder.rglob("correct_flow.mat")))
-    flow = next(v for v in stored.values() if isinstance(v, np.ndarray) and v.shape == (252, 316, 2)).astype(float)
+    flow = next(v for v in stored.values() if isinstance(v, np.ndarray) and v.shape == (252, 316, 2)).astype(
+        float
+    )
     sky = flow[..., 0] == 2.0
     truth = np.stack([flow[..., 0], -flow[..., 1]], axis=-1)
     truth[sky] = np.nan
-    return Sample("Yosemite without sky", [read_grey(next(folder.rglob(f"yos{k}.tif*"))) for k in (8, 9, 10)], 1, truth)
+    return Sample(
+        "Yosemite without sky", [read_grey(next(folder.rglob(f"yos{k}.tif*"))) for k in (8, 9, 10)], 1, truth
+    )
 
 
 def _sintel(data: Path) -> Sample:
@@ -104,7 +113,8 @@ FLOWS: list[Callable[[Path], Sample]] = [
 
 
 def read_strain(data: Path) -> tuple[Sample, Array]:
-    """Sample 14 (L1) of the image-correlation challenge, and its exact u_x (W,) in 1/frame: u depends on x alone and v is zero."""
+    """Sample 14 (L1) of the image-correlation challenge, and its exact u_x (W,) in 1/frame: u depends on x
+    alone and v is zero."""
     folder = data / "dic_challenge" / "sample14"
     frames = [read_grey(folder / f"Sample14 {name}.tif") for name in ("Reference", "L1 Amp0.1b")]
     x, u, micro = np.loadtxt(folder / "command_L1.csv", delimiter=",", comments="#", unpack=True)

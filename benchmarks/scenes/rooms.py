@@ -1,4 +1,5 @@
-"""Rendered rooms with exact truth: six textured walls seen from inside, in any pose, by a camera that moves between two frames."""
+"""Rendered rooms with exact truth: six textured walls seen from inside, in any pose, by a camera that
+moves between two frames."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ WALLS = tuple((axis, sign) for axis in range(3) for sign in (-1, 1))
 
 @dataclass(frozen=True)
 class Room:
-    """A room about the camera of the first frame, and how it moves to the second: `X_2 = rotation X_1 + shift`."""
+    """A room about the camera of the first frame, and how it moves to the second: `X_2 = rotation X_1 +
+    shift`."""
 
     pose: Array
     extent: Array
@@ -52,7 +54,13 @@ class Room:
         shade = np.empty(len(places))
         for k, (axis, _) in enumerate(WALLS):
             seen = wall == k
-            shade[seen] = map_coordinates(self.walls[k], np.delete(places[seen], axis, axis=1).T, order=3, prefilter=False, mode="mirror")
+            shade[seen] = map_coordinates(
+                self.walls[k],
+                np.delete(places[seen], axis, axis=1).T,
+                order=3,
+                prefilter=False,
+                mode="mirror",
+            )
         return shade.reshape(SIZE)
 
     def flow(self, points: Array) -> Array:
@@ -79,7 +87,8 @@ def _wall(rng: np.random.Generator) -> Array:
 
 
 def room(seed: int, step: float = 0.02, turn: float = 0.006) -> Room:
-    """A room of chance, half sides 1.2 to 3; the camera moves by `step` in any direction and turns by up to `turn` rad."""
+    """A room of chance, half sides 1.2 to 3; the camera moves by `step` in any direction and turns by up
+    to `turn` rad."""
     rng = np.random.default_rng((seed, 31))
     walls = [_wall(rng) for _ in WALLS]
     pose = Rotation.from_rotvec(0.4 * rng.normal(size=3)).as_matrix()

@@ -1,10 +1,12 @@
-"""Stereo films of moving layers with exact truth: label, disparity, visibility and motion of every pixel of the left view.
+"""Synthetic stereo sequences of moving layers: exact label, disparity, visibility and motion of every pixel.
 
-A scene is a stack of flat, bulging or sloping layers, far to near, each with a texture of its own (cells of one grey level each, a little rough) that moves and
-approaches with it. The right view is drawn for itself, not warped, a few rows lower and a little brighter; noise of 2 grey levels is added to both.
-Disparity is `x_left - x_right` in px; it is negative far away because the cameras converge, and -44 px at infinity.
+A scene is a stack of flat, bulging or sloping layers, far to near, each with a texture of its own (cells of
+one grey level, a little rough) that moves and approaches with it. The right view is rendered by itself, a few
+rows lower and a little brighter; noise of 2 grey levels is added to both. Disparity is `x_left - x_right` in
+px; it is negative far away because the cameras converge, and -44 px at infinity.
 
-- `crossing()`: a panning wall, three people crossing before it, two of them side by side; one is nearly hidden for some steps.
+- `crossing()`: a panning wall, three people crossing before it, two of them side by side; one is nearly
+  hidden.
 - `curved()`: a large ellipsoidal cab with 14 px of relief that drives and approaches, and a small person.
 - `cart()`: a cart that recedes between rows of seats.
 - `passing()`: two people cross in opposite directions, one hides the other for a step or so.
@@ -29,7 +31,7 @@ Array = NDArray[np.floating]
 AT_INFINITY = -44.0
 """Disparity of a point at infinity, px."""
 ROUGHNESS = 6.0
-"""Standard deviation of what is rough about a cell, grey levels."""
+"""Standard deviation of the roughness of a cell, grey levels."""
 SOFT_EDGE = 1.4
 """Width over which a layer's border fades, px."""
 PALE_DISTANCE = 22.0
@@ -43,10 +45,14 @@ def texture(rng: np.random.Generator, height: int, width: int, cell: float) -> A
     count = max(6, int(height * width / cell**2))
     seeds = rng.uniform((0, 0), (height, width), (count, 2))
     rows, columns = np.mgrid[:height, :width]
-    nearest = cKDTree(seeds).query(np.stack([rows.ravel(), columns.ravel()], axis=1))[1].reshape(height, width)
+    nearest = (
+        cKDTree(seeds).query(np.stack([rows.ravel(), columns.ravel()], axis=1))[1].reshape(height, width)
+    )
     levels = rng.uniform(40, 215, count)[nearest]
-    # A Gaussian of 1.5 px leaves 0.188 of the deviation of white noise.
-    return gaussian_filter(levels + ROUGHNESS * gaussian_filter(rng.normal(0, 1, (height, width)), 1.5) / 0.188, 0.8)
+    # A Gaussian of 1.5 px leaves 0.188 of the standard deviation of white noise.
+    return gaussian_filter(
+        levels + ROUGHNESS * gaussian_filter(rng.normal(0, 1, (height, width)), 1.5) / 0.188, 0.8
+    )
 
 
 def _box(x: Array, y: Array, half_width: float, half_height: float) -> Array:
@@ -58,7 +64,7 @@ def _ellipse(x: Array, y: Array, half_width: float, half_height: float) -> Array
 
 
 def _person(x: Array, y: Array, half_width: float, half_height: float) -> Array:
-    """Head, body and two legs; as wide as its height asks for."""
+    """Head, body and two legs; the width follows from the height."""
     h = half_height
     head, body = _ellipse(x, y + 0.8 * h, 0.15 * h, 0.2 * h), _ellipse(x, y + 0.2 * h, 0.28 * h, 0.48 * h)
     legs = [_box(x + side * h, y - 0.55 * h, 0.11 * h, 0.45 * h) for side in (0.14, -0.14)]
@@ -76,7 +82,13 @@ def _everywhere(x: Array, y: Array, half_width: float, half_height: float) -> Ar
     return np.full(x.shape, 99.0)
 
 
-OUTLINES: dict[str, Callable[[Array, Array, float, float], Array]] = {"box": _box, "ellipse": _ellipse, "person": _person, "pales": _pales, "all": _everywhere}
+OUTLINES: dict[str, Callable[[Array, Array, float, float], Array]] = {
+    "box": _box,
+    "ellipse": _ellipse,
+    "person": _person,
+    "pales": _pales,
+    "all": _everywhere,
+}
 """How far inside an outline a place is, px (negative: outside)."""
 
 
@@ -117,14 +129,18 @@ class Layer:
         """At step `t`; what comes nearer grows."""
         disparity = self.disparity + self.approach * t
         scale = (disparity - AT_INFINITY) / (self.disparity - AT_INFINITY)
-        return Pose(self.position[0] + self.velocity[0] * t, self.position[1] + self.velocity[1] * t, scale, disparity)
+        return Pose(
+            self.position[0] + self.velocity[0] * t, self.position[1] + self.velocity[1] * t, scale, disparity
+        )
 
     def disparity_at(self, x: Array, y: Array, pose: Pose, height: int) -> Array:
         """Disparity (H, W) in px at places of the layer, in its own px from its centre."""
         bulge: Array | float = 0.0
         if self.relief:
             a, b = self.half
-            bulge = self.relief * np.sqrt(np.clip(1 - (x / (1.06 * a)) ** 2 - 0.4 * (y / (1.06 * b)) ** 2, 0, 1))
+            bulge = self.relief * np.sqrt(
+                np.clip(1 - (x / (1.06 * a)) ** 2 - 0.4 * (y / (1.06 * b)) ** 2, 0, 1)
+            )
         slope = self.floor * np.clip(y / (height / 2.0), 0, None)
         return pose.disparity + pose.scale**2 * (bulge + slope) + 0 * x
 
@@ -167,7 +183,8 @@ class Scene:
     """Standard deviation, grey levels."""
 
     def film(self, times: Sequence[int] | None = None) -> list[Step]:
-        """Every step, or some: those have the same textures, but other noise than they have in the whole film."""
+        """Every step, or some: those have the same textures, but other noise than they have in the whole
+        film."""
         rng = np.random.default_rng(self.seed)
         width, height = self.size
         textures = [layer.texture(rng, height, width) for layer in self.layers]
@@ -186,7 +203,9 @@ class Scene:
             mine, depth = top == index, layer.disparity_at(p, q, now, height)
             moved = layer.disparity_at(p, q, then, height) - depth
             disparity[mine] = depth[mine]
-            motion[mine] = np.stack([then.x + then.scale * p - x, then.y + then.scale * q - y, moved], axis=-1)[mine]
+            motion[mine] = np.stack(
+                [then.x + then.scale * p - x, then.y + then.scale * q - y, moved], axis=-1
+            )[mine]
             # A pixel of the right view shows the point whose x_left - d(x_left) it is.
             q_right, x_left = (y - self.row_offset - now.y) / now.scale, x + now.disparity
             for _ in range(8):
@@ -198,15 +217,19 @@ class Scene:
         return Step(views[0], views[1], label, disparity, visible, motion)
 
 
-def _paint(view: Array, top: NDArray[np.int_], index: int, layer: Layer, cover: Array, p: Array, q: Array) -> Array:
-    """The view with one more layer; `top` is told where it is."""
+def _paint(
+    view: Array, top: NDArray[np.int_], index: int, layer: Layer, cover: Array, p: Array, q: Array
+) -> Array:
+    """The view with one more layer; marks in `top` where it is."""
     alpha = np.clip(OUTLINES[layer.outline](p, q, *layer.half) / SOFT_EDGE + 0.5, 0, 1)
     shown = map_coordinates(cover, [q + cover.shape[0] / 2, p + cover.shape[1] / 2], order=1, mode="reflect")
     top[alpha > 0.5] = index
     return view * (1 - alpha) + shown * alpha
 
 
-def _seen_by_both(top: NDArray[np.int_], top_right: NDArray[np.int_], disparity: Array, row_offset: float) -> NDArray[np.bool_]:
+def _seen_by_both(
+    top: NDArray[np.int_], top_right: NDArray[np.int_], disparity: Array, row_offset: float
+) -> NDArray[np.bool_]:
     """Where the right view shows the same layer at the place of the match."""
     height, width = top.shape
     rows, columns = np.mgrid[:height, :width].astype(float)
@@ -294,7 +317,7 @@ def pillar() -> Scene:
 
 
 def tiny() -> Scene:
-    """Small things, two of them no nearer to one another in depth than in the picture."""
+    """Small objects, two of them no nearer to one another in depth than in the image."""
     layers = (
         wall(320, 240, 2, -30, 4),
         Layer("box", 1, (150, 150), (8, 0), -10, 0, (12, 16), 7),
@@ -309,7 +332,7 @@ def fence() -> Scene:
     layers = (
         wall(320, 240, 0, -30, 10),
         Layer("person", 1, (200, 240), (9, 0), -18, 0, (45, 110), 16),
-        # One grey all over: only its roughness tells a pale from the next.
+        # One grey level: pales differ by their roughness only.
         Layer("pales", 2, (320, 320), (-3, 0), -8, 0, (420, 110), 2000),
     )
     return Scene("fence", layers, 6, 0.0, 9)
@@ -319,8 +342,12 @@ def textured_fence() -> Scene:
     """The same before a smaller fence that is as rough as everything else: its pales look less alike."""
     plain = fence()
     wall_, person, pales = plain.layers
-    return replace(plain, name="fence, textured", layers=(wall_, person, replace(pales, half=(200, 60), cell=14)))
+    return replace(
+        plain, name="fence, textured", layers=(wall_, person, replace(pales, half=(200, 60), cell=14))
+    )
 
 
-SCENES: dict[str, Callable[[], Scene]] = {scene.__name__: scene for scene in (crossing, curved, cart, passing, pillar, tiny, small, fence)}
+SCENES: dict[str, Callable[[], Scene]] = {
+    scene.__name__: scene for scene in (crossing, curved, cart, passing, pillar, tiny, small, fence)
+}
 """Every scene, by name."""

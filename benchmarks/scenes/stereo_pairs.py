@@ -1,4 +1,5 @@
-"""Single pairs of views with a known disparity: steps of the synthetic scenes, two stills of Middlebury, one pair of KITTI."""
+"""Single pairs of views with a known disparity: steps of the synthetic scenes, two stills of Middlebury,
+one pair of KITTI."""
 
 from __future__ import annotations
 
@@ -42,7 +43,9 @@ def scene_pairs(scene: Scene) -> list[Pair]:
     """The steps of a scene that are averaged over."""
     film = scene.film()
     steps = [film[t] for t in STEPS[scene.name]]
-    return [Pair(s.left, s.right, s.disparity, s.visible, scene.disparity_range, scene.row_offset) for s in steps]
+    return [
+        Pair(s.left, s.right, s.disparity, s.visible, scene.disparity_range, scene.row_offset) for s in steps
+    ]
 
 
 def _raw(path: Path) -> NDArray[np.floating]:
@@ -53,7 +56,9 @@ def _raw(path: Path) -> NDArray[np.floating]:
     return image.astype(float)
 
 
-def _pair(folder: Path, views: tuple[str, str], truth: str, scale: float, disparity_range: tuple[int, int]) -> Pair:
+def _pair(
+    folder: Path, views: tuple[str, str], truth: str, scale: float, disparity_range: tuple[int, int]
+) -> Pair:
     """Views and disparity of which 0 is unknown: there nothing is judged."""
     disparity = _raw(folder / truth) / scale
     known = disparity > 0
@@ -75,7 +80,9 @@ def _teddy(data: Path) -> Named:
 def _kitti(data: Path) -> Named:
     folder = data / "kitti2012"
     name = "000151_10.png"
-    return "KITTI 2012 000151, not occluded", _pair(folder, (f"image_0/{name}", f"image_1/{name}"), f"disp_noc/{name}", 256.0, (0, 127))
+    return "KITTI 2012 000151, not occluded", _pair(
+        folder, (f"image_0/{name}", f"image_1/{name}"), f"disp_noc/{name}", 256.0, (0, 127)
+    )
 
 
 READERS: list[Callable[[Path], Named]] = [_tsukuba, _teddy, _kitti]

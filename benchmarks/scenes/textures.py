@@ -1,4 +1,4 @@
-"""Backgrounds and figures of the tracking scenes, drawn by area."""
+"""Backgrounds and figures of the tracking scenes, rendered by area."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ Array = NDArray[np.floating]
 SIZE = 256
 """Width and height of the frames, px."""
 SAMPLES = 8
-"""Samples a pixel is drawn with along each axis."""
+"""Samples of a pixel along each axis."""
 
 
 def background(kind: str, seed: int, size: int = SIZE) -> Array:
     """A still picture (size, size), grey levels 0 to 255, that continues itself across its edges.
 
-    `smooth:s,m,d` is white noise smoothed by a Gaussian of s px, `fractal:b,m,d` white noise with its spectrum divided by the b-th power of the frequency; both
-    have mean m and standard deviation d before they are clipped. `flat:m` is one grey level.
+    `smooth:s,m,d` is white noise smoothed by a Gaussian of s px, `fractal:b,m,d` white noise with its
+    spectrum divided by the b-th power of the frequency; both have mean m and standard deviation d before they
+    are clipped. `flat:m` is one grey level.
     """
     name, _, numbers = kind.partition(":")
     values = [float(number) for number in numbers.split(",")]
@@ -46,20 +47,22 @@ def _divided_by_frequency(white: Array, power: float) -> Array:
 
 
 def shifted(picture: Array, dx: float, dy: float) -> Array:
-    """The picture moved by (dx, dy) px, x right, y down, what leaves on one side coming back on the other: exact for whole pixels, else by cubic splines."""
+    """The picture moved by (dx, dy) px, x right, y down, what leaves on one side coming back on the other:
+    exact for whole pixels, else by cubic splines."""
     if dx == round(dx) and dy == round(dy):
         return np.roll(picture, (round(dy), round(dx)), axis=(0, 1))
     return np.clip(ndimage.shift(picture, (dy, dx), order=3, mode="grid-wrap"), 0.0, 255.0)
 
 
 def texture(side: int, mean: float, deviation: float, sigma: float, seed: int) -> Array:
-    """Surface of a figure `side` px wide, grey levels, a picture with 4 px to spare on each side: noise smoothed by `sigma` px."""
+    """Surface of a figure `side` px wide, grey levels, a picture with 4 px to spare on each side: noise
+    smoothed by `sigma` px."""
     return background(f"smooth:{sigma},{mean},{deviation}", seed, side + 8)
 
 
 @dataclass(frozen=True)
 class Figure:
-    """Something that moves in front of the background; the first axis of its arrays is time (T frames)."""
+    """A figure in front of the background; the first axis of its arrays is time (T frames)."""
 
     centres: Array
     """(T, 2), x and y, px; pixel centres lie at integers."""
@@ -85,7 +88,11 @@ class Figure:
             return
         inside, along, across = self._samples(patch, t)
         cover = _pixel_means(inside.astype(float))
-        light = self.levels[t] * cover if self.surface is None else self.levels[t] * _pixel_means(inside * self._brightness(along, across))
+        light = (
+            self.levels[t] * cover
+            if self.surface is None
+            else self.levels[t] * _pixel_means(inside * self._brightness(along, across))
+        )
         picture[patch] = picture[patch] * (1.0 - cover) + light
 
     def _patch(self, shape: tuple[int, ...], t: int) -> tuple[slice, slice] | None:
@@ -94,12 +101,18 @@ class Figure:
         width, height = self.sizes[t]
         reach = (s * width + c * height) / 2 + 1, (c * width + s * height) / 2 + 1
         middle = self.centres[t][::-1]
-        ends = [(max(0, int(np.floor(m - r))), min(n, int(np.ceil(m + r)) + 1)) for m, r, n in zip(middle, reach, shape, strict=True)]
+        ends = [
+            (max(0, int(np.floor(m - r))), min(n, int(np.ceil(m + r)) + 1))
+            for m, r, n in zip(middle, reach, shape, strict=True)
+        ]
         return None if any(first >= last for first, last in ends) else (slice(*ends[0]), slice(*ends[1]))
 
     def _samples(self, patch: tuple[slice, slice], t: int) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Which samples of the patch lie on it, and where they lie along its width and height, px from its centre."""
-        y, x = (np.arange(SAMPLES * s.start, SAMPLES * s.stop) / SAMPLES + (1 / SAMPLES - 1) / 2 for s in patch)
+        """Which samples of the patch lie on it, and where they lie along its width and height, px from its
+        centre."""
+        y, x = (
+            np.arange(SAMPLES * s.start, SAMPLES * s.stop) / SAMPLES + (1 / SAMPLES - 1) / 2 for s in patch
+        )
         dx, dy = x - self.centres[t, 0], y[:, None] - self.centres[t, 1]
         c, s = np.cos(self.angles[t]), np.sin(self.angles[t])
         along, across = c * dx + s * dy, c * dy - s * dx
@@ -112,7 +125,9 @@ class Figure:
         """The surface at points of its own, by linear interpolation."""
         assert self.surface is not None
         middle = (len(self.surface) - 1) / 2
-        return ndimage.map_coordinates(self.surface, [across + middle, along + middle], order=1, mode="nearest")
+        return ndimage.map_coordinates(
+            self.surface, [across + middle, along + middle], order=1, mode="nearest"
+        )
 
 
 def _pixel_means(samples: Array) -> Array:

@@ -1,11 +1,14 @@
 """Moving targets with exact truth: the paper's three simulations, and scenes that are harder.
 
-Frames are 256 x 256, 51 of them. A figure is drawn by area (8 x 8 samples a pixel) over a background, noise of 2 grey levels is added frame after frame from
-`default_rng(1)`, and the sum is clipped to 0..255 and rounded. Without another word the target is a square of 13 px and level 200 that goes round a circle
-about (128, 128) once in 50 frames.
+Frames are 256 x 256, 51 of them. A figure is drawn by area (8 x 8 samples a pixel) over a background, noise
+of 2 grey levels is added frame after frame from `default_rng(1)`, and the sum is clipped to 0..255 and
+rounded. Without another word the target is a square of 13 px and level 200 that goes round a circle about
+(128, 128) once in 50 frames.
 
-- `simulations()`: 24 scenes: Simulations 1 (square), 2 (square turning 1 degree a frame) and 3 (growing disc) on four backgrounds, radius 8 and 24 px.
-- `sequences()`: 96 of them: eight backgrounds, radius 8 to 32 px. All backgrounds are synthetic; there are no photographs among them.
+- `simulations()`: 24 scenes: Simulations 1 (square), 2 (square turning 1 degree a frame) and 3 (growing disc)
+  on four backgrounds, radius 8 and 24 px.
+- `sequences()`: 96 of them: eight backgrounds, radius 8 to 32 px. All backgrounds are synthetic; there are no
+  photographs among them.
 - `hard()` in :mod:`tracking_hard_scenes`: 28 scenes, each hard in its own way.
 """
 
@@ -31,7 +34,7 @@ NOISE_SEED = 1
 BACKGROUNDS = ("smooth:4,90,20", "smooth:2,90,20", "smooth:2,128,40", "fractal:1,90,30")
 """Those of the 24 simulations."""
 MORE_BACKGROUNDS = ("flat:90", "smooth:8,90,30", "fractal:1,90,15", "fractal:1.5,90,30")
-"""Those that the 96 sequences have besides."""
+"""Further backgrounds of the 96 sequences."""
 BACKGROUND_SEED = 3
 
 
@@ -64,7 +67,7 @@ class Scene:
     planes: tuple[Plane, ...]
     target: Figure
     others: tuple[Figure, ...] = ()
-    """Drawn after the target, in front of it."""
+    """Rendered after the target, in front of it."""
     noise: float = 2.0
     """Standard deviation, grey levels."""
     noise_seed: int = NOISE_SEED
@@ -84,7 +87,8 @@ class Scene:
 
     @property
     def boxes(self) -> Array:
-        """(T, 4), x, y, width, height, px, with x = centre - width / 2; as large as the target, not enlarged by its turning."""
+        """(T, 4), x, y, width, height, px, with x = centre - width / 2; as large as the target, not
+        enlarged by its turning."""
         return self.target.boxes()
 
     @property
@@ -146,7 +150,9 @@ def line(start: tuple[float, float], velocity: tuple[float, float]) -> Array:
     return np.array(start) + TIMES[:, None] * velocity
 
 
-def square(path: Array, side: float = 13.0, level: float | Array = 200.0, degrees: float = 0.0, **more: Any) -> Figure:
+def square(
+    path: Array, side: float = 13.0, level: float | Array = 200.0, degrees: float = 0.0, **more: Any
+) -> Figure:
     """A square on a path, turning by `degrees` a frame."""
     return figure(path, np.full_like(path, side), level, angles=np.deg2rad(degrees) * TIMES, **more)
 
@@ -156,16 +162,41 @@ def disc(path: Array, radii: Array, level: float = 200.0) -> Figure:
     return figure(path, np.stack([2 * radii, 2 * radii], axis=1), level, shape="disc")
 
 
-def figure(path: Array, sizes: Array, level: float | Array, angles: Array | None = None, **more: Any) -> Figure:
+def figure(
+    path: Array, sizes: Array, level: float | Array, angles: Array | None = None, **more: Any
+) -> Figure:
     """A figure on a path."""
-    return Figure(path, sizes, np.zeros(len(path)) if angles is None else angles, np.broadcast_to(np.asarray(level, float), len(path)), **more)
+    return Figure(
+        path,
+        sizes,
+        np.zeros(len(path)) if angles is None else angles,
+        np.broadcast_to(np.asarray(level, float), len(path)),
+        **more,
+    )
 
 
-def simulation(number: int, kind: str, radius: float, *, seed: int = BACKGROUND_SEED, whole: bool = False, noise: float = 2.0) -> Scene:
-    """Simulation 1, 2 or 3 of the paper on a background, on a circle of `radius` px; `whole`: its path rounded to whole pixels."""
+def simulation(
+    number: int,
+    kind: str,
+    radius: float,
+    *,
+    seed: int = BACKGROUND_SEED,
+    whole: bool = False,
+    noise: float = 2.0,
+) -> Scene:
+    """Simulation 1, 2 or 3 of the paper on a background, on a circle of `radius` px; `whole`: its path
+    rounded to whole pixels."""
     path = circle(radius, whole=whole)
-    target = {1: lambda: square(path), 2: lambda: square(path, degrees=1.0), 3: lambda: disc(path, 7.0 + TIMES // 5)}[number]()
-    name = f"S{number} {kind} R {radius:g}" + (", whole pixels" if whole else "") + ("" if noise else ", no noise")
+    target = {
+        1: lambda: square(path),
+        2: lambda: square(path, degrees=1.0),
+        3: lambda: disc(path, 7.0 + TIMES // 5),
+    }[number]()
+    name = (
+        f"S{number} {kind} R {radius:g}"
+        + (", whole pixels" if whole else "")
+        + ("" if noise else ", no noise")
+    )
     return Scene(name, (Plane(kind, seed),), target, noise=noise)
 
 
@@ -177,7 +208,9 @@ def simulations() -> Iterator[Scene]:
 def sequences() -> Iterator[Scene]:
     """The 96 sequences of Simulations 1 to 3."""
     kinds = BACKGROUNDS + MORE_BACKGROUNDS
-    return (simulation(n, kind, radius) for n in (1, 2, 3) for kind in kinds for radius in (8.0, 16.0, 24.0, 32.0))
+    return (
+        simulation(n, kind, radius) for n in (1, 2, 3) for kind in kinds for radius in (8.0, 16.0, 24.0, 32.0)
+    )
 
 
 def published() -> Iterator[Scene]:

@@ -1,4 +1,5 @@
-"""Starts that are not exact: boxes that are too large round figures that do not fill them, of another aspect, or beside the target."""
+"""Starts that are not exact: boxes that are too large round figures that do not fill them, of another
+aspect, or beside the target."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ class Outline(Figure):
     outline: str = "diamond"
 
     def _samples(self, patch: tuple[slice, slice], t: int) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Which samples of the patch lie on it, and where they lie along its width and height, px from its centre."""
+        """Which samples of the patch lie on it, and where they lie along its width and height, px from its
+        centre."""
         _, right, down = super()._samples(patch, t)
         right, down = np.broadcast_arrays(right, down)
         return _inside(self.outline, right, down, self.sizes[t, 0] / 2), right, down
@@ -41,7 +43,9 @@ def _inside(outline: str, right: Array, down: Array, half: float) -> NDArray[np.
     if outline == "diamond":
         return np.abs(right) + np.abs(down) <= half
     if outline == "cross":
-        return (np.maximum(np.abs(right), np.abs(down)) <= half) & (np.minimum(np.abs(right), np.abs(down)) <= half / 3)
+        return (np.maximum(np.abs(right), np.abs(down)) <= half) & (
+            np.minimum(np.abs(right), np.abs(down)) <= half / 3
+        )
     if outline == "ring":
         distance = np.hypot(right, down)
         return (distance <= half) & (distance >= 0.55 * half)
@@ -51,8 +55,15 @@ def _inside(outline: str, right: Array, down: Array, half: float) -> NDArray[np.
 def outlined(outline: str, side: float, larger: float, kind: str, seed: int) -> Scene:
     """A figure with that outline on a circle, begun with a box so many times as large as its own."""
     path = circle(RADIUS)
-    target = Outline(path, np.full_like(path, side), np.zeros(len(TIMES)), np.full(len(TIMES), 200.0), outline=outline)
-    return Scene(f"{outline} {side:g} px, box {larger:g} times as large", (Plane(kind, seed),), target, start=_changed(target, (larger, larger, 0.0, 0.0)))
+    target = Outline(
+        path, np.full_like(path, side), np.zeros(len(TIMES)), np.full(len(TIMES), 200.0), outline=outline
+    )
+    return Scene(
+        f"{outline} {side:g} px, box {larger:g} times as large",
+        (Plane(kind, seed),),
+        target,
+        start=_changed(target, (larger, larger, 0.0, 0.0)),
+    )
 
 
 def stretched(box: str, side: float, kind: str, seed: int) -> Scene:

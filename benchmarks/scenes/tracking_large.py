@@ -8,15 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scenes.textures import Array, background, shifted, texture
-from benchmarks.scenes.tracking import (
-    BACKGROUND_SEED,
-    CENTRE,
-    TIMES,
-    Plane,
-    Scene,
-    circle,
-    square,
-)
+from benchmarks.scenes.tracking import BACKGROUND_SEED, CENTRE, TIMES, Plane, Scene, circle, square
 
 WIDTH, HEIGHT = 720, 480
 SIDE = 80.0
@@ -46,7 +38,15 @@ class LargeScene(Scene):
 
 def large() -> list[Scene]:
     """The scene with a camera that stands still, and with one that pans."""
-    target = square(circle(RADIUS) - CENTRE + (WIDTH / 2, HEIGHT / 2), SIDE, 1.0, surface=texture(int(SIDE), 170.0, 30.0, 3.0, 7))
+    target = square(
+        circle(RADIUS) - CENTRE + (WIDTH / 2, HEIGHT / 2),
+        SIDE,
+        1.0,
+        surface=texture(int(SIDE), 170.0, 30.0, 3.0, 7),
+    )
     pan = TIMES[:, None] * PAN
-    planes = {"still camera": Plane("fractal:1,90,30", BACKGROUND_SEED), "camera pans": Plane("fractal:1,90,30", BACKGROUND_SEED, pan)}
+    planes = {
+        "still camera": Plane("fractal:1,90,30", BACKGROUND_SEED),
+        "camera pans": Plane("fractal:1,90,30", BACKGROUND_SEED, pan),
+    }
     return [LargeScene(f"80 px in 720 x 480, {name}", (plane,), target) for name, plane in planes.items()]

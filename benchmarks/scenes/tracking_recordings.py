@@ -50,13 +50,21 @@ def read_all(data: Path) -> Iterator[Recording | str]:
 def crossing(data: Path) -> Iterator[Recording]:
     """A pedestrian of low contrast: folder `track_otb/Crossing`."""
     folder = data / "track_otb" / "Crossing"
-    boxes = np.array([line.replace(",", " ").split() for line in (folder / "groundtruth_rect.txt").read_text().split("\n") if line.strip()], float)
+    boxes = np.array(
+        [
+            line.replace(",", " ").split()
+            for line in (folder / "groundtruth_rect.txt").read_text().split("\n")
+            if line.strip()
+        ],
+        float,
+    )
     frames = np.stack([read_grey(folder / "img" / f"{k + 1:04d}.jpg") for k in range(len(boxes))])
     yield Recording("Crossing", frames, _truth(boxes))
 
 
 def campus(data: Path) -> Iterator[Recording]:
-    """Pedestrians who hide each other before a still camera, one recording each: folder `track_mot15/TUD-Campus`."""
+    """Pedestrians who hide each other before a still camera, one recording each: folder
+    `track_mot15/TUD-Campus`."""
     folder = data / "track_mot15" / "TUD-Campus"
     boxes: dict[int, dict[int, list[float]]] = {}
     with (folder / "gt" / "gt.txt").open(newline="") as file:
@@ -71,7 +79,8 @@ def campus(data: Path) -> Iterator[Recording]:
 
 
 def _truth(boxes: NDArray[np.floating]) -> Truth:
-    """The truth from boxes (T, 4) whose corner is counted from 1, to the corner of the first pixel; NaN where there is none."""
+    """The truth from boxes (T, 4) whose corner is counted from 1, to the corner of the first pixel; NaN
+    where there is none."""
     ours = boxes - (1.5, 1.5, 0.0, 0.0)
     return Truth(ours, np.isfinite(ours).all(axis=1) & (np.arange(len(ours)) > 0))
 

@@ -39,7 +39,8 @@ def inside(shape: tuple[int, ...], margin: int) -> Mask:
 
 
 def usable(truth: Array) -> Mask:
-    """Where the Jacobian is compared: 12 px from the frame's edge, 4 px from where the true Jacobian is unknown, and off motion boundaries."""
+    """Where the Jacobian is compared: 12 px from the frame's edge, 4 px from where the true Jacobian is
+    unknown, and off motion boundaries."""
     jacobian = differences(truth)
     unknown = ~np.isfinite(jacobian).all(axis=(-2, -1))
     edge = np.abs(np.where(unknown[..., None, None], 0.0, jacobian)).max(axis=(-2, -1)) >= EDGE
@@ -52,7 +53,8 @@ def root_mean_square(values: Array) -> float:
 
 
 def end_point_error(flow: Array, truth: Array, where: Mask | None = None) -> tuple[float, float]:
-    """Mean length of `flow - truth`, px, and the share of the pixels with a truth that have a flow; over `where` if given."""
+    """Mean length of `flow - truth`, px, and the share of the pixels with a truth that have a flow; over
+    `where` if given."""
     known = np.isfinite(truth).all(axis=-1)
     if where is not None:
         known &= where

@@ -1,4 +1,5 @@
-"""Errors of 3-D motion: angles, squared Mahalanobis distances, and when an estimate with status `ok` is wrong."""
+"""Errors of 3-D motion: angles, squared Mahalanobis distances, and when an estimate with status `ok` is
+wrong."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from jacoflow import motion3d
 
 Array = NDArray[np.float64]
 FAR_OFF, DEVIATIONS = 15.0, 4.0
-"""An `ok` is wrong beyond both: degrees, and stated deviations."""
+"""An `ok` is wrong beyond both: degrees, and standard deviations."""
 ELLIPSE = 5.991
 """95 % of chi squared with two degrees of freedom."""
 ELLIPSOID = 11.070

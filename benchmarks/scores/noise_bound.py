@@ -1,4 +1,4 @@
-"""How well a window of brightness can tell an affine motion at all, given the camera's noise."""
+"""How well a window of brightness determines an affine motion, given the noise of the camera."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ WINDOWS = (3.0, 4.5, 6.5, 9.0, 12.5, 18.0, 27.0)
 
 
 def moments(plane: Array, weights: Array, offsets: Array, power_x: int, power_y: int) -> Array:
-    """`sum_d weight(dx) weight(dy) dx^power_x dy^power_y plane(p + d)` at every pixel p; nothing lies beyond the edge."""
+    """`sum_d weight(dx) weight(dy) dx^power_x dy^power_y plane(p + d)` at every pixel p; nothing lies
+    beyond the edge."""
     from scipy.ndimage import correlate1d
 
     along_x = correlate1d(plane, weights * offsets**power_x, axis=1, mode="constant")
@@ -27,7 +28,8 @@ def moments(plane: Array, weights: Array, offsets: Array, power_x: int, power_y:
 
 
 def normal_matrix(gradient: Array, weights: Array, offsets: Array) -> Array:
-    """`N = sum_d w(d) a a^T` (H, W, 6, 6) of the rows `a = (g_x, g_y, g_x dx, g_y dx, g_x dy, g_y dy)` at `p + d`.
+    """`N = sum_d w(d) a a^T` (H, W, 6, 6) of the rows `a = (g_x, g_y, g_x dx, g_y dx, g_x dy, g_y dy)` at `p
+    + d`.
 
     Unknowns in the order (u, v, u_x, v_x, u_y, v_y) of the window's middle.
     """
@@ -46,14 +48,18 @@ def normal_matrix(gradient: Array, weights: Array, offsets: Array) -> Array:
 
 
 def covariance(gradient: Array, window: float, noise: float, frames: int = 2) -> Array:
-    """The least-squares noise bound: covariance (H, W, 6, 6) of (u, v, u_x, v_x, u_y, v_y), px/frame and 1/frame squared, from a Gaussian window.
+    """The least-squares noise bound: covariance (H, W, 6, 6) of (u, v, u_x, v_x, u_y, v_y), px/frame and
+    1/frame squared, from a Gaussian window.
 
-    In the window about a pixel each pixel p + d gives one equation of an affine motion (brightness constancy, the first row of the system),
-    `g . (u + u_x dx + u_y dy, v + v_x dx + v_y dy) = -(difference of the frames) + e`, with the exact gradient g of the texture (`gradient`, (H, W, 2), grey
-    levels/px) and an error e that is the frames' noise alone: variance `2 s^2` for the difference of a pair, `s^2 / 2` for half the difference of the
-    outer frames of a triple, where `s^2 = noise^2 + 1/12` counts the rounding. Weighted with `w = exp(-|d|^2 / (2 window^2))`, least squares has the covariance
-    `N^-1 (sum w^2 a a^T) N^-1 var(e)`, `N = sum w a a^T`: what remains when texture, motion model and window are perfect and only noise is left.
-    Gradients that must be taken from noisy frames, bent flow within the window and interpolation all come on top.
+    In the window about a pixel each pixel p + d gives one equation of an affine motion (brightness constancy,
+    the first row of the system), `g . (u + u_x dx + u_y dy, v + v_x dx + v_y dy) = -(difference of the
+    frames) + e`, with the exact gradient g of the texture (`gradient`, (H, W, 2), grey levels/px) and an
+    error e that is the frames' noise alone: variance `2 s^2` for the difference of a pair, `s^2 / 2` for half
+    the difference of the outer frames of a triple, where `s^2 = noise^2 + 1/12` counts the rounding. Weighted
+    with `w = exp(-|d|^2 / (2 window^2))`, least squares has the covariance `N^-1 (sum w^2 a a^T) N^-1
+    var(e)`, `N = sum w a a^T`: what remains when texture, motion model and window are perfect and only noise
+    is left. Gradients that must be taken from noisy frames, bent flow within the window and interpolation all
+    come on top.
     """
     radius = int(np.ceil(TRUNCATION * window))
     offsets = np.arange(-radius, radius + 1, dtype=float)
@@ -64,10 +70,12 @@ def covariance(gradient: Array, window: float, noise: float, frames: int = 2) ->
 
 
 def plain_window(slopes: bool) -> float:
-    """Width of the plain Gaussian window that is as noisy as one of fourth order, over that one's; for the flow, or for its `slopes`.
+    """Width of the plain Gaussian window that is as noisy as one of fourth order, over that one's; for the
+    flow, or for its `slopes`.
 
-    White noise of unit density leaves `integral H^2 w dw / (2 pi)` in the flow and `integral H^2 w^3 dw / (4 pi)` in a slope, `H = sum_n c_n exp(-n s^2 w^2 / 2)`:
-    `sum_nm c_n c_m 2 / (n + m)` and `sum_nm c_n c_m 4 / (n + m)^2` times what a plain window leaves, which goes with `s^-2` and `s^-4`.
+    White noise of unit density leaves `integral H^2 w dw / (2 pi)` in the flow and `integral H^2 w^3 dw / (4
+    pi)` in a slope, `H = sum_n c_n exp(-n s^2 w^2 / 2)`: `sum_nm c_n c_m 2 / (n + m)` and `sum_nm c_n c_m 4 /
+    (n + m)^2` times what a plain window leaves, which goes with `s^-2` and `s^-4`.
     """
     orders = np.arange(1, len(TERMS) + 1)
     pairs = 2.0 / np.add.outer(orders, orders)
@@ -75,10 +83,14 @@ def plain_window(slopes: bool) -> float:
     return more ** (-0.25 if slopes else -0.5)
 
 
-def jacobian_bound(gradient: Array, window: float | Array, noise: float, where: NDArray[np.bool_], frames: int = 2) -> float:
-    """Root mean square over `where` and the four derivatives of the deviations of :func:`covariance`, 1/frame; `window` may be an array (H, W), px.
+def jacobian_bound(
+    gradient: Array, window: float | Array, noise: float, where: NDArray[np.bool_], frames: int = 2
+) -> float:
+    """Root mean square over `where` and the four derivatives of the deviations of :func:`covariance`,
+    1/frame; `window` may be an array (H, W), px.
 
-    For an array, variances at its pixels lie on straight lines, in logarithms, between those of `STEPS` windows.
+    For an array, variances at its pixels lie on straight lines, in logarithms, between those of `STEPS`
+    windows.
     """
     if np.ndim(window) == 0:
         return float(np.sqrt(slope_variance(gradient, float(window), noise, frames)[where].mean()))
@@ -97,19 +109,31 @@ def slope_variance(gradient: Array, window: float, noise: float, frames: int) ->
     return np.diagonal(covariance(gradient, window, noise, frames), axis1=-2, axis2=-1)[..., 2:].mean(axis=-1)
 
 
-def efficient_end_point_error(gradient: Array, truth: Array, noise: float, where: NDArray[np.bool_], frames: int = 2) -> float:
-    """Mean end-point error, px, of least squares in the best single window of fourth order, chosen with the truth.
+def efficient_end_point_error(
+    gradient: Array, truth: Array, noise: float, where: NDArray[np.bool_], frames: int = 2
+) -> float:
+    """Mean end-point error, px, of least squares in the best single window of fourth order, chosen with the
+    truth.
 
-    In each of the `WINDOWS` the true flow loses what the window smooths away, and has an error of the covariance that :func:`covariance` tells of a plain window as
-    noisy: gradients are exact, frames are aligned without error. No estimate that is as smooth everywhere, and no smoother than its data, does much better.
+    In each of the `WINDOWS` the true flow loses what the window smooths away, and has an error of the
+    covariance that :func:`covariance` tells of a plain window as noisy: gradients are exact, frames are
+    aligned without error. No estimate that is as smooth everywhere, and no smoother than its data, does much
+    better.
     """
     from scipy.ndimage import gaussian_filter
 
     draw = np.random.default_rng(0).standard_normal((*truth.shape[:2], 2))
     errors = []
     for window in WINDOWS:
-        once = [gaussian_filter(truth, (np.sqrt(n) * window, np.sqrt(n) * window, 0), mode="nearest") for n in range(1, len(TERMS) + 1)]
+        once = [
+            gaussian_filter(truth, (np.sqrt(n) * window, np.sqrt(n) * window, 0), mode="nearest")
+            for n in range(1, len(TERMS) + 1)
+        ]
         lost = sum(term * part for term, part in zip(TERMS, once, strict=True)) - truth
-        spread = np.linalg.cholesky(covariance(gradient, window * plain_window(slopes=False), noise, frames)[..., :2, :2])
-        errors.append(np.linalg.norm(lost + np.einsum("...ij,...j->...i", spread, draw), axis=-1)[where].mean())
+        spread = np.linalg.cholesky(
+            covariance(gradient, window * plain_window(slopes=False), noise, frames)[..., :2, :2]
+        )
+        errors.append(
+            np.linalg.norm(lost + np.einsum("...ij,...j->...i", spread, draw), axis=-1)[where].mean()
+        )
     return float(min(errors))

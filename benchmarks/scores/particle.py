@@ -1,4 +1,5 @@
-"""How well several targets were followed: success by the centre and the overlap, and the measures of multiple object tracking."""
+"""How well several targets were followed: success by the centre and the overlap, and the measures of
+multiple object tracking."""
 
 from __future__ import annotations
 
@@ -21,12 +22,19 @@ LAST_OVERLAP = 0.3
 """Mean intersection over union there that a success needs."""
 FOUND = 0.5
 """Intersection over union from which on a box counts as found."""
-MEASURES = {"mota": "MOTA", "idf1": "IDF1", "num_switches": "switches", "num_false_positives": "false", "num_misses": "missed"}
+MEASURES = {
+    "mota": "MOTA",
+    "idf1": "IDF1",
+    "num_switches": "switches",
+    "num_false_positives": "false",
+    "num_misses": "missed",
+}
 """Measures of py-motmetrics and what the tables call them."""
 
 
 def overlaps(boxes: Array, truth: Array) -> Array:
-    """Intersection over union (T, K) of boxes (T, K, 4); 0 where there is no box, NaN where there is no truth."""
+    """Intersection over union (T, K) of boxes (T, K, 4); 0 where there is no box, NaN where there is no
+    truth."""
     known = np.isfinite(truth).all(axis=-1)
     result = overlap(boxes.reshape(-1, 4), truth.reshape(-1, 4)).reshape(known.shape)
     return np.where(known, np.nan_to_num(result), np.nan)
@@ -41,8 +49,9 @@ def held(boxes: Array) -> Array:
 
 
 def success(boxes: Array, truth: Array) -> list[dict[str, float]]:
-    """Figures of each target: `success` (0 or 1: the centre in its true box in 80 % of the frames, and mean overlap of 0.3 in the last ten), mean
-    `overlap` and mean `centre_error`, px. Where a tracker gives no box its last one stands."""
+    """Figures of each target: `success` (0 or 1: the centre in its true box in 80 % of the frames, and mean
+    overlap of 0.3 in the last ten), mean `overlap` and mean `centre_error`, px. Where a tracker gives no box
+    its last one stands."""
     boxes = held(boxes)
     shares = overlaps(boxes, truth)
     offsets = np.abs(boxes[..., :2] + boxes[..., 2:] / 2 - truth[..., :2] - truth[..., 2:] / 2)
@@ -67,10 +76,12 @@ def ended_at_truth(boxes: Array, truth: Array) -> Array:
 
 
 def multiple_object(boxes: Array, truth: Array) -> dict[str, float]:
-    """MOTA, IDF1, identity switches, false and missed boxes by py-motmetrics, boxes found with an overlap of 0.5 or more; empty without that package.
+    """MOTA, IDF1, identity switches, false and missed boxes by py-motmetrics, boxes found with an overlap of
+    0.5 or more; empty without that package.
 
-    K. Bernardin and R. Stiefelhagen, "Evaluating multiple object tracking performance: the CLEAR MOT metrics", 2008; E. Ristani et al., "Performance
-    measures and a data set for multi-target, multi-camera tracking", 2016.
+    K. Bernardin and R. Stiefelhagen, "Evaluating multiple object tracking performance: the CLEAR MOT
+    metrics", 2008; E. Ristani et al., "Performance measures and a data set for multi-target, multi-camera
+    tracking", 2016.
     """
     if motmetrics is None:
         return {}

@@ -1,6 +1,7 @@
-"""How well clusters of edge pixels follow the objects of a scene with known truth: purity, recall, paths, identities, errors of the motion.
+"""Clusters of edge pixels beside the objects of a scene: purity, recall, paths, tracks, errors of motion.
 
-A film's truth is one `Truth` a step. What a tracker said of it is one `Clustering` a step (edge pixels with the component of each) and the nodes and arcs of its graph.
+The truth of a sequence is one `Truth` a step. The output of a tracker is one `Clustering` a step (edge pixels
+with the component of each) and the nodes and arcs of its graph.
 """
 
 from __future__ import annotations
@@ -79,7 +80,8 @@ class Graph:
 
 @dataclass(frozen=True)
 class Cluster:
-    """A cluster seen with the truth: its majority label, that label's share, how many pixels, the label's pixels among them and their true motion."""
+    """A cluster seen with the truth: its majority label, that label's share, how many pixels, the label's
+    pixels among them and their true motion."""
 
     label: int
     purity: float
@@ -90,7 +92,8 @@ class Cluster:
     place: Array
     """Their medians along x and y, px."""
     motion_at: Array
-    """An affine map of their true motion, (3, 3): from (x - place, y - place, 1) to (u, v, w), by least squares; exact where they are of one plane or of what grows."""
+    """An affine map of their true motion, (3, 3): from (x - place, y - place, 1) to (u, v, w), by least
+    squares; exact where they are of one plane or of what grows."""
 
 
 def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
@@ -109,7 +112,9 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
         place = np.array([np.median(columns), np.median(rows)])
         offsets = np.stack([columns - place[0], rows - place[1], np.ones(len(rows))], axis=1)
         motion_at = np.linalg.lstsq(offsets, motions[right], rcond=None)[0]
-        out[int(component)] = Cluster(int(major), share, int(mine.sum()), rows, columns, motion, place, motion_at)
+        out[int(component)] = Cluster(
+            int(major), share, int(mine.sum()), rows, columns, motion, place, motion_at
+        )
     return out
 
 
@@ -131,9 +136,12 @@ class Scores:
         return [area >= VISIBLE * max(areas) for area in areas]
 
     def recall(self, label: int) -> float:
-        """Share of an object's edge pixels in clusters where it is the majority, over the steps at which it is visible."""
+        """Share of an object's edge pixels in clusters where it is the majority, over the steps at which
+        it is visible."""
         right, all_ = 0, 0
-        for truth, clustering, clusters, seen in zip(self.truths, self.clusterings, self.told, self.seen(label), strict=True):
+        for truth, clustering, clusters, seen in zip(
+            self.truths, self.clusterings, self.told, self.seen(label), strict=True
+        ):
             if seen:
                 mine = truth.label[clustering.rows, clustering.columns] == label
                 major = np.array([clusters[int(k)].label == label for k in clustering.component[mine]], bool)
@@ -165,7 +173,8 @@ class Scores:
         return count
 
     def path(self, label: int) -> int:
-        """Over how many steps the chain of strongest arcs from the object's largest cluster stays on it, until it is hidden."""
+        """Over how many steps the chain of strongest arcs from the object's largest cluster stays on it,
+        until it is hidden."""
         at = self.largest(0, label)
         chain = [at]
         for time in range(self.first_hidden(label) - 1):
@@ -175,7 +184,8 @@ class Scores:
         return self._steps(label, chain)
 
     def index_kept(self, label: int) -> int:
-        """Over how many steps the component that is the object's largest cluster at first stays on it, until it is hidden."""
+        """Over how many steps the component that is the object's largest cluster at first stays on it,
+        until it is hidden."""
         return self._steps(label, [self.largest(0, label)] * self.first_hidden(label))
 
     def id_kept(self, label: int) -> int:
@@ -184,11 +194,15 @@ class Scores:
         if first is None:
             return 0
         wanted = self.graph.nodes[0, first].track_id
-        by_step = [{node.track_id: k for (t, k), node in self.graph.nodes.items() if t == time} for time in range(len(self.told))]
+        by_step = [
+            {node.track_id: k for (t, k), node in self.graph.nodes.items() if t == time}
+            for time in range(len(self.told))
+        ]
         return self._steps(label, [ids.get(wanted) for ids in by_step])
 
     def id_share(self, label: int) -> float:
-        """Share of the steps at which an object is visible where the track that is a main one of it most often is: one whose cluster has at least half as many of its pixels as its largest cluster."""
+        """Share of the steps at which an object is visible where the track that is a main one of it most
+        often is: one whose cluster has at least half as many of its pixels as its largest cluster."""
         times = [time for time, seen in enumerate(self.seen(label)) if seen]
         tracks = [track for time in times for track in self._main_tracks(time, label)]
         return max((tracks.count(track) for track in tracks), default=0) / max(1, len(times))
@@ -196,7 +210,9 @@ class Scores:
     def _main_tracks(self, time: int, label: int) -> set[int]:
         """Tracks of the object's largest cluster and of those at least half as large."""
         sizes = {k: cluster.pixels for k, cluster in self.told[time].items() if cluster.label == label}
-        return {self.graph.nodes[time, k].track_id for k, size in sizes.items() if 2 * size >= max(sizes.values())}
+        return {
+            self.graph.nodes[time, k].track_id for k, size in sizes.items() if 2 * size >= max(sizes.values())
+        }
 
     def _track(self, time: int, label: int) -> int | None:
         """Track of the object's largest cluster."""
@@ -204,8 +220,10 @@ class Scores:
         return None if largest is None else self.graph.nodes[time, largest].track_id
 
     def recognised(self, label: int) -> bool | None:
-        """Whether the object's largest cluster, from the third step on after it was hidden until it is hidden again, is on one of the tracks that its main clusters had at the last three steps before that (two things may have been one object all along). Steps at which it has no cluster of its own,
-        which `recall` counts, are left out. None where it never comes back for two steps."""
+        """Whether the object's largest cluster, from the third step on after it was hidden until it is hidden
+        again, is on one of the tracks that its main clusters had at the last three steps before that (two
+        things may have been one object all along). Steps at which it has no cluster of its own, which
+        `recall` counts, are left out. None where it never comes back for two steps."""
         seen = self.seen(label)
         hidden = self.first_hidden(label)
         back = next((t for t in range(hidden, len(seen)) if seen[t]), None)
@@ -214,7 +232,9 @@ class Scores:
         gone = next((t for t in range(back, len(seen)) if not seen[t]), len(seen))
         if gone - back < 2:
             return None
-        before = {track for time in range(max(0, hidden - 3), hidden) for track in self._main_tracks(time, label)}
+        before = {
+            track for time in range(max(0, hidden - 3), hidden) for track in self._main_tracks(time, label)
+        }
         own = [time for time in range(back, gone) if self.largest(time, label) is not None]
         return bool(own) and all(self._track(time, label) in before for time in own[2:] or own[-1:])
 
@@ -227,9 +247,12 @@ class Scores:
         return sum(len(times) == 1 for times in begun) / max(1, len(begun))
 
     def grouped(self, label: int) -> tuple[float, float, float]:
-        """Share of an object's edge pixels in its largest cluster, in its largest group, and share of that group's pixels that are the object's; means over the steps after the first at which it is visible."""
+        """Share of an object's edge pixels in its largest cluster, in its largest group, and share of that
+        group's pixels that are the object's; means over the steps after the first at which it is visible."""
         shares = []
-        for time, (truth, clustering, seen) in enumerate(zip(self.truths, self.clusterings, self.seen(label), strict=True)):
+        for time, (truth, clustering, seen) in enumerate(
+            zip(self.truths, self.clusterings, self.seen(label), strict=True)
+        ):
             if time == 0 or not seen:
                 continue
             mine = truth.label[clustering.rows, clustering.columns] == label
@@ -238,24 +261,42 @@ class Scores:
             names, of_groups = np.unique(groups[mine], return_counts=True)
             if len(of_groups):
                 largest = groups == names[np.argmax(of_groups)]
-                shares.append((of_clusters.max() / mine.sum(), of_groups.max() / mine.sum(), (largest & mine).sum() / largest.sum()))
+                shares.append(
+                    (
+                        of_clusters.max() / mine.sum(),
+                        of_groups.max() / mine.sum(),
+                        (largest & mine).sum() / largest.sum(),
+                    )
+                )
         first, second, third = np.mean(shares, axis=0) if shares else (0.0, 0.0, 0.0)
         return float(first), float(second), float(third)
 
     def groups(self) -> float:
         """Groups of a step after the first, mean."""
-        counts = [len({node.group for (t, _), node in self.graph.nodes.items() if t == time}) for time in range(1, len(self.told))]
+        counts = [
+            len({node.group for (t, _), node in self.graph.nodes.items() if t == time})
+            for time in range(1, len(self.told))
+        ]
         return float(np.mean(counts))
 
     def motion_errors(self, told: Literal["affine", "velocity", "median"] = "affine") -> dict[int, Array]:
-        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority. `affine`: the median of its affine motion over that label's pixels in it beside the median of the truth there. `velocity`: its velocity beside the
-        true motion of that label at the cluster's `middle`, where it is told. `median`: its velocity beside the median of the truth, as section 5.2 words it: where motion changes by px within a cluster, one row too many or too few of its outline makes .06 px."""
+        """|error| of (u, v, w) of every pure cluster, (N, 3), px and disparity, by the label of its majority.
+
+        `affine`: median of the affine motion over the label's pixels beside the median of the truth there.
+        `velocity`: velocity beside the truth of the label at the cluster's `middle`, where that is known.
+        `median`: velocity beside the median of the truth (section 5.2); one row of pixels too many makes .06
+        px where the motion varies.
+        """
         errors = defaultdict(list)
         for time, clusters in enumerate(self.told[:-1]):
             for component, cluster in clusters.items():
                 node = self.graph.nodes[time, component]
                 if cluster.purity >= PURE and node.velocity is not None:
-                    said = np.median(node.motion(cluster.columns, cluster.rows), axis=0) if told == "affine" else node.velocity
+                    said = (
+                        np.median(node.motion(cluster.columns, cluster.rows), axis=0)
+                        if told == "affine"
+                        else node.velocity
+                    )
                     true = cluster.motion
                     if told == "velocity" and node.middle is not None:
                         true = np.array([*(node.middle - cluster.place), 1.0]) @ cluster.motion_at
@@ -264,12 +305,14 @@ class Scores:
 
 
 def gross(errors: Array) -> float:
-    """Share of motions (N, 3) that are off by more than the gross errors, in the picture by the length of the error."""
+    """Share of motions (N, 3) that are off by more than the gross errors, in the picture by the length of
+    the error."""
     off = (np.hypot(errors[:, 0], errors[:, 1]) > GROSS[0]) | (errors[:, 2] > GROSS[1])
     return float(off.mean())
 
 
 def gross_along(errors: Array) -> float:
-    """The same, in the picture by the error along x or along y: of motions in whole cells of 8 px, one of 22 px/step is off by 2 px along x, and by its length whenever anything is left along y."""
+    """The same, in the picture by the error along x or along y: of motions in whole cells of 8 px, one of
+    22 px/step is off by 2 px along x, and by its length whenever anything is left along y."""
     off = (errors[:, :2] > GROSS[0]).any(axis=1) | (errors[:, 2] > GROSS[1])
     return float(off.mean())

@@ -14,7 +14,7 @@ _TASKS = Path("/proc/self/task")
 
 
 def _thread_times() -> dict[str, float] | None:
-    """CPU seconds of every other thread of this process; None where the system does not tell."""
+    """CPU seconds of every other thread of this process; None where the system has no such file."""
     try:
         tasks = [task for task in _TASKS.iterdir() if task.name != str(threading.get_native_id())]
         return {task.name: int((task / "schedstat").read_text().split()[0]) * 1e-9 for task in tasks}
@@ -36,15 +36,22 @@ def once(work: Callable[[], object]) -> Time:
     """Runs `work` and measures it."""
     before, cpu, clock, own = _thread_times(), time.process_time(), time.perf_counter(), time.thread_time()
     work()
-    own, wall, cpu, after = time.thread_time() - own, time.perf_counter() - clock, time.process_time() - cpu, _thread_times()
+    own, wall, cpu, after = (
+        time.thread_time() - own,
+        time.perf_counter() - clock,
+        time.process_time() - cpu,
+        _thread_times(),
+    )
     if before is None or after is None:
         return Time(cpu, wall)
-    # Asking for the times of many threads takes milliseconds of this one: its own are taken right around the work.
+    # Asking for the times of many threads takes milliseconds of this one: its own are taken right around the
+    # work.
     return Time(max(own, *(spent - before.get(thread, 0.0) for thread, spent in after.items()), 0.0), wall)
 
 
 def race(contestants: dict[Name, Callable[[], object]], rounds: int) -> dict[Name, Time]:
-    """The best of `rounds` runs of each, taken in turns so that a noisy neighbour hits all alike; one run of each goes unmeasured before."""
+    """The best of `rounds` runs of each, taken in turns so that a noisy neighbour hits all alike; one run
+    of each goes unmeasured before."""
     best: dict[Name, Time] = {}
     for work in contestants.values():
         work()

@@ -14,12 +14,13 @@ NEAR = 3.0
 OVERLAP = 0.5
 """A box counts as found with more than this share of intersection over union."""
 SETTLED = 6
-"""Frames before this one do not count in root-mean-square errors: the filter is still finding its velocity."""
+"""Frames before this one do not count in root-mean-square errors: the filter is still finding its
+velocity."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """What a tracker said; the first axis is time (T), frame 0 being given. NaN where it does not tell."""
+    """Output of a tracker; the first axis is time (T), frame 0 is the start. NaN where it has none."""
 
     boxes: Array
     """(T, 4), x, y, width, height, px, with x = centre - width / 2."""
@@ -52,11 +53,13 @@ def overlap(boxes: Array, others: Array) -> Array:
 
 
 def scores(track: Track, truth: Truth) -> dict[str, float]:
-    """Figures of one track; those that the tracker or the scene does not tell are left out.
+    """Figures of one track; those that the tracker or the scene does not have are left out.
 
-    `on3`: share of frames with the centre within 3 px; `success`: share with intersection over union above 0.5; `centre_error`: median, px;
-    `displacement_error_x`, `_y` and `velocity_error_x`, `_y`: root mean square against the true step since the frame before, px, from frame 6 on;
-    `sight_on3`: as on3, of the window's middle; `scale_error`: greatest relative one; `angle_error`: greatest, degrees; `mean_overlap`; `milliseconds` a frame.
+    `on3`: share of frames with the centre within 3 px; `success`: share with intersection over union above
+    0.5; `centre_error`: median, px; `displacement_error_x`, `_y` and `velocity_error_x`, `_y`: root mean
+    square against the true step since the frame before, px, from frame 6 on; `sight_on3`: as on3, of the
+    window's middle; `scale_error`: greatest relative one; `angle_error`: greatest, degrees; `mean_overlap`;
+    `milliseconds` a frame.
     """
     counted = truth.scored
     distances = np.linalg.norm(track.centres - truth.centres, axis=1)[counted]
@@ -72,9 +75,14 @@ def scores(track: Track, truth: Truth) -> dict[str, float]:
     settled = counted & (np.arange(len(counted)) >= SETTLED)
     for name, said in (("displacement", track.displacements), ("velocity", track.velocities)):
         if said is not None:
-            figures |= {f"{name}_error_{axis}": _root_mean_square((said - steps)[settled, k]) for k, axis in enumerate("xy")}
+            figures |= {
+                f"{name}_error_{axis}": _root_mean_square((said - steps)[settled, k])
+                for k, axis in enumerate("xy")
+            }
     if track.sights is not None:
-        figures["sight_on3"] = float((np.linalg.norm(track.sights - truth.centres, axis=1)[counted] <= NEAR).mean())
+        figures["sight_on3"] = float(
+            (np.linalg.norm(track.sights - truth.centres, axis=1)[counted] <= NEAR).mean()
+        )
     if track.scales is not None and truth.scales is not None:
         figures["scale_error"] = float(np.abs(track.scales / truth.scales - 1)[counted].max())
     if track.rotations is not None and truth.angles is not None:
@@ -83,6 +91,6 @@ def scores(track: Track, truth: Truth) -> dict[str, float]:
 
 
 def _root_mean_square(errors: Array) -> float:
-    """Over the frames in which something was said; NaN where nothing ever was."""
+    """Over the frames with a value; NaN if there is none."""
     known = errors[np.isfinite(errors)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")

@@ -1,8 +1,7 @@
-"""How often 95 % intervals hold the truth: u, v, divergence and curl of the coarse-to-fine estimate on made scenes and on recordings.
+"""How often 95 % intervals of u, v, divergence and curl hold the truth: coarse-to-fine estimate, scenes and
+recordings.
 
     python -m benchmarks.tables.coverage [--only fitted held_out recordings] [--data FOLDER]
-
-The scenes `FITTED` are those that the covariance's constants were fitted on; `HELD_OUT` differ in seed, size, texture, motion and noise, and were not.
 """
 
 from __future__ import annotations
@@ -27,17 +26,21 @@ QUANTITIES = ("u", "v", "divergence", "curl")
 MARGIN = 16
 """Left out along each side, px: what enters the frame has no counterpart."""
 NORMAL = 1.959964
-"""Half the width of a 95 % interval, deviations."""
+"""Half the width of a 95 % interval, standard deviations."""
 ASKED = (0.92, 0.97)
 """Shares of the truth that the intervals should hold."""
 
 
 def estimate(frames: list[Any], preset: str) -> jacoflow.FlowField:
     """The estimate whose intervals are looked at."""
-    return jacoflow.estimate(frames, method="coarse_to_fine", preset=preset, time_scheme="pair" if len(frames) == 2 else None)
+    return jacoflow.estimate(
+        frames, method="coarse_to_fine", preset=preset, time_scheme="pair" if len(frames) == 2 else None
+    )
 
 
-def held(found: jacoflow.FlowField, flow: Array, jacobian: Array, where: NDArray[np.bool_]) -> dict[str, float]:
+def held(
+    found: jacoflow.FlowField, flow: Array, jacobian: Array, where: NDArray[np.bool_]
+) -> dict[str, float]:
     """Share of the pixels `where` whose interval holds the truth, for each of `QUANTITIES`."""
     truth = {
         "u": flow[..., 0],
@@ -53,7 +56,8 @@ def held(found: jacoflow.FlowField, flow: Array, jacobian: Array, where: NDArray
 
 
 def scene_rows(plan: Plan, seeds: list[int], count: int, preset: str, border: bool = False) -> Iterator[Row]:
-    """One row a family: shares over all its noise levels and seeds, then the worst and the best of its single scenes; `border`: of the margin alone."""
+    """One row a family: shares over all its noise levels and seeds, then the worst and the best of its
+    single scenes; `border`: of the margin alone."""
     for family in plan.families:
         shares = []
         for noise, seed in itertools.product(plan.noises, seeds):
@@ -69,14 +73,21 @@ def scene_rows(plan: Plan, seeds: list[int], count: int, preset: str, border: bo
 
 
 def summary(rows: list[Row], title: str) -> Row:
-    """The mean of the rows, and how many of their shares are as asked."""
+    """The mean of the rows, and how many of their shares are within `ASKED`."""
     values = np.array([[float(str(row[name])) for name in QUANTITIES] for row in rows])
     good = int(((values >= ASKED[0]) & (values <= ASKED[1])).sum())
     means = dict(zip(QUANTITIES, values.mean(axis=0).tolist(), strict=True))
-    return {"scene": title, **means, "as_asked": f"{good} of {values.size} within {ASKED[0]:g}-{ASKED[1]:g}, all {values.min():.2f}-{values.max():.2f}"}
+    return {
+        "scene": title,
+        **means,
+        "as_asked": f"{good} of {values.size} within {ASKED[0]:g}-{ASKED[1]:g}, "
+        f"all {values.min():.2f}-{values.max():.2f}",
+    }
 
 
-def table(plan: Plan, seeds: list[int], frames: list[int], preset: str = "balanced", border: bool = False) -> list[Row]:
+def table(
+    plan: Plan, seeds: list[int], frames: list[int], preset: str = "balanced", border: bool = False
+) -> list[Row]:
     """All families, and the mean."""
     rows: list[Row] = []
     for count in frames:
@@ -86,7 +97,8 @@ def table(plan: Plan, seeds: list[int], frames: list[int], preset: str = "balanc
 
 
 def recordings(data: Path, preset: str = "balanced") -> list[Row]:
-    """Shares on recordings: off motion boundaries and away from edges; derivatives against differences of the truth, which have errors of their own."""
+    """Shares on recordings: off motion boundaries and away from edges; derivatives against differences of
+    the truth, which have errors of their own."""
     if samples.cv2 is None:
         return []
     rows: list[Row] = []
@@ -96,7 +108,13 @@ def recordings(data: Path, preset: str = "balanced") -> list[Row]:
             continue
         field = estimate(sample.pair() if count == 2 else sample.frames, preset)
         where = usable(sample.truth) & field.valid
-        rows.append({"scene": sample.name, "frames": count, **held(field, sample.truth, differences(sample.truth), where)})
+        rows.append(
+            {
+                "scene": sample.name,
+                "frames": count,
+                **held(field, sample.truth, differences(sample.truth), where),
+            }
+        )
     return rows + [{"scene": line, "frames": "missing"} for line in missing]
 
 

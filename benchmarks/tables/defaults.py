@@ -1,9 +1,11 @@
-"""Which rows and how much smoothing the windowed estimator should have by default: error and coverage on scenes with exact truth.
+"""Which rows and how much smoothing the windowed estimator should have by default: error and coverage on
+scenes with exact truth.
 
     python -m benchmarks.tables.defaults
 
-Each line: root mean square error of the flow (px/frame) and of the four derivatives (1/frame), and the share of components whose error is below two of their
-standard deviations (.954 for normal errors that are fully described). Frames have 8 bits; a margin of 20 px is left out.
+Each line: root mean square error of the flow (px/frame) and of the four derivatives (1/frame), and the share
+of components whose error is below two of their standard deviations (.954 for normal errors that are fully
+described). Frames have 8 bits; a margin of 20 px is left out.
 """
 
 import itertools
@@ -32,7 +34,9 @@ SCENES = [
 ]
 
 
-def measure(name: str, carrier: str | None, noise: float, options: dict[str, object]) -> tuple[float, float, float, float]:
+def measure(
+    name: str, carrier: str | None, noise: float, options: dict[str, object]
+) -> tuple[float, float, float, float]:
     """Errors of flow and Jacobian, and coverage of both, in the middle of three frames."""
     scene = scenes.Scene(name, width=128, height=112, random_state=5, carrier=carrier)
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=1)

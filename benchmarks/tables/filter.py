@@ -1,4 +1,5 @@
-"""Microseconds per pixel and frame of the affine-flow filter, against filterpy on one pixel; with the answers compared to the reference."""
+"""Microseconds per pixel and frame of the affine-flow filter, against filterpy on one pixel; with the
+answers compared to the reference."""
 
 from __future__ import annotations
 
@@ -19,8 +20,11 @@ FORMS = ("augmented", "non_augmented", "fast")
 
 
 def ramp_stack(count: int) -> NDArray[np.float64]:
-    """The patent's turning ramp, rounded down and smoothed by 3 px, (count, HEIGHT, WIDTH), with scene point (60, 80) inside."""
-    scene = jacoflow.scenes.Scene("ramp", width=WIDTH, height=HEIGHT, origin=(60 - WIDTH // 2, 80 - HEIGHT // 2))
+    """The patent's turning ramp, rounded down and smoothed by 3 px, (count, HEIGHT, WIDTH), with scene
+    point (60, 80) inside."""
+    scene = jacoflow.scenes.Scene(
+        "ramp", width=WIDTH, height=HEIGHT, origin=(60 - WIDTH // 2, 80 - HEIGHT // 2)
+    )
     frames = np.floor(scene.frames(count))
     if reference is None:
         return frames
@@ -37,7 +41,9 @@ def speed(rounds: int) -> list[dict[str, object]]:
         for dtype in ("float32", "float64"):
             for threads in (1, 2):
                 frames = stack.astype(dtype)
-                contestants[f"{form} {dtype} {threads}"] = lambda f=form, d=dtype, n=threads, s=frames: follow(s, f, d, n)
+                contestants[f"{form} {dtype} {threads}"] = lambda f=form, d=dtype, n=threads, s=frames: (
+                    follow(s, f, d, n)
+                )
     times = race(contestants, rounds)
     rivals = {}
     if reference is not None:
@@ -83,7 +89,8 @@ def follow(stack: NDArray[np.floating], form: str, dtype: str, threads: int) -> 
 
 
 def agreement(frames: int = 400) -> list[dict[str, object]]:
-    """Largest relative difference of the motion state from the reference over `frames` frames of the experiment, at the pixel (60, 80)."""
+    """Largest relative difference of the motion state from the reference over `frames` frames of the
+    experiment, at the pixel (60, 80)."""
     if reference is None:
         return []
     origin = (reference.PIXEL[0] - 32, reference.PIXEL[1] - 32)
@@ -93,23 +100,36 @@ def agreement(frames: int = 400) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for form in FORMS:
         settings = reference.Settings.patent()
-        means, _ = reference.run(measurements, settings, augmented=form == "augmented", motion_first=form == "fast")
+        means, _ = reference.run(
+            measurements, settings, augmented=form == "augmented", motion_first=form == "fast"
+        )
         for dtype in ("float64", "float32"):
             tracker = jacoflow.FlowFilter(form=form, precision=dtype, points=[(32, 32)])
             ours = []
             for image in stack:
                 field = tracker.push(image.astype(dtype))
-                ours.append(np.concatenate([np.ravel(field.flow), np.ravel(np.swapaxes(field.jacobian, -1, -2))]))
+                ours.append(
+                    np.concatenate([np.ravel(field.flow), np.ravel(np.swapaxes(field.jacobian, -1, -2))])
+                )
             difference = np.abs(np.array(ours) - means[:, 6:]).max(axis=0)
             relative = float((difference / np.abs(means[:, 6:]).max(axis=0)).max())
             order = "motion first" if form == "fast" else "brightness first"
-            rows.append({"form": form, "reference_square_root": order, "precision": dtype, "frames": frames, "largest_relative_difference": relative})
+            rows.append(
+                {
+                    "form": form,
+                    "reference_square_root": order,
+                    "precision": dtype,
+                    "frames": frames,
+                    "largest_relative_difference": relative,
+                }
+            )
     return rows
 
 
 TABLES = {
     "speed": report.Table(
-        "Flow filter, microseconds per pixel and frame, 640 x 480", lambda o: speed(max(2, report.rounds(o) // 2))
+        "Flow filter, microseconds per pixel and frame, 640 x 480",
+        lambda o: speed(max(2, report.rounds(o) // 2)),
     ),
     "agreement": report.Table(
         "Flow filter, agreement with the reference", lambda o: agreement(60 if o.quick else 400)

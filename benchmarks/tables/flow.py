@@ -26,12 +26,17 @@ def wider() -> str | None:
     return "avx512"
 
 
-def speed(rounds: int, width: int = 640, height: int = 480, ours: list[Setting] = SPEED) -> list[dict[str, object]]:
-    """One row for each of our settings and number of threads, and for each rival on one thread; the same 8-bit frames for all, a pair for the rivals.
+def speed(
+    rounds: int, width: int = 640, height: int = 480, ours: list[Setting] = SPEED
+) -> list[dict[str, object]]:
+    """One row for each of our settings and number of threads, and for each rival on one thread; the same
+    8-bit frames for all, a pair for the rivals.
 
     The presets run a second time with the instruction set beyond AVX2, where there is one.
     """
-    scene = jacoflow.scenes.Scene("waves", width=width, height=height, random_state=1, speed=2.0, wavelength=256.0)
+    scene = jacoflow.scenes.Scene(
+        "waves", width=width, height=height, random_state=1, speed=2.0, wavelength=256.0
+    )
     camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
     frames = [camera.apply_u8(scene.frame(t - 1.0), index=t) for t in range(3)]
     contestants: dict[tuple[str, int], Callable[[], object]] = {}
@@ -41,7 +46,9 @@ def speed(rounds: int, width: int = 640, height: int = 480, ours: list[Setting] 
             contestants[setting.name, threads] = partial(setting.field, given, threads=threads)
         if setting.name.startswith("coarse to fine") and (simd := wider()) is not None:
             for threads in THREADS:
-                contestants[f"{setting.name}, {simd}", threads] = partial(setting.field, given, threads=threads, simd=simd)
+                contestants[f"{setting.name}, {simd}", threads] = partial(
+                    setting.field, given, threads=threads, simd=simd
+                )
     if rivals.cv2 is not None:
         rivals.cv2.setNumThreads(1)
         for name, flow in rivals.RIVALS.items():
@@ -59,14 +66,22 @@ def speed(rounds: int, width: int = 640, height: int = 480, ours: list[Setting] 
         for rival in rivals.RIVALS:
             time = times.get((rival, 1))
             row[f"times_{rival}"] = time.busiest / measured.busiest if time else None
-        rows.append({**row, "speedup_cpu": one_thread.busiest / measured.busiest, "speedup_wall": one_thread.wall / measured.wall})
+        rows.append(
+            {
+                **row,
+                "speedup_cpu": one_thread.busiest / measured.busiest,
+                "speedup_wall": one_thread.wall / measured.wall,
+            }
+        )
     return rows
 
 
 TABLES = {
     f"{width}": report.Table(
         f"Flow per second, {width} x {height}",
-        lambda o, size=(width, height): [] if o.quick and size != SIZES[0] else speed(report.rounds(o), *size),
+        lambda o, size=(width, height): (
+            [] if o.quick and size != SIZES[0] else speed(report.rounds(o), *size)
+        ),
     )
     for width, height in SIZES
 }

@@ -2,7 +2,8 @@
 
     python -m benchmarks.tables.memory
 
-Each estimate runs in a process of its own, which has made one on small frames before: what libraries take once is not counted. The result is counted.
+Each estimate runs in a process of its own, which has made one on small frames before: what libraries take
+once is not counted. The result is counted.
 """
 
 from __future__ import annotations
@@ -30,10 +31,14 @@ WARM_UP = 64
 
 
 def frames(width: int, height: int) -> np.ndarray:
-    """Three 8-bit frames of one moving surface that passes in front of another: motion boundaries take the most memory."""
+    """Three 8-bit frames of one moving surface that passes in front of another: motion boundaries take the
+    most memory."""
     camera = jacoflow.scenes.Sensor(noise=1.0, rounding="nearest", saturate=True)
     surfaces = [
-        jacoflow.scenes.Scene("waves", width=width, height=height, random_state=seed, speed=2.0, wavelength=256.0) for seed in (1, 2)
+        jacoflow.scenes.Scene(
+            "waves", width=width, height=height, random_state=seed, speed=2.0, wavelength=256.0
+        )
+        for seed in (1, 2)
     ]
     pictures = []
     for t in range(3):
@@ -51,13 +56,20 @@ def highest() -> float:
         return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024.0
     except (OSError, StopIteration):
         # May be that of the process that started this one.
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+            1.0 if sys.platform == "darwin" else 1024.0
+        )
 
 
 def measure(file: str, preset: str, count: int, covariance: bool) -> float:
     """Planes that the estimate from the last `count` frames of the file needs, in this process."""
     given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
-    settings = {"method": "coarse_to_fine", "preset": preset, "covariance": covariance, "time_scheme": "pair" if count == 2 else None}
+    settings = {
+        "method": "coarse_to_fine",
+        "preset": preset,
+        "covariance": covariance,
+        "time_scheme": "pair" if count == 2 else None,
+    }
     jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], **settings)
     before = highest()
     jacoflow.estimate(given, **settings)
@@ -72,7 +84,16 @@ def rows(width: int, height: int) -> Iterator[dict[str, object]]:
         for preset, count in product(PRESETS, (2, 3)):
             row: dict[str, object] = {"preset": preset, "frames": count}
             for covariance in (False, True):
-                child = [sys.executable, "-m", "benchmarks.tables.memory", CHILD, str(file), preset, str(count), str(int(covariance))]
+                child = [
+                    sys.executable,
+                    "-m",
+                    "benchmarks.tables.memory",
+                    CHILD,
+                    str(file),
+                    preset,
+                    str(count),
+                    str(int(covariance)),
+                ]
                 found = subprocess.run(child, check=True, capture_output=True, text=True)
                 row["planes_with_covariance" if covariance else "planes"] = float(found.stdout)
             yield row

@@ -1,6 +1,7 @@
-"""A round of the weighted variational mixture beside scikit-learn's, on the same points, and how far both agree.
+"""A round of the weighted variational mixture beside scikit-learn's, on the same points, and how far both
+agree.
 
-    python -m benchmarks.tables.mixture
+python -m benchmarks.tables.mixture
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class FromResponsibilities(BayesianGaussianMixture):  # type: ignore[misc]
 
 
 def case(components: int, count: int, dimensions: int) -> tuple[Array, Array]:
-    """Points (N, D) about as many centres as there are components, and responsibilities (N, K) that know half of the truth: from random ones rounding decides between optima."""
+    """Points (N, D) about as many centres as there are components, and responsibilities (N, K) that know
+    half of the truth: from random ones rounding decides between optima."""
     rng = np.random.default_rng(0)
     centres = rng.normal(0, 10, (components, dimensions))
     labels = rng.integers(components, size=count)
@@ -48,7 +50,9 @@ def case(components: int, count: int, dimensions: int) -> tuple[Array, Array]:
 
 def ours(points: Array, shares: Array, rounds: int, threads: int) -> VariationalGaussianMixture:
     """A fit of ours."""
-    mixture = VariationalGaussianMixture(shares.shape[1], covariance_prior=0.1, tol=None, max_iter=rounds, threads=threads)
+    mixture = VariationalGaussianMixture(
+        shares.shape[1], covariance_prior=0.1, tol=None, max_iter=rounds, threads=threads
+    )
     return mixture.fit(points, resp=shares)
 
 
@@ -56,9 +60,17 @@ def theirs(points: Array, shares: Array, rounds: int) -> FromResponsibilities:
     """The same fit of scikit-learn's, whose first round is its initialisation."""
     d = points.shape[1]
     mixture = FromResponsibilities(
-        n_components=shares.shape[1], weight_concentration_prior_type="dirichlet_distribution", weight_concentration_prior=0.1, mean_precision_prior=1e-3,
-        mean_prior=points.mean(0), degrees_of_freedom_prior=d + 9.1, covariance_prior=0.1 * np.eye(d), reg_covar=0, max_iter=rounds - 1, tol=0,
-    )  # fmt: skip
+        n_components=shares.shape[1],
+        weight_concentration_prior_type="dirichlet_distribution",
+        weight_concentration_prior=0.1,
+        mean_precision_prior=1e-3,
+        mean_prior=points.mean(0),
+        degrees_of_freedom_prior=d + 9.1,
+        covariance_prior=0.1 * np.eye(d),
+        reg_covar=0,
+        max_iter=rounds - 1,
+        tol=0,
+    )
     mixture.resp = shares
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -67,30 +79,45 @@ def theirs(points: Array, shares: Array, rounds: int) -> FromResponsibilities:
 
 
 def table(rounds: int = 10) -> list[Row]:
-    """One row for each of `SETTINGS`: milliseconds of a round, and the largest relative difference of the covariances after `MANY`."""
+    """One row for each of `SETTINGS`: milliseconds of a round, and the largest relative difference of the
+    covariances after `MANY`."""
     rows: list[Row] = []
     for components, count, dimensions in SETTINGS:
         points, shares = case(components, count, dimensions)
         work: dict[tuple[str, int], Callable[[], object]] = {}
         for many in (FEW, MANY):
             for threads in (1, 2):
-                work[f"jacoflow, {threads} thread{'s' * (threads > 1)}", many] = lambda n=many, t=threads: ours(points, shares, n, t)
+                work[f"jacoflow, {threads} thread{'s' * (threads > 1)}", many] = lambda n=many, t=threads: (
+                    ours(points, shares, n, t)
+                )
             if BayesianGaussianMixture is not object:
                 work["scikit-learn", many] = lambda n=many: theirs(points, shares, n)
         times = timing.race(work, rounds)
-        spent = {name: 1000 * (times[name, MANY].busiest - times[name, FEW].busiest) / (MANY - FEW) for name, many in work if many == MANY}
+        spent = {
+            name: 1000 * (times[name, MANY].busiest - times[name, FEW].busiest) / (MANY - FEW)
+            for name, many in work
+            if many == MANY
+        }
         reference = spent.get("scikit-learn", float("nan"))
         difference = float("nan")
         if "scikit-learn" in spent:
-            ours_, theirs_ = ours(points, shares, MANY, 1).covariances_, theirs(points, shares, MANY).covariances_
+            ours_, theirs_ = (
+                ours(points, shares, MANY, 1).covariances_,
+                theirs(points, shares, MANY).covariances_,
+            )
             difference = float(np.abs(ours_ / theirs_ - 1).max())
         for name, milliseconds in spent.items():
             rows.append(
                 {
-                    "components": components, "points": count, "dimensions": dimensions, "method": name, "milliseconds_per_round": milliseconds,
-                    "times_scikit-learn": reference / milliseconds, "largest_relative_difference": difference if name.startswith("jaco") else "",
+                    "components": components,
+                    "points": count,
+                    "dimensions": dimensions,
+                    "method": name,
+                    "milliseconds_per_round": milliseconds,
+                    "times_scikit-learn": reference / milliseconds,
+                    "largest_relative_difference": difference if name.startswith("jaco") else "",
                 }
-            )  # fmt: skip
+            )
     return rows
 
 

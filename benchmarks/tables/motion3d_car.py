@@ -19,10 +19,14 @@ TURNING = 5e-4
 
 
 def car(data: Path) -> list[Row]:
-    """Time to contact of the car ahead, in frames, beside the laser's, over one frame and over four: from its relative motion in space, and from the divergence of its flow, for a surface that faces the camera.
+    """Time to contact of the car ahead, frames, beside the laser's, over one frame and over four.
 
-    The car is nearly a plane that fills 13 degrees: in so narrow a field a rotation looks like a sideways motion, and with the slant of the surface that trades against the approach. The rotation is the camera's, which the whole scene tells, and what the car turns itself.
-    Between the frames 19 and 20 the laser's range falls by 0.15 m, twice as much as between any others: another part of the car is the nearest from there on. The speeds in the file around them are too high by that.
+    From the car's motion in space, and from the divergence of its flow for a surface parallel to the image.
+    The car is nearly a plane that fills 13 degrees: a rotation looks like a lateral motion, which trades with
+    the slant of the surface against the approach. So the rotation is the camera's, from the whole scene, and
+    the car's own is bounded. Between frames 19 and 20 the laser's range falls by 0.15 m, twice as much as
+    elsewhere: from there on another part of the car is the nearest, and the speeds in the file around them
+    are too high.
     """
     folder = data / "ttc_kitti_lidar"
     images, laser = frames(folder / "image_02"), laser_ranges(folder)
@@ -33,21 +37,42 @@ def car(data: Path) -> list[Row]:
             first, last = names[index], names[index + step]
             box, flow = laser.boxes[first], field(images[index], images[index + step], "balanced")
             scene, _ = motion3d.estimate_field_motion(flow, K_CAR)
-            found, points = motion3d.estimate_field_motion(flow, K_CAR, spacing=CAR_SPACING, region=box, scene=scene, turning=TURNING * step)
+            found, points = motion3d.estimate_field_motion(
+                flow, K_CAR, spacing=CAR_SPACING, region=box, scene=scene, turning=TURNING * step
+            )
             divergence, spread, _ = flow.region_mean("divergence", region=box)
             facing, facing_deviation = 2 * step / divergence, 2 * step * spread / divergence**2
-            contact, deviation = -step / found.approach_rate, step * found.approach_rate_std / found.approach_rate**2
-            published, recorded = laser.published(first, last), laser.recorded(first, last, range(names[0], names[-1] + 1))
+            contact, deviation = (
+                -step / found.approach_rate,
+                step * found.approach_rate_std / found.approach_rate**2,
+            )
+            published, recorded = (
+                laser.published(first, last),
+                laser.recorded(first, last, range(names[0], names[-1] + 1)),
+            )
             off = lambda value, own, truth: round((value - truth[0]) / float(np.hypot(own, truth[1])), 2)
             rows.append(
                 {
-                    "frames": f"{first} to {last}", "laser, its file": round(published[0], 1), "deviation of that": round(published[1], 1),
-                    "laser, these frames": round(recorded[0], 1), "deviation of this": round(recorded[1], 1), "ours": round(contact, 1), "deviation": round(deviation, 1),
-                    "off the file, deviations": off(contact, deviation, published), "off these frames, deviations": off(contact, deviation, recorded),
-                    "points": len(points), "status": found.status, "scene's status": scene.status, "scene off straight ahead, deg": round(angle(scene.translation, np.array([0, 0, -1.0])), 1),
-                    "from divergence": round(facing, 1), "its deviation": round(facing_deviation, 1), "it is off these frames": off(facing, facing_deviation, recorded),
+                    "frames": f"{first} to {last}",
+                    "laser, its file": round(published[0], 1),
+                    "deviation of that": round(published[1], 1),
+                    "laser, these frames": round(recorded[0], 1),
+                    "deviation of this": round(recorded[1], 1),
+                    "ours": round(contact, 1),
+                    "deviation": round(deviation, 1),
+                    "off the file, deviations": off(contact, deviation, published),
+                    "off these frames, deviations": off(contact, deviation, recorded),
+                    "points": len(points),
+                    "status": found.status,
+                    "scene's status": scene.status,
+                    "scene off straight ahead, deg": round(
+                        angle(scene.translation, np.array([0, 0, -1.0])), 1
+                    ),
+                    "from divergence": round(facing, 1),
+                    "its deviation": round(facing_deviation, 1),
+                    "it is off these frames": off(facing, facing_deviation, recorded),
                 }
-            )  # fmt: skip
+            )
     return rows
 
 

@@ -1,8 +1,12 @@
-"""How often the stated covariances of 3-D motion hold where they are hardest to state: long lenses, narrow fields and epipoles among the points, a thing that moves, few points with outliers in unknown noise, many outliers, few near points before a far background, few patches; and in fast turns.
+"""How often covariances of 3-D motion hold where they are hardest to state.
 
-    python -m benchmarks.tables.motion3d_coverage [--trials 400] [--cases long narrow around mover few outliers patches turns]
+    python -m benchmarks.tables.motion3d_coverage [--trials 400] [--cases CASE ...]
 
-`wrong`: said to be `ok` and more than 15 degrees and four of its stated deviations off. `ellipsoid`, `ellipse`: shares of the estimates with the status `ok` whose 95 % ellipsoid of all five unknowns, and whose 95 % ellipse of the direction, hold the truth. None of the layouts is one of the published tables.
+Long lenses, narrow fields with epipoles among the points, a moving object, few points with outliers in
+unknown noise, many outliers, few near points before a far background, few patches, fast rotations; none is
+one of the published tables. `wrong`: status `ok`, and more than 15 degrees and four standard deviations off.
+`ellipsoid`, `ellipse`: shares of the `ok` estimates whose 95 % ellipsoid of all five unknowns, and whose 95 %
+ellipse of the direction, hold the truth.
 """
 
 from __future__ import annotations
@@ -49,12 +53,16 @@ def long_lens(seed: int) -> Estimated:
     return motion3d.estimate_motion(half * shape, flow, sigma=sigma, placement="start"), u, w
 
 
-def layout(seed: int, depth: str, u: tuple[float, float, float], half: float, n: int, sigma: float, turning: bool) -> Estimated:
+def layout(
+    seed: int, depth: str, u: tuple[float, float, float], half: float, n: int, sigma: float, turning: bool
+) -> Estimated:
     """Points in `[-half, half]^2` of one layout, without or with the published rotation."""
     rng = np.random.default_rng((seed, 26))
     shape = rng.uniform(-1, 1, (n, 2))
     direction, w = np.array(u) / np.linalg.norm(u), scenes.W0 * turning
-    flow = _flow(half * shape, scenes.depths(depth, shape, rng), direction, w) + sigma * rng.normal(size=(n, 2))
+    flow = _flow(half * shape, scenes.depths(depth, shape, rng), direction, w) + sigma * rng.normal(
+        size=(n, 2)
+    )
     return motion3d.estimate_motion(half * shape, flow, sigma=sigma, placement="start"), direction, w
 
 
@@ -66,7 +74,8 @@ NARROW = (
     ("ground", (0.6, 0.2, 0.75), 0.25, 200, 0.03),
     ("smooth", (0.1, 1.0, 0.2), 0.15, 200, 0.03),
 )
-"""Depths, translation, half width, points and noise of narrow fields; of the last a rotation is known to a radian only."""
+"""Depths, translation, half width, points and noise of narrow fields; of the last a rotation is known to a
+radian only."""
 
 AROUND = (
     ("smooth", (0.35, 0.25, 1.0), 0.6, 40, 0.03),
@@ -79,16 +88,24 @@ AROUND = (
 
 
 def mover(seed: int) -> Estimated:
-    """Two views in pixels of which a thing that moves by itself fills a tenth to a third; noise .1 to .3 px, median flow 6 px."""
+    """Two views in pixels with a moving object on a tenth to a third of the points; noise .1 to .3 px,
+    median flow 6 px."""
     rng = np.random.default_rng((seed, 22))
     depth, name = ("smooth", "uniform", "layers")[seed % 3], ("oblique", "forward", "off")[seed // 3 % 3]
     sigma = rng.uniform(0.1, 0.3)
-    make = scenes.two_views(depth, name, sigma, 6, 40_000 + seed, n=int(rng.uniform(300, 1200)), mover=rng.uniform(0.1, 0.33))
-    return motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=True), make.u, make.w
+    make = scenes.two_views(
+        depth, name, sigma, 6, 40_000 + seed, n=int(rng.uniform(300, 1200)), mover=rng.uniform(0.1, 0.33)
+    )
+    return (
+        motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=True),
+        make.u,
+        make.w,
+    )
 
 
 def few_points(seed: int) -> Estimated:
-    """20 to 60 points, of which 10 to 30 % are outliers, in noise of 1 to 5 % of the median translational flow that is not told."""
+    """20 to 60 points, 10 to 30 % of them outliers, in unknown noise of 1 to 5 % of the median
+    translational flow."""
     rng = np.random.default_rng((seed, 23))
     n = int(rng.uniform(20, 61))
     (u, w), shape = _by_chance(rng), rng.uniform(-1, 1, (n, 2))
@@ -102,14 +119,19 @@ def few_points(seed: int) -> Estimated:
 
 
 def outliers(seed: int, noise: float, share: float) -> Estimated:
-    """1000 points, of which a share has any flow up to four times the median translational flow, of which `noise` is a share, too."""
+    """1000 points, of which a share has any flow up to four times the median translational flow, of which
+    `noise` is a share, too."""
     rng = np.random.default_rng((seed, 26))
     (u, w), shape = _by_chance(rng), rng.uniform(-1, 1, (1000, 2))
     nu = scenes.depths(("uniform", "smooth")[seed % 2], shape, rng)
     size = float(np.median(np.linalg.norm(_flow(0.6 * shape, nu, u, 0 * w), axis=1)))
     flow = _flow(0.6 * shape, nu, u, w) + noise * size * rng.normal(size=(1000, 2))
     flow = np.where(rng.uniform(size=(1000, 1)) < share, rng.uniform(-4 * size, 4 * size, (1000, 2)), flow)
-    return motion3d.estimate_motion(0.6 * shape, flow, sigma=noise * size, placement="start", robust=True), u, w
+    return (
+        motion3d.estimate_motion(0.6 * shape, flow, sigma=noise * size, placement="start", robust=True),
+        u,
+        w,
+    )
 
 
 FAR_NOISE = 0.2
@@ -117,7 +139,8 @@ FAR_NOISE = 0.2
 
 
 def _far_background(seed: int, wrong: float) -> tuple[Array, Array, Array, Array]:
-    """Points, flow and motion of two views: a twentieth of 600 points moves by 20 px, the others, far away, by 1 to 2; of all, a share is `wrong`."""
+    """Points, flow and motion of two views: a twentieth of 600 points moves by 20 px, the others, far
+    away, by 1 to 2; of all, a share is `wrong`."""
     rng = np.random.default_rng((seed, 27))
     u, w = _by_chance(rng, 0.02)
     pixels = rng.uniform([0, 0], [640, 480], (600, 2))
@@ -136,7 +159,8 @@ def far_background(seed: int, wrong: float) -> Estimated:
 
 
 def far_row(name: str, trials: int, wrong: float) -> Row:
-    """The row of few near points before a far background, with errors beside those of OpenCV's MAGSAC where that is installed."""
+    """The row of few near points before a far background, with errors beside those of OpenCV's MAGSAC
+    where that is installed."""
     errors: list[float] = []
     theirs: list[float] = []
 
@@ -159,28 +183,42 @@ def _magsac(pixels: Array, flow: Array) -> Array | None:
         import cv2
     except ImportError:
         return None
-    essential, mask = cv2.findEssentialMat(pixels, pixels + flow, scenes.K, cv2.USAC_MAGSAC, 0.999, 2 * FAR_NOISE)
+    essential, mask = cv2.findEssentialMat(
+        pixels, pixels + flow, scenes.K, cv2.USAC_MAGSAC, 0.999, 2 * FAR_NOISE
+    )
     if essential is None:
         return None
-    return np.ravel(cv2.recoverPose(essential[:3], pixels, pixels + flow, scenes.K, distanceThresh=1e7, mask=mask)[2])
+    return np.ravel(
+        cv2.recoverPose(essential[:3], pixels, pixels + flow, scenes.K, distanceThresh=1e7, mask=mask)[2]
+    )
 
 
 def patches(seed: int, n: int = 6) -> Estimated:
-    """Patches of half size 60 px with flow and Jacobian, f = 500 px, noise of .02 to .15 px, half width .2 to .6."""
+    """Patches of half size 60 px with flow and Jacobian, f = 500 px, noise of .02 to .15 px, half width .2
+    to .6."""
     rng = np.random.default_rng((seed, 24))
     name = ("oblique", "forward", "lateral", "off")[seed % 4]
-    make, jacobian, covariance = scenes.patches(name, n, 60, rng.uniform(0.02, 0.15), 50_000 + seed, rng.uniform(0.2, 0.6))
-    found = motion3d.estimate_motion(make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, placement="start")
+    make, jacobian, covariance = scenes.patches(
+        name, n, 60, rng.uniform(0.02, 0.15), 50_000 + seed, rng.uniform(0.2, 0.6)
+    )
+    found = motion3d.estimate_motion(
+        make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, placement="start"
+    )
     return found, make.u, make.w
 
 
 def turns(seed: int, turn: float, robust: bool) -> Estimated:
-    """Two exact views of 800 points that turn by `turn` rad about an axis by chance, .2 px of noise, median flow of 6 px; with `robust` 30 % outliers."""
+    """Two exact views of 800 points that turn by `turn` rad about an axis by chance, .2 px of noise,
+    median flow of 6 px; with `robust` 30 % outliers."""
     rng = np.random.default_rng((seed, 25))
     make = scenes.two_views("smooth", "oblique", 0.0, 6.0, 60_000 + seed, n=800)
     axis = rng.normal(size=3)
     w = turn * axis / np.linalg.norm(axis)
-    flow = scenes.displaced(make.points, make.depths, make.u, w) - make.points + rng.normal(0, 0.2, make.flow.shape)
+    flow = (
+        scenes.displaced(make.points, make.depths, make.u, w)
+        - make.points
+        + rng.normal(0, 0.2, make.flow.shape)
+    )
     if robust:
         flow = np.where(rng.uniform(size=(800, 1)) < 0.3, rng.uniform(-80, 80, flow.shape), flow)
     return motion3d.estimate_motion(make.points, flow, scenes.K, sigma=0.2, robust=robust), make.u, w
@@ -188,14 +226,40 @@ def turns(seed: int, turn: float, robust: bool) -> Estimated:
 
 CASES: dict[str, dict[str, Callable[[int], Estimated]]] = {
     "long": {"long lens, half width .15 to .2": long_lens},
-    "narrow": {f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=False)) for depth, u, half, n, sigma in NARROW},
-    "around": {f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=True)) for depth, u, half, n, sigma in AROUND},
+    "narrow": {
+        f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (
+            lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=False)
+        )
+        for depth, u, half, n, sigma in NARROW
+    },
+    "around": {
+        f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (
+            lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=True)
+        )
+        for depth, u, half, n, sigma in AROUND
+    },
     "mover": {"a thing that moves by itself, robust": mover},
     "few": {"20 to 60 points, outliers, noise not told": few_points},
-    "outliers": {f"{share:.0%} outliers, noise {noise:g} of the flow": (lambda seed, n=noise, s=share: outliers(seed, n, s)) for share in (0.4, 0.6) for noise in (0.05, 0.1, 0.2, 0.3)},
-    "patches": {"6 patches with Jacobians": patches, "10 patches with Jacobians": lambda seed: patches(seed, 10), "30 patches with Jacobians": lambda seed: patches(seed, 30)},
-    "turns": {f"two views that turn by {turn:g} rad{', 30 % outliers' if robust else ''}": (lambda seed, t=turn, r=robust: turns(seed, t, r)) for turn in (0.05, 0.12, 0.17, 0.25) for robust in (False, True)},
-}  # fmt: skip
+    "outliers": {
+        f"{share:.0%} outliers, noise {noise:g} of the flow": (
+            lambda seed, n=noise, s=share: outliers(seed, n, s)
+        )
+        for share in (0.4, 0.6)
+        for noise in (0.05, 0.1, 0.2, 0.3)
+    },
+    "patches": {
+        "6 patches with Jacobians": patches,
+        "10 patches with Jacobians": lambda seed: patches(seed, 10),
+        "30 patches with Jacobians": lambda seed: patches(seed, 30),
+    },
+    "turns": {
+        f"two views that turn by {turn:g} rad{', 30 % outliers' if robust else ''}": (
+            lambda seed, t=turn, r=robust: turns(seed, t, r)
+        )
+        for turn in (0.05, 0.12, 0.17, 0.25)
+        for robust in (False, True)
+    },
+}
 """Scenes by the name of their part."""
 
 
@@ -215,19 +279,39 @@ def row(name: str, estimated: Iterator[Estimated]) -> Row:
         errors.append(angle(found.translation, u))
     others = ", ".join(f"{status} {count}" for status, count in sorted(statuses.items()) if status != "ok")
     share = lambda held: round(float(np.mean(held)), 3) if held else float("nan")
-    return {"scenes": name, "trials": sum(statuses.values()), "ok": statuses["ok"], "wrong": wrong, "ellipsoid": share(ellipsoids), "ellipse": share(ellipses), "median, deg": round(float(np.median(errors)), 2) if errors else float("nan"), "others": others}
+    return {
+        "scenes": name,
+        "trials": sum(statuses.values()),
+        "ok": statuses["ok"],
+        "wrong": wrong,
+        "ellipsoid": share(ellipsoids),
+        "ellipse": share(ellipses),
+        "median, deg": round(float(np.median(errors)), 2) if errors else float("nan"),
+        "others": others,
+    }
 
 
 def table(trials: int = TRIALS, only: list[str] | None = None) -> list[Row]:
     """One row for each kind of scene."""
-    rows = [row(name, map(make, range(trials))) for part, kinds in CASES.items() if only is None or part in only for name, make in kinds.items()]
+    rows = [
+        row(name, map(make, range(trials)))
+        for part, kinds in CASES.items()
+        if only is None or part in only
+        for name, make in kinds.items()
+    ]
     if only is None or "outliers" in only:
-        rows += [far_row(f"5 % near points before a far background, {wrong:.0%} outliers", trials, wrong) for wrong in (0.0, 0.2)]
+        rows += [
+            far_row(f"5 % near points before a far background, {wrong:.0%} outliers", trials, wrong)
+            for wrong in (0.0, 0.2)
+        ]
     return rows
 
 
 TABLES = {
-    "coverage": report.Table("3-D motion: where covariances are hardest to state", lambda o: table(report.trials(o, TRIALS, 12), o.cases)),
+    "coverage": report.Table(
+        "3-D motion: where covariances are hardest to state",
+        lambda o: table(report.trials(o, TRIALS, 12), o.cases),
+    )
 }
 ARGUMENTS = {"--cases": {"nargs": "+", "choices": list(CASES), "help": "parts of the table"}}
 

@@ -1,8 +1,11 @@
-"""How often the stated covariances of the motion of a flow field hold: rendered rooms of chance with exact truth (`motion3d_rooms`), two frames of 320 x 240 px, f = 300 px.
+"""How often the covariance of the motion of a flow field holds: random rendered rooms with exact truth.
 
     python -m benchmarks.tables.motion3d_fields [--trials 40] [--only fields errors]
 
-Flow by both methods that have a field of windows, in noise of 1.5 and 5 grey levels, each estimated robustly (the default), from all points, and from patches of 48 px. `quick`: translational flow of some 2 px, beyond what the windowed method is made for; `slow`: a quarter of it. Columns as in `motion3d_coverage`. `errors`: what the errors of a picture's flow have in common.
+Two frames of 320 x 240 px, f = 300 px, noise of 1.5 and 5 grey levels, flow by both methods with windows;
+motions are estimated robustly (default), from all points, and from patches of 48 px. `quick`: translational
+flow of about 2 px, too fast for the windowed method; `slow`: a quarter of it. Columns as in
+`motion3d_coverage`. `errors`: what the errors of one field have in common.
 """
 
 from __future__ import annotations
@@ -27,13 +30,22 @@ STEPS = {"quick": 0.02, "slow": 0.005}
 """How far the camera moves between both frames, in units of which walls are 1.2 to 3 away."""
 TURN = 0.3
 """Most that it turns, in shares of that."""
-WAYS: dict[str, dict[str, Any]] = {"default": {}, "robust=False": {"robust": False}, "patches=48": {"patches": 48}}
+WAYS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "robust=False": {"robust": False},
+    "patches=48": {"patches": 48},
+}
 
 
-def fields(method: Method, noise: float, step: float, trials: int) -> list[tuple[jacoflow.FlowField, rooms.Room]]:
+def fields(
+    method: Method, noise: float, step: float, trials: int
+) -> list[tuple[jacoflow.FlowField, rooms.Room]]:
     """Flow fields of rooms, and these."""
     made = [rooms.room(seed, step, TURN * step) for seed in range(trials)]
-    return [(jacoflow.estimate(rooms.frames(one, noise, seed), method=method), one) for seed, one in enumerate(made)]
+    return [
+        (jacoflow.estimate(rooms.frames(one, noise, seed), method=method), one)
+        for seed, one in enumerate(made)
+    ]
 
 
 def estimated(seen: list[tuple[jacoflow.FlowField, rooms.Room]], way: str) -> Iterator[Estimated]:
@@ -49,14 +61,18 @@ def table(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
         for speed, step in STEPS.items():
             for noise in NOISES:
                 seen = fields(method, noise, step, trials)
-                rows += [row(f"{method}, {speed}, noise {noise:g}, {way}", estimated(seen, way)) for way in WAYS]
+                rows += [
+                    row(f"{method}, {speed}, noise {noise:g}, {way}", estimated(seen, way)) for way in WAYS
+                ]
     return rows
 
 
 def in_common(field: jacoflow.FlowField, made: rooms.Room) -> tuple[float, float, float]:
-    """The mean error of the flow of a picture in standard deviations of one point (root mean square of both components), what independent errors would make it, and how much too long the flow is, in units of what its covariances tell.
+    """Mean error of a field in standard deviations of one point, what independent errors would make it, and
+    excess length.
 
-    A tenth of the points, those with the largest errors, is left out: occluded ones.
+    The mean error is the root mean square of both components; the excess length of the flow is in units of
+    what its covariances state. The tenth of the points with the largest errors, occluded ones, is left out.
     """
     points, flow, covariances, (_, shared, _, scale, _) = _motion3d_field_points(field, None, None, None)
     true, covariances = made.flow(points), covariances / shared
@@ -74,7 +90,11 @@ def in_common(field: jacoflow.FlowField, made: rooms.Room) -> tuple[float, float
     mean, inverse = fit(one)
     longer = fit(np.concatenate([true[kept, :, None], one], axis=2))[0][0]
     deviation = np.sqrt(np.median(np.trace(covariances, axis1=1, axis2=2)) / 2)
-    return float(np.sqrt(np.mean(mean**2)) / deviation), float(np.sqrt(np.trace(inverse) / 2) / deviation), float(longer / scale)
+    return (
+        float(np.sqrt(np.mean(mean**2)) / deviation),
+        float(np.sqrt(np.trace(inverse) / 2) / deviation),
+        float(longer / scale),
+    )
 
 
 def errors(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
@@ -86,14 +106,25 @@ def errors(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
                 seen = [in_common(field, made) for field, made in fields(method, noise, step, trials)]
                 mean, independent, longer = np.sqrt(np.mean(np.square(seen), axis=0))
                 name = f"{method}, {speed}, noise {noise:g}"
-                rows.append({"flow": name, "rooms": trials, "mean error, deviations of a point": round(mean, 2), "if independent": round(independent, 2), "too long, in units of what is told": round(longer, 2)})
+                rows.append(
+                    {
+                        "flow": name,
+                        "rooms": trials,
+                        "mean error, deviations of a point": round(mean, 2),
+                        "if independent": round(independent, 2),
+                        "too long, in units of what is told": round(longer, 2),
+                    }
+                )
     return rows
 
 
 TABLES = {
-    "fields": report.Table("3-D motion: flow fields of rendered rooms", lambda o: table(report.trials(o, TRIALS))),
+    "fields": report.Table(
+        "3-D motion: flow fields of rendered rooms", lambda o: table(report.trials(o, TRIALS))
+    ),
     "errors": report.Table(
-        "3-D motion: what the errors of a picture's flow have in common", lambda o: errors(report.trials(o, TRIALS))
+        "3-D motion: what the errors of a picture's flow have in common",
+        lambda o: errors(report.trials(o, TRIALS)),
     ),
 }
 

@@ -1,10 +1,20 @@
-"""Where the points lie, what shape their noise has, planes, and long displacements in large noise: how often an estimate of 3-D motion that says `ok` is wrong and how often its covariance holds, of scenes by chance.
+"""How often 3-D motion holds for unusual layouts, shapes of noise, planes, and long displacements in large
+noise.
 
-    python -m benchmarks.tables.motion3d_layouts [--trials 400] [--cases layouts noise things planes band views]
+    python -m benchmarks.tables.motion3d_layouts [--trials 400] [--cases CASE ...]
 
-Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a street or a wall with a relief
-of 3 %. A thing that moves by itself is a tenth to a third of the points, the nearest to one of them, half as near again; noise is .3 to 10 % there, and the search robust. Planes are exact ones with noise of 1 % of the flow, which another motion explains as well unless it has points behind the camera. The band is a tenth as high as it is wide and up to 160 degrees of it are seen. In two views the camera moves by a tenth of the depth, and noise is
-a share of the displacements. The columns are those of `motion3d_coverage.py`.
+Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 to 20 % of the median
+translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a
+street or a wall with 3 % relief.
+
+- `things`: a moving object on a tenth to a third of the points, half as near again; noise .3 to 10 %, robust
+  search.
+- `planes`: exact planes, noise of 1 % of the flow; the twin solution differs only in points behind the
+  camera.
+- `band`: a tenth as high as wide, up to 160 degrees of it visible.
+- `views`: two views, translation of a tenth of the depth, noise as a share of the displacements.
+
+Columns as in `motion3d_coverage`.
 """
 
 from __future__ import annotations
@@ -50,7 +60,7 @@ LAYOUTS: dict[str, Callable[[int, np.random.Generator], Array]] = {
     "two clusters": lambda n, rng: rng.choice([-0.7, 0.7], (n, 1)) + rng.normal(0, 0.1, (n, 2)),
     "a ring": _ring,
     "three lines": _rows,
-}  # fmt: skip
+}
 """Places in [-1, 1]^2."""
 
 RATIOS = (5.0, 20.0, 50.0, 200.0)
@@ -58,7 +68,8 @@ RATIOS = (5.0, 20.0, 50.0, 200.0)
 
 
 def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
-    """A scene by chance with points of one layout, noise of one shape and of any orientation, told."""
+    """A random scene with points of one layout, noise of one shape in any orientation, with known
+    covariances."""
     rng = np.random.default_rng((seed, 31))
     half, n = rng.uniform(0.2, 1), int(np.exp(rng.uniform(np.log(20), np.log(1000))))
     u, w = _unit(rng), rng.uniform(0, 0.05) * _unit(rng)
@@ -69,17 +80,23 @@ def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
     sigma = np.exp(rng.uniform(np.log(0.003), np.log(0.2))) * np.median(np.linalg.norm(moved, axis=1))
     roots = _roots(n, ratio, float(sigma), rng)
     flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
-    return motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"), u, w
+    return (
+        motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"),
+        u,
+        w,
+    )
 
 
 def thing(seed: int, ratio: float) -> Estimated:
-    """A scene by chance with a thing in it that moves by itself; robust."""
+    """A random scene with a moving object; robust."""
     rng = np.random.default_rng((seed, 35))
     half, n = rng.uniform(0.2, 1), int(np.exp(rng.uniform(np.log(60), np.log(1000))))
     u, w = _unit(rng), rng.uniform(0, 0.05) * _unit(rng)
     shape = LAYOUTS[list(LAYOUTS)[seed % len(LAYOUTS)]](n, rng)
     nu = np.maximum(SURFACES[seed // len(LAYOUTS) % len(SURFACES)](shape, rng), 0.02)
-    near = np.argsort(np.linalg.norm(shape - shape[rng.integers(n)], axis=1))[: int(n * rng.uniform(0.1, 0.33))]
+    near = np.argsort(np.linalg.norm(shape - shape[rng.integers(n)], axis=1))[
+        : int(n * rng.uniform(0.1, 0.33))
+    ]
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
     sigma = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
@@ -87,7 +104,13 @@ def thing(seed: int, ratio: float) -> Estimated:
     flow[near] = 1.5 * nu[near, None] * (g[near] @ _unit(rng)) + r[near] @ (0.03 * _unit(rng))
     roots = _roots(n, ratio, sigma, rng)
     flow += np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
-    return motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start", robust=True), u, w
+    return (
+        motion3d.estimate_motion(
+            half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start", robust=True
+        ),
+        u,
+        w,
+    )
 
 
 def plane(seed: int, ratio: float) -> Estimated:
@@ -100,11 +123,15 @@ def plane(seed: int, ratio: float) -> Estimated:
     moved = nu[:, None] * (g @ u)
     roots = _roots(300, ratio, 0.01 * float(np.median(np.linalg.norm(moved, axis=1))), rng)
     flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(300, 2)))
-    return motion3d.estimate_motion(points, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"), u, w
+    return (
+        motion3d.estimate_motion(points, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"),
+        u,
+        w,
+    )
 
 
 def band(seed: int) -> Estimated:
-    """A band across a wide picture of something nearly flat, which the camera moves along."""
+    """A nearly flat surface in a band across a wide image, with lateral motion."""
     rng = np.random.default_rng((seed, 33))
     n, half = int(np.exp(rng.uniform(np.log(30), np.log(2000)))), np.tan(np.radians(rng.uniform(55, 80)))
     shape = rng.uniform([-1, -0.1], [1, 0.1], (n, 2))
@@ -115,15 +142,24 @@ def band(seed: int) -> Estimated:
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
     sigma = float(np.exp(rng.uniform(np.log(0.002), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
-    return motion3d.estimate_motion(half * shape, moved + r @ w + sigma * rng.normal(size=(n, 2)), sigma=sigma, placement="start"), u, w
+    return (
+        motion3d.estimate_motion(
+            half * shape, moved + r @ w + sigma * rng.normal(size=(n, 2)), sigma=sigma, placement="start"
+        ),
+        u,
+        w,
+    )
 
 
 def views(seed: int, depth: str, noise: float) -> Estimated:
-    """Two exact views in pixels, f = 500, of a field of 15 to 70 degrees; the camera moves by a tenth of the depth and turns by .03 rad."""
+    """Two exact views in pixels, f = 500, of a field of 15 to 70 degrees; the camera moves by a tenth of
+    the depth and turns by .03 rad."""
     rng = np.random.default_rng((seed, 34))
     n, half = int(np.exp(rng.uniform(np.log(50), np.log(3000)))), np.tan(np.radians(rng.uniform(7.5, 35)))
     shape = LAYOUTS[("all over the picture", "a corner", "a cluster anywhere")[seed % 3]](n, rng)
-    nu = 0.1 * np.maximum(1 + 0.5 * shape @ rng.uniform(-1, 1, 2) if depth == "plane" else DEPTHS[depth](shape, rng), 0.05)
+    nu = 0.1 * np.maximum(
+        1 + 0.5 * shape @ rng.uniform(-1, 1, 2) if depth == "plane" else DEPTHS[depth](shape, rng), 0.05
+    )
     u, w = _unit(rng), 0.03 * _unit(rng)
     pixels = [320, 240] + 500 * half * shape
     still = scenes.displaced(pixels, 0 * nu, u, w)
@@ -145,7 +181,9 @@ def _unit(rng: np.random.Generator) -> Array:
 def _roots(n: int, ratio: float, sigma: float, rng: np.random.Generator) -> Array:
     """Roots of covariances with `sigma` as the geometric mean of their axes."""
     angle = rng.uniform(0, np.pi, n)
-    turned = np.stack([np.stack([np.cos(angle), -np.sin(angle)], 1), np.stack([np.sin(angle), np.cos(angle)], 1)], 1)
+    turned = np.stack(
+        [np.stack([np.cos(angle), -np.sin(angle)], 1), np.stack([np.sin(angle), np.cos(angle)], 1)], 1
+    )
     return turned * (sigma * np.array([ratio**0.5, ratio**-0.5]))
 
 
@@ -153,13 +191,36 @@ def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]
     """What is tried, by the name of its row."""
     parts: dict[str, dict[str, Callable[[int], Estimated]]] = {
         "layouts": {name: (lambda seed, name=name: estimated(seed, name)) for name in LAYOUTS},
-        "noise": {f"all over the picture, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: estimated(seed, "all over the picture", ratio)) for ratio in RATIOS},
-        "things": {f"a thing that moves by itself, robust, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: thing(seed, ratio)) for ratio in (1.0, 20.0, 100.0)},
-        "planes": {f"a plane, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: plane(seed, ratio)) for ratio in (1.0, 10.0, 30.0, 100.0)},
+        "noise": {
+            f"all over the picture, axes of the noise {ratio:g} to 1": (
+                lambda seed, ratio=ratio: estimated(seed, "all over the picture", ratio)
+            )
+            for ratio in RATIOS
+        },
+        "things": {
+            f"a thing that moves by itself, robust, axes of the noise {ratio:g} to 1": (
+                lambda seed, ratio=ratio: thing(seed, ratio)
+            )
+            for ratio in (1.0, 20.0, 100.0)
+        },
+        "planes": {
+            f"a plane, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: plane(seed, ratio))
+            for ratio in (1.0, 10.0, 30.0, 100.0)
+        },
         "band": {"a band of something nearly flat, 110 to 160 degrees wide": band},
-        "views": {f"two views, {depth}, noise {noise:g} of the displacement": (lambda seed, depth=depth, noise=noise: views(seed, depth, noise)) for depth, noise in VIEWS},
-    }  # fmt: skip
-    return {name: make for part, kinds in parts.items() if only is None or part in only for name, make in kinds.items()}
+        "views": {
+            f"two views, {depth}, noise {noise:g} of the displacement": (
+                lambda seed, depth=depth, noise=noise: views(seed, depth, noise)
+            )
+            for depth, noise in VIEWS
+        },
+    }
+    return {
+        name: make
+        for part, kinds in parts.items()
+        if only is None or part in only
+        for name, make in kinds.items()
+    }
 
 
 def coverage_row(name: str, trials: int) -> Row:
@@ -180,9 +241,11 @@ TABLES = {
 }
 ARGUMENTS = {
     "--cases": {
-        "nargs": "+", "choices": ["layouts", "noise", "things", "planes", "band", "views"], "help": "parts of the table"
+        "nargs": "+",
+        "choices": ["layouts", "noise", "things", "planes", "band", "views"],
+        "help": "parts of the table",
     }
-}  # fmt: skip
+}
 
 if __name__ == "__main__":
     report.main(__doc__, TABLES, ARGUMENTS)

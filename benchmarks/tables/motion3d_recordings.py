@@ -1,4 +1,5 @@
-"""3-D motion from recorded frames to numbers: a drive with true poses, and a car ahead with its range by laser."""
+"""3-D motion from recorded frames to numbers: a drive with true poses, and a car ahead with its range by
+laser."""
 
 from __future__ import annotations
 
@@ -21,6 +22,8 @@ Row = dict[str, object]
 
 BLOCK = 100
 """Side of the blocks, px, by which points are split into two halves that share no pixels but at the seams."""
+
+
 def tracks(first: Array, second: Array) -> tuple[Array, Array]:
     """OpenCV's corners and their Lucas-Kanade displacement, checked forwards and backwards, px."""
     cv2 = rivals.cv2
@@ -28,15 +31,19 @@ def tracks(first: Array, second: Array) -> tuple[Array, Array]:
     options = {"winSize": (21, 21), "maxLevel": 4}
     end, found, _ = cv2.calcOpticalFlowPyrLK(first, second, start, None, **options)
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, end, None, **options)
-    good = (found & again).ravel().astype(bool) & (np.linalg.norm((back - start).reshape(-1, 2), axis=1) < 0.5)
+    good = (found & again).ravel().astype(bool) & (
+        np.linalg.norm((back - start).reshape(-1, 2), axis=1) < 0.5
+    )
     points = start.reshape(-1, 2)[good].astype(float)
     return points, end.reshape(-1, 2)[good].astype(float) - points
 
 
 def medians(data: Path) -> list[Row]:
-    """Median errors over all pairs of the drive, and over those whose truth was measured; of these also the mean offset of the direction, to the right and down, and the scatter about it.
+    """Median errors over all pairs of the drive, and over those whose truth was measured; of these also the
+    mean offset of the direction, to the right and down, and the scatter about it.
 
-    An offset that every method shows, on flow of every kind, is one of the reference: of how the camera stands to what the poses were measured with.
+    An offset that every method shows, on flow of every kind, is one of the reference: of how the camera
+    stands to what the poses were measured with.
     """
     images, poses = drive(data)
     errors: dict[str, list[tuple[float, float, float, float]]] = {}
@@ -44,12 +51,16 @@ def medians(data: Path) -> list[Row]:
 
     def add(name: str, direction: Array, true_direction: Array, turned: float) -> None:
         off = np.degrees(direction - true_direction)[:2]
-        errors.setdefault(name, []).append((angle(direction, true_direction), float(np.degrees(turned)), *off))
+        errors.setdefault(name, []).append(
+            (angle(direction, true_direction), float(np.degrees(turned)), *off)
+        )
 
     for index in range(len(images) - 1):
         u, w, shift, turn = true_motion(poses, index)
         for preset in ("fast", "balanced"):
-            found, _ = motion3d.estimate_field_motion(field(images[index], images[index + 1], preset), K_DRIVE)
+            found, _ = motion3d.estimate_field_motion(
+                field(images[index], images[index + 1], preset), K_DRIVE
+            )
             add(f"jacoflow, {preset} flow", found.translation, u, float(np.linalg.norm(found.rotation - w)))
             ok[f"jacoflow, {preset} flow"] += found.status == "ok"
         if rivals.cv2 is None:
@@ -57,7 +68,12 @@ def medians(data: Path) -> list[Row]:
         points, flow = tracks(images[index], images[index + 1])
         for name, method in rivals.METHODS.items():
             direction, rotation = rivals.two_view(points, flow, K_DRIVE, 0.5, method)
-            add(f"{name} on LK tracks", direction, shift, np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
+            add(
+                f"{name} on LK tracks",
+                direction,
+                shift,
+                np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)),
+            )
         found = motion3d.estimate_motion(points, flow, K_DRIVE, robust=True)
         add("jacoflow on LK tracks", found.translation, u, float(np.linalg.norm(found.rotation - w)))
         ok["jacoflow on LK tracks"] += found.status == "ok"
@@ -68,11 +84,17 @@ def medians(data: Path) -> list[Row]:
         mean, scatter = offsets.mean(0), offsets.std(0, ddof=1)
         rows.append(
             {
-                "method": name, "direction, deg": round(every[0], 3), "rotation, deg": round(every[1], 4), "every third pair": f"{third[0]:.3f} / {third[1]:.4f}",
-                "pairs with measured truth": f"{measured[0]:.3f} / {measured[1]:.4f}", "asked": "1.1 / 0.06" if name.startswith("5-point") else "", "ok": f"{ok[name]} of {len(values)}" if name in ok else "",
-                "their offset, deg": f"{mean[0]:.2f}, {mean[1]:.2f}", "scatter about it": f"{scatter[0]:.2f}, {scatter[1]:.2f}",
+                "method": name,
+                "direction, deg": round(every[0], 3),
+                "rotation, deg": round(every[1], 4),
+                "every third pair": f"{third[0]:.3f} / {third[1]:.4f}",
+                "pairs with measured truth": f"{measured[0]:.3f} / {measured[1]:.4f}",
+                "asked": "1.1 / 0.06" if name.startswith("5-point") else "",
+                "ok": f"{ok[name]} of {len(values)}" if name in ok else "",
+                "their offset, deg": f"{mean[0]:.2f}, {mean[1]:.2f}",
+                "scatter about it": f"{scatter[0]:.2f}, {scatter[1]:.2f}",
             }
-        )  # fmt: skip
+        )
     return rows
 
 
@@ -87,29 +109,42 @@ SPACINGS = (8, 16, 24, 32, 48)
 """Distances of points, px, from one correlation length of a pair on."""
 
 
-def halves_apart(points: Array, flow: Array, covariances: Array, first: NDArray[np.bool_], **options: float) -> float | None:
-    """Squared deviation, over 5, of the difference of the motions of two halves; None unless both are told to be `ok`."""
-    one, other = (motion3d.estimate_motion(points[half], flow[half], K_DRIVE, cov=covariances[half], robust=True, **options) for half in (first, ~first))  # type: ignore[arg-type]
+def halves_apart(
+    points: Array, flow: Array, covariances: Array, first: NDArray[np.bool_], **options: float
+) -> float | None:
+    """Squared Mahalanobis distance, over 5, between the motions of two halves; None unless both are `ok`."""
+    one, other = (
+        motion3d.estimate_motion(
+            points[half], flow[half], K_DRIVE, cov=covariances[half], robust=True, **options
+        )
+        for half in (first, ~first)
+    )  # type: ignore[arg-type]
     if (one.status, other.status) != ("ok", "ok"):
         return None
     difference = np.concatenate([one.tangent @ other.translation, other.rotation - one.rotation])
     return float(difference @ np.linalg.solve(one.covariance + other.covariance, difference)) / 5
 
 
-def told(given: list[float | None]) -> dict[str, float | str]:
-    """Mean, median and the share within the 95 % ellipsoid, of squared deviations over 5; how many pairs are `ok`."""
+def summary(given: list[float | None]) -> dict[str, float | str]:
+    """Number of `ok` pairs; mean, median and share within the 95 % ellipsoid of squared distances over 5."""
     values = np.array([value for value in given if value is not None])
     if not len(values):
         return {"ok": 0, "mean": "", "median": "", "share within 95 %": ""}
     return {
-        "ok": len(values), "mean": round(float(values.mean()), 2), "median": round(float(np.median(values)), 2), "share within 95 %": round(float(np.mean(values < 11.07 / 5)), 2),
-    }  # fmt: skip
+        "ok": len(values),
+        "mean": round(float(values.mean()), 2),
+        "median": round(float(np.median(values)), 2),
+        "share within 95 %": round(float(np.mean(values < 11.07 / 5)), 2),
+    }
 
 
 def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
-    """Whether the covariance lies: motions of two halves of the picture should differ by what both covariances say, whatever the halves and however dense the points.
+    """Whether motions of two halves of the image differ by what both covariances say, for dense and sparse
+    points.
 
-    Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points taken for independent, whatever their distance. What all flow of a picture has in common is in both halves and left out. Halves of few points are often told as `few_points`; they do not count.
+    Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points
+    taken for independent. Errors that all flow of an image has in common are in both halves and do not count.
+    Halves of few points are often `few_points`; they do not count either.
     """
     images, _ = drive(data)
     rows: list[Row] = []
@@ -122,10 +157,22 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
                 correlated, independent = [], []
                 for points, vectors, covariances, (_, shared, *_) in taken:
                     first = split(*points.T)
-                    correlated.append(halves_apart(points, vectors, covariances, first, shared=shared, correlation_length=length))
+                    correlated.append(
+                        halves_apart(
+                            points, vectors, covariances, first, shared=shared, correlation_length=length
+                        )
+                    )
                     independent.append(halves_apart(points, vectors, covariances / shared, first))
-                row: Row = {"flow": preset, "spacing, px": spacing, "correlation lengths": round(spacing / length, 1), "halves": name, "pairs": len(taken)}
-                row |= told(correlated) | {f"{key}, taken for independent": value for key, value in told(independent).items()}
+                row: Row = {
+                    "flow": preset,
+                    "spacing, px": spacing,
+                    "correlation lengths": round(spacing / length, 1),
+                    "halves": name,
+                    "pairs": len(taken),
+                }
+                row |= summary(correlated) | {
+                    f"{key}, taken for independent": value for key, value in summary(independent).items()
+                }
                 rows.append(row)
     return rows
 

@@ -1,6 +1,7 @@
-"""The particle filter beside the Kalman filter on a linear model, and its CPU time beside filterpy's resampling and a NumPy filter.
+"""The particle filter beside the Kalman filter on a linear model, and its CPU time beside filterpy's
+resampling and a NumPy filter.
 
-    python -m benchmarks.tables.particle_filter
+python -m benchmarks.tables.particle_filter
 """
 
 from __future__ import annotations
@@ -22,7 +23,13 @@ except ImportError:
 Array = NDArray[np.float64]
 Row = dict[str, object]
 SEEDS, PARTICLES = 12, 20_000
-COLUMNS = ("mean, sd/sqrt(ESS)", "variances, %", "log evidence of a step", "of all steps together", "N / smallest ESS")
+COLUMNS = (
+    "mean, sd/sqrt(ESS)",
+    "variances, %",
+    "log evidence of a step",
+    "of all steps together",
+    "N / smallest ESS",
+)
 SCHEMES = ("systematic", "stratified", "residual", "multinomial")
 F = np.array([[1.0, 1.0], [0.0, 1.0]])
 Q = np.diag([0.05, 0.02])
@@ -95,7 +102,8 @@ def ours(particles: int, seed: int, threads: int | None = None) -> ParticleFilte
 
 
 def worst_step(filter_: ParticleFilter | NumpyFilter, scheme: str, seed: int) -> tuple[float, ...]:
-    """Largest error of the mean in sd/sqrt(ESS), of variances (relative) and of the log evidence; error of its sum; N / smallest ESS."""
+    """Largest error of the mean in sd/sqrt(ESS), of variances (relative) and of the log evidence; error of
+    its sum; N / smallest ESS."""
     kalman = KalmanFilter(2, 1)
     kalman.F, kalman.H, kalman.P, kalman.Q, kalman.R = F, np.array([[1.0, 0.0]]), P0, Q, R
     steps, total, fewest = [], 0.0, np.inf
@@ -160,7 +168,8 @@ def cycles(particles: int, rounds: int) -> list[Row]:
     )
     base = times["ours, 1 thread"].busiest
     return [
-        {"filter": name, "us": 1e6 * time.busiest / STEPS, "ratio": time.busiest / base} for name, time in times.items()
+        {"filter": name, "us": 1e6 * time.busiest / STEPS, "ratio": time.busiest / base}
+        for name, time in times.items()
     ]
 
 
@@ -174,22 +183,24 @@ def resampling(particles: int, rounds: int) -> list[Row]:
     for scheme in SCHEMES:
         rival = getattr(monte_carlo, f"{scheme}_resample")
         times = timing.race(
-            {"ours": lambda s=scheme: resample(weights, scheme=s), "filterpy": lambda r=rival: r(weights)}, rounds
+            {"ours": lambda s=scheme: resample(weights, scheme=s), "filterpy": lambda r=rival: r(weights)},
+            rounds,
         )
         own, theirs = times["ours"].busiest, times["filterpy"].busiest
-        rows.append({"scheme": scheme, "ours, us": 1e6 * own, "filterpy, us": 1e6 * theirs, "ratio": theirs / own})
+        rows.append(
+            {"scheme": scheme, "ours, us": 1e6 * own, "filterpy, us": 1e6 * theirs, "ratio": theirs / own}
+        )
     return rows
 
 
 TABLES = {
     "accuracy": report.Table(
-        f"Particle filter, worst of {STEPS} steps against the Kalman filter: median of seeds (largest); asked: {BARS}",
+        f"Particle filter, worst of {STEPS} steps against the Kalman filter: median of seeds (largest); "
+        f"asked: {BARS}",
         lambda o: accuracy(PARTICLES, report.trials(o, SEEDS)),
     ),
     "copies": report.Table("Particle filter, copies of weights .1 .2 .3 .4, n = 8", lambda _: copies()),
-    "cycles": report.Table(
-        "Particle filter, time of a cycle", lambda o: cycles(PARTICLES, report.rounds(o))
-    ),
+    "cycles": report.Table("Particle filter, time of a cycle", lambda o: cycles(PARTICLES, report.rounds(o))),
     "resampling": report.Table(
         "Particle filter, time of a resampling", lambda o: resampling(PARTICLES, report.rounds(o))
     ),

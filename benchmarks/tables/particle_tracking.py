@@ -1,10 +1,11 @@
 """The particle tracker beside OpenCV's trackers on scenes of targets that look alike and on recordings.
 
-    python -m benchmarks.tables.particle_tracking [--only TABLE ...] [--runs 3] [--recordings 10 11] [--trackers NAME ...] [--data FOLDER] [--out FOLDER]
+    python -m benchmarks.tables.particle_tracking [--only TABLE ...] [--runs 3] [--recordings 10 11] [--data FOLDER]
 
-Every tracker gets the true box of each target in its first frame. A cell is success in % / mean overlap (intersection over union) / mean error of the
-centre in px, over recordings (seeds of the scene), runs (seeds of the tracker) and targets. Success: the centre in the target's own true box in 80 % of the
-frames, and a mean overlap of 0.3 in the last ten. OpenCV's trackers run once a recording, one for each target.
+Every tracker gets the true box of each target in its first frame. A cell is success in % / mean overlap
+(intersection over union) / mean error of the centre in px, over recordings (seeds of the scene), runs (seeds
+of the tracker) and targets. Success: the centre in the target's own true box in 80 % of the frames, and a
+mean overlap of 0.3 in the last ten. OpenCV's trackers run once a recording, one for each target.
 """
 
 from __future__ import annotations
@@ -18,13 +19,7 @@ import numpy as np
 from benchmarks import report
 from benchmarks.rivals.particle import Contestant, Sequence, Settings, rivals
 from benchmarks.scenes import particle_recordings
-from benchmarks.scores.particle import (
-    FOUND,
-    ended_at_truth,
-    multiple_object,
-    overlaps,
-    success,
-)
+from benchmarks.scores.particle import FOUND, ended_at_truth, multiple_object, overlaps, success
 from jacoflow import scenes
 from jacoflow.track import ParticleTracker
 
@@ -49,9 +44,14 @@ def without(mode: str, factors: tuple[str, ...], factor: str) -> Settings:
 
 LIKELIHOODS = (PAPER_MODE, *(without("paper", PAPER, factor) for factor in PAPER[::-1]), IMPROVED_MODE)
 READINGS = (
-    *(Settings(f"paper mode, foreground {name}", "paper", {"foreground": name}) for name in ("ratio", "literal", "posterior", "affine")),
+    *(
+        Settings(f"paper mode, foreground {name}", "paper", {"foreground": name})
+        for name in ("ratio", "literal", "posterior", "affine")
+    ),
     Settings("paper mode, systematic resampling", "paper", {"resampling": "systematic"}),
-    Settings("paper mode, systematic, below N/2", "paper", {"resampling": "systematic", "ess_threshold": 0.5}),
+    Settings(
+        "paper mode, systematic, below N/2", "paper", {"resampling": "systematic", "ess_threshold": 0.5}
+    ),
 )
 PARTS = (
     IMPROVED_MODE,
@@ -59,7 +59,9 @@ PARTS = (
     *(Settings(f"improved mode without {part}", "improved", {"without": (part,)}) for part in PIECES),
     Settings("improved mode with distance", "improved", {"likelihoods": (*IMPROVED, "distance")}),
     Settings("improved mode with foreground", "improved", {"likelihoods": (*IMPROVED, "foreground")}),
-    Settings("improved mode, systematic, below N/2", "improved", {"resampling": "systematic", "ess_threshold": 0.5}),
+    Settings(
+        "improved mode, systematic, below N/2", "improved", {"resampling": "systematic", "ess_threshold": 0.5}
+    ),
     Settings("improved mode, 300 and 600 particles", "improved", {"n_particles": 300, "n_near": 600}),
     Settings("improved mode, 100 and 200 particles", "improved", {"n_particles": 100, "n_near": 200}),
 )
@@ -71,7 +73,9 @@ def scene(name: str, recording: int) -> Sequence:
     return Sequence(name, made.frames(), made.boxes())
 
 
-def comparison(names: Iterable[str], contestants: list[Contestant], recordings: Iterable[int], runs: int) -> list[Row]:
+def comparison(
+    names: Iterable[str], contestants: list[Contestant], recordings: Iterable[int], runs: int
+) -> list[Row]:
     """One row for each tracker, one column for each scene, then means over the scenes."""
     figures: dict[str, dict[str, list[dict[str, float]]]] = {each.name: {} for each in contestants}
     for name in names:
@@ -79,20 +83,37 @@ def comparison(names: Iterable[str], contestants: list[Contestant], recordings: 
             sequence = scene(name, recording)
             for each in contestants:
                 for seed in range(runs if each.random else 1):
-                    figures[each.name].setdefault(name, []).extend(success(each.follow(sequence, seed), sequence.boxes))
+                    figures[each.name].setdefault(name, []).extend(
+                        success(each.follow(sequence, seed), sequence.boxes)
+                    )
     rows: list[Row] = []
     for tracker, by_scene in figures.items():
-        means = {name: {key: float(np.mean([figure[key] for figure in each])) for key in each[0]} for name, each in by_scene.items()}
-        cells = {name: f"{100 * each['success']:.0f} / {each['overlap']:.2f} / {each['centre_error']:.1f}" for name, each in means.items()}
-        over_scenes = {key: float(np.mean([each[key] for each in means.values()])) for key in ("success", "overlap")}
+        means = {
+            name: {key: float(np.mean([figure[key] for figure in each])) for key in each[0]}
+            for name, each in by_scene.items()
+        }
+        cells = {
+            name: f"{100 * each['success']:.0f} / {each['overlap']:.2f} / {each['centre_error']:.1f}"
+            for name, each in means.items()
+        }
+        over_scenes = {
+            key: float(np.mean([each[key] for each in means.values()])) for key in ("success", "overlap")
+        }
         count = {len(each) for each in by_scene.values()}
         row: Row = {"tracker": tracker, "n": "-".join(str(each) for each in sorted(count)), **cells}
-        rows.append({**row, "mean success, %": round(100 * over_scenes["success"], 1), "mean overlap": round(over_scenes["overlap"], 3)})
+        rows.append(
+            {
+                **row,
+                "mean success, %": round(100 * over_scenes["success"], 1),
+                "mean overlap": round(over_scenes["overlap"], 3),
+            }
+        )
     return rows
 
 
 def campus(data: Path, ours: list[Contestant], others: list[Contestant]) -> list[Row]:
-    """Multiple object tracking of eight people: ours on frames of 320 x 240, OpenCV's on those of 640 x 480."""
+    """Multiple object tracking of eight people: ours on frames of 320 x 240, OpenCV's on those of 640 x
+    480."""
     full = particle_recordings.campus(data)
     if full is None:
         return []
@@ -103,16 +124,22 @@ def campus(data: Path, ours: list[Contestant], others: list[Contestant]) -> list
         for seed in SEEDS if each.random else SEEDS[:1]:
             boxes = each.follow(sequence, seed)
             ended = multiple_object(ended_at_truth(boxes, sequence.boxes), sequence.boxes)
-            whole = {name: round(value, 3) if name in ("MOTA", "IDF1") else int(value) for name, value in multiple_object(boxes, sequence.boxes).items()}
+            whole = {
+                name: round(value, 3) if name in ("MOTA", "IDF1") else int(value)
+                for name, value in multiple_object(boxes, sequence.boxes).items()
+            }
             row: Row = {"tracker": each.name, "seed": seed if each.random else "", **whole}
-            row |= {f"{name}, ended at the truth": round(ended[name], 3) for name in ("MOTA", "IDF1") if ended}
+            row |= {
+                f"{name}, ended at the truth": round(ended[name], 3) for name in ("MOTA", "IDF1") if ended
+            }
             means = np.nanmean(overlaps(boxes, sequence.boxes), axis=0)
             rows.append({**row, "mean overlap of each target": " ".join(f"{value:.2f}" for value in means)})
     return rows
 
 
 def single(data: Path, contestants: list[Contestant]) -> list[Row]:
-    """Mean overlap and number of frames with an overlap of 0.5 or more, of recordings with one or two targets."""
+    """Mean overlap and number of frames with an overlap of 0.5 or more, of recordings with one or two
+    targets."""
     rows: list[Row] = []
     for sequence in particle_recordings.single(data):
         for each in contestants:
@@ -120,12 +147,21 @@ def single(data: Path, contestants: list[Contestant]) -> list[Row]:
                 shares = overlaps(each.follow(sequence, seed), sequence.boxes)
                 found = " ".join(f"{int((column >= FOUND).sum())}/{len(column)}" for column in shares.T)
                 means = " ".join(f"{value:.2f}" for value in np.nanmean(shares, axis=0))
-                rows.append({"recording": sequence.name, "tracker": each.name, "seed": seed if each.random else "", "mean overlap of each target": means, f"frames with {FOUND} or more": found})
+                rows.append(
+                    {
+                        "recording": sequence.name,
+                        "tracker": each.name,
+                        "seed": seed if each.random else "",
+                        "mean overlap of each target": means,
+                        f"frames with {FOUND} or more": found,
+                    }
+                )
     return rows
 
 
 def speed(threads: int = 2, rounds: int = 3) -> list[Row]:
-    """Time of a frame of 720 x 480 with two targets that cross, 1000 particles each and 2000 while they are near, beside CSRT, in one run."""
+    """Time of a frame of 720 x 480 with two targets that cross, 1000 particles each and 2000 while they
+    are near, beside CSRT, in one run."""
     made = scenes.TargetScene("people_handheld", random_state=SEEDS[0], scale=1.0)
     frames, boxes = made.frames(), made.boxes()
     times: dict[str, list[float]] = {}
@@ -139,7 +175,14 @@ def speed(threads: int = 2, rounds: int = 3) -> list[Row]:
         start = time.perf_counter()
         each.follow(Sequence("speed", frames, boxes), 0)
         times[f"{each.name}, one thread"] = [1e3 * (time.perf_counter() - start) / (len(frames) - 1)]
-    return [{"tracker": name, "mean, ms": round(float(np.mean(each)), 1), "median, ms": round(float(np.median(each)), 1)} for name, each in times.items()]
+    return [
+        {
+            "tracker": name,
+            "mean, ms": round(float(np.mean(each)), 1),
+            "median, ms": round(float(np.median(each)), 1),
+        }
+        for name, each in times.items()
+    ]
 
 
 def among(options: report.Options, settings: Iterable[Settings], *beside: Contestant) -> list[Contestant]:

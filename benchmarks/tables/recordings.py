@@ -1,4 +1,5 @@
-"""Errors of flow and Jacobian on recordings with known truth, against OpenCV's flows and against no motion at all."""
+"""Errors of flow and Jacobian on recordings with known truth, against OpenCV's flows and against no motion
+at all."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ Row = dict[str, object]
 
 @dataclass(frozen=True)
 class Asked:
-    """What one setting for all recordings should attain: mean end-point error in px and error of the Jacobian in 1/frame."""
+    """What one setting for all recordings should attain: mean end-point error in px and error of the
+    Jacobian in 1/frame."""
 
     reach: tuple[float, float]
     aim: tuple[float, float]
@@ -51,7 +53,8 @@ ASKED = {
 
 
 def score(sample: Sample, flow: Array, jacobian: Array) -> Row:
-    """Mean end-point error (px) over the pixels with a truth, share of them that have an estimate, error of the Jacobian's entries (1/frame)."""
+    """Mean end-point error (px) over the pixels with a truth, share of them that have an estimate, error
+    of the Jacobian's entries (1/frame)."""
     mean, share = end_point_error(flow, sample.truth)
     asked = ASKED.get(sample.name)
     wrong = jacobian_error(jacobian, differences(sample.truth), usable(sample.truth))
@@ -70,8 +73,17 @@ def rival_rows(sample: Sample) -> list[Row]:
     rows: list[Row] = []
     for method, run in rivals.RIVALS.items():
         flow = run(*sample.pair())
-        setting, _, jacobian = rivals.best(rivals.gaussian_fits(flow), lambda _, j: jacobian_error(j, truth, where))
-        rows.append({"sample": sample.name, "method": method, **score(sample, flow, jacobian), "best_sigma": setting["sigma"]})
+        setting, _, jacobian = rivals.best(
+            rivals.gaussian_fits(flow), lambda _, j: jacobian_error(j, truth, where)
+        )
+        rows.append(
+            {
+                "sample": sample.name,
+                "method": method,
+                **score(sample, flow, jacobian),
+                "best_sigma": setting["sigma"],
+            }
+        )
     return rows
 
 
@@ -81,24 +93,34 @@ def frames_for(sample: Sample, setting: Setting) -> list[samples.Picture]:
 
 
 def table(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
-    """One row for each recording and method, reached beside asked; recordings that are not there get a row that says so."""
+    """One row for each recording and method, reached beside `ASKED`; a missing recording has a row that
+    says so."""
     if samples.cv2 is None:
         return [{"sample": "all", "method": "skipped: OpenCV, which reads the pictures, is missing"}]
     rows: list[Row] = []
     found, missing = samples.read_all(samples.FLOWS, data)
     for sample in found:
         zero = np.zeros_like(sample.truth)
-        rows.append({"sample": sample.name, "method": "no motion", **score(sample, zero, np.zeros((*zero.shape, 2)))})
+        rows.append(
+            {"sample": sample.name, "method": "no motion", **score(sample, zero, np.zeros((*zero.shape, 2)))}
+        )
         rows += rival_rows(sample)
         for setting in ours:
-            rows.append({"sample": sample.name, "method": setting.name, **score(sample, *setting.estimate(frames_for(sample, setting)))})
+            rows.append(
+                {
+                    "sample": sample.name,
+                    "method": setting.name,
+                    **score(sample, *setting.estimate(frames_for(sample, setting))),
+                }
+            )
     return rows + [{"sample": line, "method": "skipped"} for line in missing]
 
 
 def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
-    """Image correlation: root-mean-square error of u (px, all pixels) and of u_x (1/frame, 12 px from the edge) against the commanded ones.
+    """Image correlation: root mean square error of u (px, all pixels) and of u_x (1/frame, 12 px from the edge).
 
-    OpenCV's rows have the Gaussians that suit u and u_x best, each chosen with the truth. Asked of ours: below both of them (`reach`), half of the better (`aim`).
+    OpenCV's rows have the Gaussians that suit u and u_x best, each chosen with the truth. Specified for ours:
+    below both of them (`reach`), half of the better one (`aim`).
     """
     if samples.cv2 is None:
         return []
@@ -114,17 +136,38 @@ def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
     def of_slope(_flow: Array, jacobian: Array) -> float:
         return root_mean_square((jacobian[..., 0, 0] - slope)[where & np.isfinite(jacobian[..., 0, 0])])
 
-    rows: list[Row] = [{"sample": sample.name, "method": "no motion", "u_error": root_mean_square(along), "u_x_error": root_mean_square(np.where(where, slope, 0.0)[where])}]
+    rows: list[Row] = [
+        {
+            "sample": sample.name,
+            "method": "no motion",
+            "u_error": root_mean_square(along),
+            "u_x_error": root_mean_square(np.where(where, slope, 0.0)[where]),
+        }
+    ]
     peers: list[Row] = []
     for method, run in rivals.RIVALS.items():
         flow = run(*sample.pair())
         fits = list(rivals.gaussian_fits(flow))
-        (u_setting, *u_fit), (slope_setting, *slope_fit) = (rivals.best(iter(fits), error) for error in (of_u, of_slope))
-        peers.append({"sample": sample.name, "method": method, "u_error": of_u(*u_fit), "u_x_error": of_slope(*slope_fit), "u_error_unsmoothed": of_u(flow, flow)})
+        (u_setting, *u_fit), (slope_setting, *slope_fit) = (
+            rivals.best(iter(fits), error) for error in (of_u, of_slope)
+        )
+        peers.append(
+            {
+                "sample": sample.name,
+                "method": method,
+                "u_error": of_u(*u_fit),
+                "u_x_error": of_slope(*slope_fit),
+                "u_error_unsmoothed": of_u(flow, flow),
+            }
+        )
         peers[-1] |= {"best_sigma_u": u_setting["sigma"], "best_sigma": slope_setting["sigma"]}
     for setting in ours:
         estimate = setting.estimate(frames_for(sample, setting))
-        row: Row = {"sample": sample.name, "method": setting.name, "share": float(np.isfinite(estimate[0]).all(axis=-1).mean())}
+        row: Row = {
+            "sample": sample.name,
+            "method": setting.name,
+            "share": float(np.isfinite(estimate[0]).all(axis=-1).mean()),
+        }
         for name, error in (("u_error", of_u), ("u_x_error", of_slope)):
             reach = min(float(str(peer[name])) for peer in peers)
             row |= {name: error(*estimate), f"{name}_reach": reach, f"{name}_aim": reach / 2}

@@ -2,10 +2,10 @@
 
     python -m benchmarks.tables.segmentation [--data FOLDER]
 
-Agreement: number of regions, and adjusted Rand index of our labels against scikit-image's, at scale / min_size
-150 / 30 and 300 / 60, sigma 0.8. Without `--data` (or JACOFLOW_DATA) only pictures that come with scikit-image
-are used. Time: 720 x 480 colour px of 8 bits, scale 150, sigma 0.8, min_size 120. All run in turns in this
-process; given are CPU time of the busiest thread and the median of the time on the clock.
+Agreement: number of regions, and adjusted Rand index of our labels against scikit-image's, at scale /
+min_size 150 / 30 and 300 / 60, sigma 0.8. Without `--data` (or JACOFLOW_DATA) only pictures that come with
+scikit-image are used. Time: 720 x 480 colour px of 8 bits, scale 150, sigma 0.8, min_size 120. All run in
+turns in this process; given are CPU time of the busiest thread and the median of the time on the clock.
 """
 
 from __future__ import annotations
@@ -77,7 +77,15 @@ def agreement(data: Path | None) -> list[Row]:
             theirs = felzenszwalb(image, scale, SIGMA, min_size)
             index = adjusted_rand_score(theirs.ravel(), ours.ravel())
             regions = {"regions": int(ours.max()) + 1, "scikit-image": int(theirs.max()) + 1}
-            rows.append({"picture": name, "scale": scale, "min_size": min_size, **regions, "adjusted_rand_index": f"{index:.6f}"})
+            rows.append(
+                {
+                    "picture": name,
+                    "scale": scale,
+                    "min_size": min_size,
+                    **regions,
+                    "adjusted_rand_index": f"{index:.6f}",
+                }
+            )
     return rows
 
 
@@ -112,11 +120,15 @@ def times(data: Path | None, rounds: int) -> list[Row]:
     base = next(iter(work))
     return [
         {
-            "method": name, "cpu_ms_min": 1000 * best[name], "cpu_ms_median": 1000 * middle[name], "clock_ms_median": 1000 * clock[name],
-            "times_ours_min": best[name] / best[base], "times_ours_median": middle[name] / middle[base],
+            "method": name,
+            "cpu_ms_min": 1000 * best[name],
+            "cpu_ms_median": 1000 * middle[name],
+            "clock_ms_median": 1000 * clock[name],
+            "times_ours_min": best[name] / best[base],
+            "times_ours_median": middle[name] / middle[base],
         }
         for name in work
-    ]  # fmt: skip
+    ]
 
 
 TABLES = {

@@ -2,8 +2,10 @@
 
     python -m benchmarks.tables.stereo_prior
 
-Candidates are within 3 px of the disparity that the step before leads to, moved by the true motion: the best that any prediction could do. On a fence of one grey, whose pales look alike, on one that is textured, and on people who cross.
-Outliers are edge pixels more than 1 px off the best truth within 2 px. Times are wall time of matching with a known row offset.
+Candidates are within 3 px of the disparity that the step before leads to, moved by the true motion: the best
+that any prediction could do. On a fence of one grey, whose pales look alike, on one that is textured, and on
+people who cross. Outliers are edge pixels more than 1 px off the best truth within 2 px. Times are wall time
+of matching with a known row offset.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ Row = dict[str, object]
 
 
 def led_to(before: NDArray[np.floating], shown: stereo_scenes.Step) -> NDArray[np.float32]:
-    """Where the disparities of a step, (H, W), px, are at the next one: moved, and spread to the 5 x 5 px about each place, nearer ones over farther; NaN elsewhere."""
+    """Where the disparities of a step, (H, W), px, are at the next one: moved, and spread to the 5 x 5 px
+    about each place, nearer ones over farther; NaN elsewhere."""
     height, width = before.shape
     rows, columns = np.nonzero(np.isfinite(before))
     u, v, w = shown.motion[rows, columns].T
@@ -45,21 +48,41 @@ def prior_row(scene: stereo_scenes.Scene, method: str, with_prior: bool) -> Row:
     for t, shown in enumerate(film):
         prior = led_to(found, film[t - 1]) if with_prior and found is not None else None
         begun = time.perf_counter()
-        found = jacoflow.stereo.edge_disparity(shown.left, shown.right, disparity_range=scene.disparity_range, row_offset=scene.row_offset, method=method, prior=prior).disparity
+        found = jacoflow.stereo.edge_disparity(
+            shown.left,
+            shown.right,
+            disparity_range=scene.disparity_range,
+            row_offset=scene.row_offset,
+            method=method,
+            prior=prior,
+        ).disparity
         if t > 0:
             times.append(time.perf_counter() - begun)
             counts.append(count(found, edge_pixels(shown.left), shown.disparity, shown.visible))
-    return {"scene": scene.name, "method": method, "prior": "within 3 px" if with_prior else "none", **figures(counts), "ms": 1e3 * float(np.median(times))}
+    return {
+        "scene": scene.name,
+        "method": method,
+        "prior": "within 3 px" if with_prior else "none",
+        **figures(counts),
+        "ms": 1e3 * float(np.median(times)),
+    }
 
 
 def table() -> list[Row]:
     """One row for each scene, method and prior."""
     scenes = stereo_scenes.fence(), stereo_scenes.textured_fence(), stereo_scenes.crossing()
-    return [prior_row(scene, method, with_prior) for scene in scenes for method in ("classes", "sgm") for with_prior in (False, True)]
+    return [
+        prior_row(scene, method, with_prior)
+        for scene in scenes
+        for method in ("classes", "sgm")
+        for with_prior in (False, True)
+    ]
 
 
 TABLES = {
-    "prior": report.Table("Disparity of edge pixels, looked for near those of the step before", lambda _: table()),
+    "prior": report.Table(
+        "Disparity of edge pixels, looked for near those of the step before", lambda _: table()
+    )
 }
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ except ImportError:
     cv2 = None
 
 
-
 def rows(data: Path, rounds: int) -> list[dict[str, object]]:
-    """One row for each recording and method: rows of these cameras are aligned, only edge pixels with a known truth count, best truth within 2 px."""
+    """One row for each recording and method: rows of these cameras are aligned, only edge pixels with a
+    known truth count, best truth within 2 px."""
     if cv2 is None:
         return [{"recording": "skipped: OpenCV, which reads the pictures, is missing"}]
     chosen = [
@@ -39,7 +39,8 @@ def rows(data: Path, rounds: int) -> list[dict[str, object]]:
 
 TABLES = {
     "recordings": report.Table(
-        "Disparity of edge pixels, recordings", lambda o: [] if o.data is None else rows(o.data, report.rounds(o))
+        "Disparity of edge pixels, recordings",
+        lambda o: [] if o.data is None else rows(o.data, report.rounds(o)),
     )
 }
 

@@ -1,11 +1,14 @@
-"""The stereo tracker on films of people who cross one another, drawn by chance: whether who was hidden is recognised.
+"""The stereo tracker on random scenes of people who cross: whether a hidden object is recognised.
 
     python -m benchmarks.tables.stereo_tracking_chance [--trials 20]
 
-- `crossing`: the layout of the scene `crossing`, with every place, speed, depth, size and texture of it drawn anew.
-- `passing`: somebody is hidden for some steps by a pillar, by another person or by two; often with something else that moves about; noise of 1 to 4 grey levels.
+- `crossing`: the layout of the scene `crossing` with random places, speeds, depths, sizes and textures.
+- `passing`: a person is hidden for some steps by a pillar, by another person or by two; noise of 1 to 4 grey
+  levels.
 
-Counted are objects that are seen for three steps at least before they are hidden, long enough to know how they move, and for two after that. Paths last until an object is hidden; `kept` is the share of the steps at which an object is visible with one and the same track.
+An object counts if it is visible for at least three steps before it is hidden and for two after that. Paths
+last until an object is hidden; `kept` is the share of the steps at which an object is visible with one and
+the same track.
 """
 
 from __future__ import annotations
@@ -28,12 +31,17 @@ HISTORY = 3
 
 def scored(scene: Scene, seed: int) -> Scores:
     """What the tracker makes of a film."""
-    return follow(scene, scene.film(), StereoTracker(disparity_range=scene.disparity_range, random_state=seed), False)[0]
+    return follow(
+        scene, scene.film(), StereoTracker(disparity_range=scene.disparity_range, random_state=seed), False
+    )[0]
 
 
 def comings_back(scores: Scores, scene: Scene) -> dict[int, bool]:
-    """Of each object that was hidden and came back, seen long enough before and after: whether it was recognised."""
-    told = {label: scores.recognised(label) for label in labels(scene) if scores.first_hidden(label) >= HISTORY}
+    """Of each object that was hidden and came back, seen long enough before and after: whether it was
+    recognised."""
+    told = {
+        label: scores.recognised(label) for label in labels(scene) if scores.first_hidden(label) >= HISTORY
+    }
     return {label: recognised for label, recognised in told.items() if recognised is not None}
 
 
@@ -49,7 +57,10 @@ def row(kind: str, films: int) -> Row:
             kept.append(scores.id_share(label))
             recalls.append(scores.recall(label))
             paths.append(scores.path(label) / max(1, scores.first_hidden(label)))
-    means = {name: float(np.mean(values)) for name, values in {"purity": purities, "recall": recalls, "path": paths, "kept": kept}.items()}
+    means = {
+        name: float(np.mean(values))
+        for name, values in {"purity": purities, "recall": recalls, "path": paths, "kept": kept}.items()
+    }
     return {"films": kind, "number": films, **means, "recognised": f"{sum(back)} of {len(back)}"}
 
 
@@ -59,7 +70,9 @@ def table(films: int) -> list[Row]:
 
 
 TABLES = {
-    "chance": report.Table("Stereo tracking, films by chance", lambda o: table(report.trials(o, SEQUENCES, 1))),
+    "chance": report.Table(
+        "Stereo tracking, films by chance", lambda o: table(report.trials(o, SEQUENCES, 1))
+    )
 }
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
-"""The stereo tracker on a recording: five pairs of KITTI 2012 from a driving car, with the known flow of one of them.
+"""The stereo tracker on a recording: five pairs of KITTI 2012 from a driving car, with the known flow of one
+of them.
 
     python -m benchmarks.tables.stereo_tracking_recordings --data FOLDER [--picture FILE]
 
-Each edge pixel of pair 10 is told by its cluster's affine motion where it is in pair 11; where the true flow is known, that is compared: end point error, and outliers as KITTI counts them (off by more than 3 px and 5 %).
-A street seen from a driving car does not move as affine pieces parallel to the picture, as clusters do: this measures how far that goes. `best affine` is the median error that is left if each cluster's affine motion is fitted to the true flow of
-its own pixels: it tells what the size of the clusters alone costs. With the usual 16 components one holds the whole road; the second row has three times as many, and searches as far as near things move here (120 px and 8 disparities a step).
-Disparities are compared with the true ones.
+The affine motion of its cluster predicts where each edge pixel of pair 10 is in pair 11. Where the true flow
+is known the table has the end-point error and the outliers as KITTI counts them (more than 3 px and 5 % off).
+`best affine` is the median error that is left if each cluster's affine motion is fitted to the true flow of
+its pixels: the cost of the size of the clusters alone. With the usual 16 components one holds the whole road;
+the second row has three times as many, and a search range for the near objects of this recording (120 px and
+8 disparities a step).
 """
 
 from __future__ import annotations
@@ -53,10 +56,14 @@ def read(data: Path) -> Recording:
     folder = data / "kitti2012"
     pairs = []
     for index in FRAMES:
-        left, right = (read_grey(folder / f"image_{camera}" / f"{SEQUENCE}_{index:02d}.png") for camera in (0, 1))
+        left, right = (
+            read_grey(folder / f"image_{camera}" / f"{SEQUENCE}_{index:02d}.png") for camera in (0, 1)
+        )
         pairs.append((left, right))
     # OpenCV turns the order of the channels round: valid, v, u.
-    valid, v, u = np.moveaxis(cv2.imread(str(folder / "flow_occ" / f"{SEQUENCE}_10.png"), cv2.IMREAD_UNCHANGED).astype(float), -1, 0)
+    valid, v, u = np.moveaxis(
+        cv2.imread(str(folder / "flow_occ" / f"{SEQUENCE}_10.png"), cv2.IMREAD_UNCHANGED).astype(float), -1, 0
+    )
     flow = np.where(valid[..., None] > 0, (np.stack([u, v], axis=-1) - 32768) / 64, np.nan)
     disparity = cv2.imread(str(folder / "disp_occ" / f"{SEQUENCE}_10.png"), cv2.IMREAD_UNCHANGED) / 256.0
     return Recording(pairs, flow, np.where(disparity > 0, disparity, np.nan))
@@ -74,12 +81,15 @@ DRAWN = "improved, 48 components, search 16"
 
 def follow(recording: Recording, settings: str) -> tuple[StereoTracker, list[StereoStep]]:
     """The tracker after the recording, and its steps."""
-    tracker = StereoTracker(**SETTINGS[settings], disparity_range=(0, 127), row_offset=0.0, focal=FOCAL, baseline=BASELINE)
+    tracker = StereoTracker(
+        **SETTINGS[settings], disparity_range=(0, 127), row_offset=0.0, focal=FOCAL, baseline=BASELINE
+    )
     return tracker, [tracker.update(left, right) for left, right in recording.pairs]
 
 
 def motion_of_pixels(tracker: StereoTracker, step: StereoStep) -> Array:
-    """What the clusters of a step say of the motion of their pixels to the next one, (N, 2), px; NaN where they say nothing."""
+    """What the clusters of a step say of the motion of their pixels to the next one, (N, 2), px; NaN where
+    they say nothing."""
     motion = np.full((len(step.rows), 2), np.nan)
     for cluster in step.clusters:
         told, mine = tracker.graph.nodes[step.time, cluster.index], step.cluster_of_pixel == cluster.index
@@ -92,14 +102,22 @@ def motion_of_pixels(tracker: StereoTracker, step: StereoStep) -> Array:
 
 
 def best_affine(step: StereoStep, flow: Array) -> Array:
-    """Errors (N,), px, of the affine motion of each cluster that is nearest to the true flow (N, 2) of its pixels, found by weighting them over and over; NaN where there is no truth, or too little of it."""
+    """Errors (N,), px, of the affine motion of each cluster that is nearest to the true flow (N, 2) of its
+    pixels, found by weighting them over and over; NaN where there is no truth, or too little of it."""
     error = np.full(len(flow), np.nan)
     known = np.isfinite(flow).all(axis=-1)
     for index in np.unique(step.cluster_of_pixel):
         mine = (step.cluster_of_pixel == index) & known
         if mine.sum() < 20:
             continue
-        places = np.stack([np.ones(mine.sum()), step.cols[mine] - step.cols[mine].mean(), step.rows[mine] - step.rows[mine].mean()], axis=-1)
+        places = np.stack(
+            [
+                np.ones(mine.sum()),
+                step.cols[mine] - step.cols[mine].mean(),
+                step.rows[mine] - step.rows[mine].mean(),
+            ],
+            axis=-1,
+        )
         weights = np.ones(len(places))
         for _ in range(20):
             map_ = np.linalg.lstsq(places * weights[:, None], flow[mine] * weights[:, None], rcond=None)[0]
@@ -124,10 +142,20 @@ def row(recording: Recording, settings: str) -> dict[str, object]:
     off = np.abs(step.values - recording.disparity[step.rows, step.cols])
     lengths = [len(track.times) for track in tracker.tracks.values()]
     return {
-        "mode": settings, "edge pixels": len(step.rows), "with known flow": int(known.sum()), "told": float(told.mean()), "median error": float(np.nanmedian(error)),
-        "outliers": float(wrong[told].mean()), "best affine": float(np.nanmedian(best_affine(step, truth))), "median speed": float(np.median(np.hypot(*truth[known].T))), "disparity MAE": float(np.nanmean(off)),
-        "disparity off by 3 px": float((off[np.isfinite(off)] > 3).mean()), "clusters": len(step.clusters), "tracks through all pairs": sum(length == len(steps) for length in lengths), "ms a step": spent,
-    }  # fmt: skip
+        "mode": settings,
+        "edge pixels": len(step.rows),
+        "with known flow": int(known.sum()),
+        "told": float(told.mean()),
+        "median error": float(np.nanmedian(error)),
+        "outliers": float(wrong[told].mean()),
+        "best affine": float(np.nanmedian(best_affine(step, truth))),
+        "median speed": float(np.median(np.hypot(*truth[known].T))),
+        "disparity MAE": float(np.nanmean(off)),
+        "disparity off by 3 px": float((off[np.isfinite(off)] > 3).mean()),
+        "clusters": len(step.clusters),
+        "tracks through all pairs": sum(length == len(steps) for length in lengths),
+        "ms a step": spent,
+    }
 
 
 def rows(data: Path) -> list[dict[str, object]]:
@@ -155,7 +183,9 @@ def draw(data: Path, out: Path) -> None:
     disparity = np.full(left.shape, np.nan)
     disparity[step.rows, step.cols] = step.values
     axes[0].imshow(0.6 * left, cmap="gray", vmin=0, vmax=255)
-    points = axes[0].scatter(step.cols, step.rows, c=step.values, s=1.5, marker="s", linewidths=0, cmap="turbo")
+    points = axes[0].scatter(
+        step.cols, step.rows, c=step.values, s=1.5, marker="s", linewidths=0, cmap="turbo"
+    )
     figure.colorbar(points, ax=axes[0], label="disparity, px")
     for each, by in zip(axes[1:3], ("track", "group"), strict=True):
         plot.clusters(step, left=left, axes=each, by=by)

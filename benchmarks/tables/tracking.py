@@ -2,8 +2,9 @@
 
     python -m benchmarks.tables.tracking [--only TABLE ...] [--trackers NAME ...] [--quick]
 
-Every tracker gets the true box in the first frame (where a scene is not about a wrong one). A cell is the share of frames with intersection over union
-above 0.5 / the median error of the centre in px. "3x" ran on frames enlarged three times, the best case of OpenCV's trackers for so small a target.
+Every tracker gets the true box in the first frame (where a scene is not about a wrong one). A cell is the
+share of frames with intersection over union above 0.5 / the median error of the centre in px. "3x" ran on
+frames enlarged three times, the best case of OpenCV's trackers for so small a target.
 """
 
 from __future__ import annotations
@@ -22,16 +23,22 @@ from benchmarks.scores.tracking import NEAR, scores
 
 Row = dict[str, object]
 Figures = dict[str, float]
-BARS = {"success": ">= 1", "centre_error": "<= 0.10 (S3 0.20)", "displacement_error": "<= 0.08", "scale_error": "<= 0.06", "angle_error": "<= 5"}
-"""Asked of `layered` on the published scenes."""
+BARS = {
+    "success": ">= 1",
+    "centre_error": "<= 0.10 (S3 0.20)",
+    "displacement_error": "<= 0.08",
+    "scale_error": "<= 0.06",
+    "angle_error": "<= 5",
+}
+"""Specified for `layered` on the published scenes."""
 LOCAL_BARS = {"sight_on3": ">= 1", "centre_error": "<= 1.6", "velocity_error": "<= 0.50"}
-"""Asked of `local` there."""
+"""Specified for `local` there."""
 PAPER_BARS = {"displacement_error": "<= 0.06 (flat, no noise)"}
-"""Asked of `paper`: its raw velocity on a flat background."""
+"""Specified for `paper`: its raw velocity on a flat background."""
 ROUNDS = 3
 """In which a large target is followed, for other work on a machine makes single times half as long again."""
 LAST = 10
-"""Frames at the end that tell whether a target was followed to it."""
+"""Frames at the end in which a target that was followed must be found."""
 KEPT = 0.9
 """Share of frames found from which on a target was not exchanged with its twin."""
 
@@ -48,10 +55,14 @@ def cell(figures: Figures) -> str:
 
 
 def others_win(trackers: list[Tracker]) -> list[Row]:
-    """As `comparison`, and how many of the crossings with a twin each tracker went through without being exchanged."""
+    """As `comparison`, and how many of the crossings with a twin each tracker went through without being
+    exchanged."""
     reached = {scene.name: run(scene, trackers) for scene in hard_scenes.others_win()}
     crossings = [scene.name for scene in hard_scenes.crossings()]
-    kept = {tracker.name: sum(reached[name][tracker.name]["success"] >= KEPT for name in crossings) for tracker in trackers}
+    kept = {
+        tracker.name: sum(reached[name][tracker.name]["success"] >= KEPT for name in crossings)
+        for tracker in trackers
+    }
     return [*told(reached, trackers), {"scene": f"crossings kept, of {len(crossings)}", **kept}]
 
 
@@ -60,12 +71,20 @@ def comparison(tested: list[Scene], trackers: list[Tracker], asked: str | None =
     return told({scene.name: run(scene, trackers) for scene in tested}, trackers, asked)
 
 
-def told(reached: dict[str, dict[str, Figures]], trackers: list[Tracker], asked: str | None = None) -> list[Row]:
+def told(
+    reached: dict[str, dict[str, Figures]], trackers: list[Tracker], asked: str | None = None
+) -> list[Row]:
     """The rows of figures by scene and tracker."""
-    rows: list[Row] = [{"scene": name, **{tracker: cell(figures) for tracker, figures in each.items()}} for name, each in reached.items()]
+    rows: list[Row] = [
+        {"scene": name, **{tracker: cell(figures) for tracker, figures in each.items()}}
+        for name, each in reached.items()
+    ]
 
     def over_scenes(what: str, average: Callable[[list[float]], float]) -> dict[str, object]:
-        return {tracker.name: float(average([each[tracker.name][what] for each in reached.values()])) for tracker in trackers}
+        return {
+            tracker.name: float(average([each[tracker.name][what] for each in reached.values()]))
+            for tracker in trackers
+        }
 
     rows.append({"scene": "mean success", **over_scenes("success", np.mean)})
     if asked is not None and any(tracker.name == "jacoflow layered" for tracker in trackers):
@@ -74,23 +93,38 @@ def told(reached: dict[str, dict[str, Figures]], trackers: list[Tracker], asked:
 
 
 def published(trackers: list[Tracker]) -> list[Row]:
-    """Every figure of every tracker on the scenes with published errors, below what is asked of ours."""
+    """Every figure of every tracker on the scenes with published errors, below the specified ones."""
     names = {tracker.name for tracker in trackers}
     bars: list[Row] = []
-    for name, asked in (("jacoflow layered", BARS), ("jacoflow local", LOCAL_BARS), ("jacoflow paper", PAPER_BARS)):
+    for name, asked in (
+        ("jacoflow layered", BARS),
+        ("jacoflow local", LOCAL_BARS),
+        ("jacoflow paper", PAPER_BARS),
+    ):
         if name in names:
-            bars.append({"scene": "asked", "tracker": name, **{column: asked[base] for base in asked for column in _columns(base)}})
-    rows = [{"scene": scene.name, "tracker": name, **figures} for scene in scenes.published() for name, figures in run(scene, trackers).items()]
+            bars.append(
+                {
+                    "scene": "asked",
+                    "tracker": name,
+                    **{column: asked[base] for base in asked for column in _columns(base)},
+                }
+            )
+    rows = [
+        {"scene": scene.name, "tracker": name, **figures}
+        for scene in scenes.published()
+        for name, figures in run(scene, trackers).items()
+    ]
     return [*bars, *rows]
 
 
 def _columns(base: str) -> tuple[str, ...]:
-    """The columns of a figure that is told along each axis."""
+    """The columns of a figure that has a value along each axis."""
     return (f"{base}_x", f"{base}_y") if base in ("displacement_error", "velocity_error") else (base,)
 
 
 def summary(tested: list[Scene], trackers: list[Tracker]) -> list[Row]:
-    """One row for each tracker: means over the scenes, and how many it followed to the end (the centre within 3 px in each of the last ten frames)."""
+    """One row for each tracker: means over the scenes, and how many it followed to the end (the centre
+    within 3 px in each of the last ten frames)."""
     found: dict[str, list[Figures]] = {tracker.name: [] for tracker in trackers}
     for scene in tested:
         frames, truth = scene.frames(), Truth.of(scene)
@@ -103,19 +137,29 @@ def summary(tested: list[Scene], trackers: list[Tracker]) -> list[Row]:
 
 
 def large(trackers: list[Tracker]) -> list[Row]:
-    """One row for each scene and tracker: CPU time of a frame, the least of rounds taken in turns, and how well it was followed. KCF is the bar for our time with a camera that stands still."""
+    """One row for each scene and tracker: CPU time of a frame, the least of rounds taken in turns, and how
+    well it was followed. KCF is the bar for our time with a camera that stands still."""
     rows: list[Row] = []
     for scene in tracking_large.large():
         rounds = [run(scene, trackers) for _ in range(ROUNDS)]
         for name, figures in rounds[0].items():
             milliseconds = min(each[name]["milliseconds"] for each in rounds)
-            rows.append({"scene": scene.name, "tracker": name, "milliseconds": milliseconds, **{column: figures[column] for column in ("success", "centre_error")}})
+            rows.append(
+                {
+                    "scene": scene.name,
+                    "tracker": name,
+                    "milliseconds": milliseconds,
+                    **{column: figures[column] for column in ("success", "centre_error")},
+                }
+            )
     return rows
 
 
 def _means(figures: list[Figures]) -> Row:
     """How many were followed, then the mean of each figure over the scenes that have it."""
-    columns = [column for column in dict.fromkeys(key for each in figures for key in each) if column != "followed"]
+    columns = [
+        column for column in dict.fromkeys(key for each in figures for key in each) if column != "followed"
+    ]
     means = {column: float(np.nanmean([each.get(column, np.nan) for each in figures])) for column in columns}
     return {"followed": int(sum(each["followed"] for each in figures)), **means}
 

@@ -1,4 +1,5 @@
-"""Tables of our trackers alone: other noise, less contrast, starts that are not exact, and the time of a frame."""
+"""Tables of our trackers alone: other noise, less contrast, starts that are not exact, and the time of a
+frame."""
 
 from __future__ import annotations
 
@@ -13,17 +14,7 @@ from benchmarks.scenes import tracking as scenes
 from benchmarks.scenes import tracking_begin
 from benchmarks.scenes import tracking_hard as hard_scenes
 from benchmarks.scenes.textures import Array, Figure
-from benchmarks.scenes.tracking import (
-    TIMES,
-    Plane,
-    Scene,
-    Truth,
-    circle,
-    disc,
-    figure,
-    line,
-    square,
-)
+from benchmarks.scenes.tracking import TIMES, Plane, Scene, Truth, circle, disc, figure, line, square
 from benchmarks.scores.tracking import scores
 
 Row = dict[str, object]
@@ -35,12 +26,31 @@ CONTRAST_KINDS = ("smooth:4,90,10", "smooth:4,90,20", "smooth:4,90,40")
 SEEDS = range(3, 7)
 """Of backgrounds."""
 PLANE_SEEDS = range(100, 124)
-"""Of backgrounds of which two halves move otherwise: which of them passes for the still scene is a matter of their texture."""
+"""Of backgrounds with two halves in different motion; which half passes for the still scene depends on
+texture."""
 BEGIN_SEEDS = range(4)
 BAR_SEEDS = range(30, 36)
-BARS = ((200.0, 40.0), (200.0, 90.0), (200.0, 110.0), (200.0, 250.0), (150.0, 40.0), (160.0, 250.0), (140.0, 220.0), (20.0, 90.0), (20.0, 150.0), (20.0, 250.0))
+BARS = (
+    (200.0, 40.0),
+    (200.0, 90.0),
+    (200.0, 110.0),
+    (200.0, 250.0),
+    (150.0, 40.0),
+    (160.0, 250.0),
+    (140.0, 220.0),
+    (20.0, 90.0),
+    (20.0, 150.0),
+    (20.0, 250.0),
+)
 """Grey levels of targets and of the bars that they go behind."""
-ASKED_TIMES = {"jacoflow layered": {"5 deg/frame": "<= 1", "level 140, camera pans": "<= 4", "level 140, camera jitter": "<= 4"}, "jacoflow local": {"5 deg/frame": "<= 0.3"}}
+ASKED_TIMES = {
+    "jacoflow layered": {
+        "5 deg/frame": "<= 1",
+        "level 140, camera pans": "<= 4",
+        "level 140, camera jitter": "<= 4",
+    },
+    "jacoflow local": {"5 deg/frame": "<= 0.3"},
+}
 """ms a frame on one thread, by tracker and scene."""
 
 
@@ -54,7 +64,15 @@ def noise(trackers: list[Tracker]) -> list[Row]:
             each = [_scores(replace(scene, noise_seed=seed), tracker) for seed in NOISE_SEEDS]
             row: Row = {"scene": scene.name, "tracker": tracker.name}
             worse: dict[str, Callable[[Iterable[float]], float]] = {"success": min, "sight_on3": min}
-            for column in ("success", "sight_on3", "centre_error", "displacement_error_x", "displacement_error_y", "scale_error", "angle_error"):
+            for column in (
+                "success",
+                "sight_on3",
+                "centre_error",
+                "displacement_error_x",
+                "displacement_error_y",
+                "scale_error",
+                "angle_error",
+            ):
                 if column in each[0]:
                     values = [figures[column] for figures in each]
                     row[column] = f"{np.mean(values):.3g} / {worse.get(column, max)(values):.3g}"
@@ -63,20 +81,31 @@ def noise(trackers: list[Tracker]) -> list[Row]:
 
 
 def contrast(trackers: list[Tracker]) -> list[Row]:
-    """Share of frames found, mean over four backgrounds, by how much brighter than the mean of the background the target is."""
+    """Share of frames found, mean over four backgrounds, by how much brighter than the mean of the
+    background the target is."""
     rows: list[Row] = []
     for kind in CONTRAST_KINDS:
         for above in CONTRASTS:
             row: Row = {"background": kind, "target above its mean": above}
             for tracker in _named(trackers, "layered", "local", "paper"):
-                tested = (Scene("contrast", (Plane(kind, seed),), square(circle(hard_scenes.RADIUS), level=90.0 + above)) for seed in SEEDS)
+                tested = (
+                    Scene(
+                        "contrast",
+                        (Plane(kind, seed),),
+                        square(circle(hard_scenes.RADIUS), level=90.0 + above),
+                    )
+                    for seed in SEEDS
+                )
                 row[tracker.name] = float(np.mean([_scores(scene, tracker)["success"] for scene in tested]))
             rows.append(row)
     return rows
 
 
 def begin(trackers: list[Tracker]) -> list[Row]:
-    """Starts that are not exact: share of frames within 3 px, greatest error of the position in px, and over its stated deviation, of frames in which the target is said to be tracked; means and worst over four backgrounds of two kinds."""
+    """Starts that are not exact: share of frames within 3 px, and of tracked frames the greatest error.
+
+    Errors in px and over their stated standard deviation; means and worst over four backgrounds of two kinds.
+    """
     rows: list[Row] = []
     if not _named(trackers, "layered"):
         return rows
@@ -103,29 +132,47 @@ def begin(trackers: list[Tracker]) -> list[Row]:
 
 
 def covered(trackers: list[Tracker]) -> list[Row]:
-    """Share of frames found, mean and worst over six backgrounds of two kinds each, of a target that goes behind a bar as in the hard scenes, but for the brightness of both; background of mean 90."""
+    """Share of frames found, mean and worst over six backgrounds of two kinds each, of a target that goes
+    behind a bar as in the hard scenes, but for the brightness of both; background of mean 90."""
     rows: list[Row] = []
     for level, bar_level in BARS:
         row: Row = {"target": f"level {level:g}", "bar": f"level {bar_level:g}"}
-        bar = figure(np.full((len(TIMES), 2), (129.5, 127.5)), np.full((len(TIMES), 2), (20.0, 256.0)), bar_level)
+        bar = figure(
+            np.full((len(TIMES), 2), (129.5, 127.5)), np.full((len(TIMES), 2), (20.0, 256.0)), bar_level
+        )
         target = square(line((70.0, 128.0), (2.4, 0.4)), level=level)
         for tracker in _named(trackers, "layered", "local"):
-            each = [_scores(Scene("bar", (Plane(kind, seed),), target, others=(bar,)), tracker)["success"] for kind in tracking_begin.KINDS for seed in BAR_SEEDS]
+            each = [
+                _scores(Scene("bar", (Plane(kind, seed),), target, others=(bar,)), tracker)["success"]
+                for kind in tracking_begin.KINDS
+                for seed in BAR_SEEDS
+            ]
             row[tracker.name] = f"{np.mean(each):.2f} / {min(each):.2f}"
         rows.append(row)
     return rows
 
 
 def limits(trackers: list[Tracker]) -> list[Row]:
-    """Share of frames found, mean and worst over four backgrounds: outlines that change along one axis, discs that shrink, very small targets, and two halves of the background in motion."""
+    """Share of frames found, mean and worst over four backgrounds: outlines that change along one axis,
+    discs that shrink, very small targets, and two halves of the background in motion."""
     path = circle(hard_scenes.RADIUS)
     tested: list[tuple[str, str, Figure]] = []
     for share in (0.3, 0.45, 0.6):
         width = 16 * (1 + share * np.sin(2 * np.pi * TIMES / 25))
-        tested.append((f"16 px, width swings by {share:.0%}", hard_scenes.KIND, figure(path, np.stack([width, np.full_like(width, 16.0)], axis=1), 200.0)))
-    tested.append(("disc of 32 px, 0.97 times as large each frame", hard_scenes.KIND, disc(path, 16.0 * 0.97**TIMES)))
+        tested.append(
+            (
+                f"16 px, width swings by {share:.0%}",
+                hard_scenes.KIND,
+                figure(path, np.stack([width, np.full_like(width, 16.0)], axis=1), 200.0),
+            )
+        )
+    tested.append(
+        ("disc of 32 px, 0.97 times as large each frame", hard_scenes.KIND, disc(path, 16.0 * 0.97**TIMES))
+    )
     for side in (5.0, 6.0, 7.0):
-        tested.extend((f"{side:g} px", kind, square(path, side=side)) for kind in (hard_scenes.KIND, "smooth:2,128,40"))
+        tested.extend(
+            (f"{side:g} px", kind, square(path, side=side)) for kind in (hard_scenes.KIND, "smooth:2,128,40")
+        )
     rows: list[Row] = []
     for name, kind, target in tested:
         row: Row = {"target": name, "background": kind}
@@ -133,7 +180,10 @@ def limits(trackers: list[Tracker]) -> list[Row]:
             each = [_scores(Scene(name, (Plane(kind, seed),), target), tracker)["success"] for seed in SEEDS]
             row[tracker.name] = f"{np.mean(each):.2f} / {min(each):.2f}"
         rows.append(row)
-    row = {"target": "13 px before two planes in motion", "background": f"{hard_scenes.KIND}, {len(PLANE_SEEDS)} seeds"}
+    row = {
+        "target": "13 px before two planes in motion",
+        "background": f"{hard_scenes.KIND}, {len(PLANE_SEEDS)} seeds",
+    }
     for tracker in trackers:
         each = [_scores(hard_scenes.two_planes(seed), tracker)["success"] for seed in PLANE_SEEDS]
         row[tracker.name] = f"{np.mean(each):.2f} / {min(each):.2f}"
@@ -141,12 +191,19 @@ def limits(trackers: list[Tracker]) -> list[Row]:
 
 
 def times(trackers: list[Tracker]) -> list[Row]:
-    """Time of a frame on one thread beside what is asked."""
+    """Time of a frame on one thread beside the specified one."""
     by_name = {scene.name: scene for scene in hard_scenes.hard()}
     rows: list[Row] = []
     for tracker in trackers:
         for name, asked in ASKED_TIMES.get(tracker.name, {}).items():
-            rows.append({"scene": name, "tracker": tracker.name, "asked, ms": asked, "milliseconds": _scores(by_name[name], tracker)["milliseconds"]})
+            rows.append(
+                {
+                    "scene": name,
+                    "tracker": tracker.name,
+                    "asked, ms": asked,
+                    "milliseconds": _scores(by_name[name], tracker)["milliseconds"],
+                }
+            )
     return rows
 
 
@@ -159,14 +216,20 @@ def _stretched(box: str, side: float) -> Callable[[str, int], Scene]:
 
 
 def _stated(scene: Scene) -> tuple[float, float, float, float]:
-    """Share of frames within 3 px, share said to be tracked, greatest error of these, px, and over the stated deviation."""
+    """Share of frames within 3 px, share tracked, greatest error of these, px, and over its standard
+    deviation."""
     from jacoflow import track
 
     found = track.track(scene.frames(), scene.start_box)
     off: Array = np.abs(found.position - scene.centres)
     tracked = (found.status == "tracking") & (np.arange(len(off)) > 0)
     over = off / np.sqrt(found.covariance[:, :, 0, 0])
-    return float((np.linalg.norm(off, axis=1) <= 3)[1:].mean()), float(tracked[1:].mean()), float(off[tracked].max(initial=0.0)), float(over[tracked].max(initial=0.0))
+    return (
+        float((np.linalg.norm(off, axis=1) <= 3)[1:].mean()),
+        float(tracked[1:].mean()),
+        float(off[tracked].max(initial=0.0)),
+        float(over[tracked].max(initial=0.0)),
+    )
 
 
 def _named(trackers: list[Tracker], *modes: str) -> list[Tracker]:
@@ -185,7 +248,10 @@ TABLES = {
         "contrast": ("share of frames found by contrast", contrast),
         "begin": ("starts that are not exact (layered)", begin),
         "bars": ("behind bars of other brightness, mean / worst", covered),
-        "limits": ("outlines and sizes at the limits, mean / worst", lambda trackers: limits(with_affine(trackers))),
+        "limits": (
+            "outlines and sizes at the limits, mean / worst",
+            lambda trackers: limits(with_affine(trackers)),
+        ),
         "times": ("time of a frame", times),
     }.items()
 }

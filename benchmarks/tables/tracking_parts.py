@@ -1,4 +1,5 @@
-"""The gradient tracker's parts beside what is asked of them: derivative masks, gain of one step, refined flow, and the gate against flow that is noise."""
+"""Parts of the gradient tracker beside their specification: masks, gain of one step, refined flow, gate in
+noise."""
 
 from __future__ import annotations
 
@@ -25,11 +26,11 @@ UNGATED = {"min_sigma": 0.0, "cond_max": 1e9, "step_max": 1e9}
 MARGIN = 14
 """Left out along each side, px."""
 MASKED = 6
-"""Along each side masks and windows reach beyond the frame, px: no flow is told there, and a share of pixels is of the others."""
+"""Width of the rim where masks and windows leave the frame, px: no flow there."""
 
 
 def table() -> list[Row]:
-    """All rows, asked beside reached; none where jacoflow has no trackers."""
+    """All rows, specified beside reached; none where jacoflow has no trackers."""
     try:
         from jacoflow import track
     except ImportError:
@@ -38,7 +39,8 @@ def table() -> list[Row]:
 
 
 def reference_masks(order: int) -> tuple[Array, Array, Array]:
-    """Value and slopes along x and y at the middle of the least-squares polynomial of total degree `order` over 5 x 5: three masks (5, 5), [row, column] = [y, x]."""
+    """Value and slopes along x and y at the middle of the least-squares polynomial of total degree `order`
+    over 5 x 5: three masks (5, 5), [row, column] = [y, x]."""
     y, x = (axis.ravel().astype(float) for axis in np.mgrid[-2:3, -2:3])
     powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
     fit = np.linalg.pinv(np.stack([x**i * y**j for i, j in powers], axis=1))
@@ -52,12 +54,19 @@ def mask_rows(track: Any) -> list[Row]:
     for order in ORDERS:
         pairs = zip(track.derivative_kernels(order), reference_masks(order), strict=True)
         worst = max(float(np.abs(np.asarray(own) - exact).max()) for own, exact in pairs)
-        rows.append({"what": f"masks of order {order}: greatest difference from least squares", "asked": "<= 1e-12", "reached": worst})
+        rows.append(
+            {
+                "what": f"masks of order {order}: greatest difference from least squares",
+                "asked": "<= 1e-12",
+                "reached": worst,
+            }
+        )
     return rows
 
 
 def shifted_texture(step: float) -> tuple[Array, Array]:
-    """A texture and the same moved by (step, -step / 2) px, by splines of fifth order that continue across the edges; (96, 96) each."""
+    """A texture and the same moved by (step, -step / 2) px, by splines of fifth order that continue across
+    the edges; (96, 96) each."""
     first = background("smooth:2,128,40", 7, 96)
     return first, ndimage.shift(first, (-step / 2, step), order=5, mode="grid-wrap")
 
@@ -69,7 +78,13 @@ def gain_rows(track: Any) -> list[Row]:
         for step, mean in zip(STEPS, asked, strict=True):
             flow = inner_flow(track.local_flow(*shifted_texture(step), window=WINDOW, order=order, **UNGATED))
             reached = float(np.nanmean(flow[..., 0]))
-            rows.append({"what": f"mean u, px, one step of order {order} for a shift of {step:g} px", "asked": f"{mean} +- 0.005", "reached": reached})
+            rows.append(
+                {
+                    "what": f"mean u, px, one step of order {order} for a shift of {step:g} px",
+                    "asked": f"{mean} +- 0.005",
+                    "reached": reached,
+                }
+            )
     return rows
 
 
@@ -77,19 +92,39 @@ def refined_rows(track: Any) -> list[Row]:
     """Error of the refined flow."""
     rows: list[Row] = []
     for step, asked in REFINED.items():
-        wrong = inner_flow(track.refine_flow(*shifted_texture(step), window=WINDOW, **UNGATED)) - (step, -step / 2)
+        wrong = inner_flow(track.refine_flow(*shifted_texture(step), window=WINDOW, **UNGATED)) - (
+            step,
+            -step / 2,
+        )
         reached = float(np.sqrt(np.nanmean(wrong**2)))
-        rows.append({"what": f"root mean square error, px, of the refined flow for a shift of {step:g} px", "asked": f"<= {asked}", "reached": reached})
+        rows.append(
+            {
+                "what": f"root mean square error, px, of the refined flow for a shift of {step:g} px",
+                "asked": f"<= {asked}",
+                "reached": reached,
+            }
+        )
     return rows
 
 
 def gate_rows(track: Any) -> list[Row]:
-    """Share of the pixels of a still, noisy picture that count as moving, without the gate of gradient strength and with it."""
+    """Share of the pixels of a still, noisy picture that count as moving, without the gate of gradient
+    strength and with it."""
     rows: list[Row] = []
-    for kind, min_sigma, asked in (("smooth:4,90,20", 0.0, "0.05"), ("flat:90", 0.0, "0.59"), ("smooth:4,90,20", 2.5, "< 0.0005")):
+    for kind, min_sigma, asked in (
+        ("smooth:4,90,20", 0.0, "0.05"),
+        ("flat:90", 0.0, "0.59"),
+        ("smooth:4,90,20", 2.5, "< 0.0005"),
+    ):
         flow = accepted_flow(track.local_flow(*still_pair(kind), min_sigma=min_sigma))
         moving = (np.abs(flow[MASKED:-MASKED, MASKED:-MASKED]) >= 0.5).any(axis=-1)
-        rows.append({"what": f"share of moving pixels in still {kind}, gate {min_sigma:g}", "asked": asked, "reached": float(moving.mean())})
+        rows.append(
+            {
+                "what": f"share of moving pixels in still {kind}, gate {min_sigma:g}",
+                "asked": asked,
+                "reached": float(moving.mean()),
+            }
+        )
     return rows
 
 
@@ -97,7 +132,9 @@ def still_pair(kind: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Two pictures of the same background with noise of 2 grey levels, rounded."""
     rng = np.random.default_rng(0)
     still = background(kind, 3)
-    first, second = (np.rint(np.clip(still + rng.normal(0.0, 2.0, still.shape), 0, 255)).astype(np.uint8) for _ in range(2))
+    first, second = (
+        np.rint(np.clip(still + rng.normal(0.0, 2.0, still.shape), 0, 255)).astype(np.uint8) for _ in range(2)
+    )
     return first, second
 
 

@@ -24,7 +24,14 @@ def recordings(data: Path, trackers: list[Tracker]) -> list[Row]:
         for tracker in trackers:
             figures = scores(tracker.run(each.frames, each.start_box), each.truth)
             kept = ("mean_overlap", "success", "centre_error", "milliseconds")
-            rows.append({"recording": each.name, "frames": len(each.frames), "tracker": tracker.name, **{name: figures[name] for name in kept}})
+            rows.append(
+                {
+                    "recording": each.name,
+                    "frames": len(each.frames),
+                    "tracker": tracker.name,
+                    **{name: figures[name] for name in kept},
+                }
+            )
     return rows
 
 
