@@ -1,6 +1,6 @@
 """The particle tracker beside OpenCV's trackers on scenes of targets that look alike and on recordings.
 
-    python -m benchmarks.tables.particle_tracking [--only TABLE ...] [--runs 3] [--recordings 10 11] [--data FOLDER]
+    python -m benchmarks.tables.particle_tracking [--only TABLE ...] [--runs 3] [--recordings 10 11]
 
 Every tracker gets the true box of each target in its first frame. A cell is success in % / mean overlap
 (intersection over union) / mean error of the centre in px, over recordings (seeds of the scene), runs (seeds

@@ -117,7 +117,7 @@ def table(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
 
 
 def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
-    """Image correlation: root mean square error of u (px, all pixels) and of u_x (1/frame, 12 px from the edge).
+    """Image correlation: root mean square error of u (px, all pixels) and of u_x (1/frame, off the edge).
 
     OpenCV's rows have the Gaussians that suit u and u_x best, each chosen with the truth. Specified for ours:
     below both of them (`reach`), half of the better one (`aim`).
