@@ -1,8 +1,8 @@
 """Hashes of results on fixed scenes: shows that a change of words, names or rooms changed no bit.
 
-    python benchmarks/fingerprint.py                                # prints the hashes
-    python benchmarks/fingerprint.py --write benchmarks/fingerprint.json
-    python benchmarks/fingerprint.py --compare benchmarks/fingerprint.json   # fails where a hash differs
+    python -m benchmarks.fingerprint                                            # prints the hashes
+    python -m benchmarks.fingerprint --write benchmarks/fingerprint.json
+    python -m benchmarks.fingerprint --compare benchmarks/fingerprint.json      # fails where a hash differs
 
 Computed without vector instructions (`JACOFLOW_SIMD=scalar`), so that the hashes do not depend on the
 processor. They may depend on the C library, whose elementary functions round differently from version to

@@ -67,7 +67,13 @@ def main() -> None:
         if importlib.util.find_spec(f"benchmarks.ablation.{system}") is None:
             continue
         larger = getattr(importlib.import_module(f"benchmarks.ablation.{system}"), "LARGER_IS_BETTER", ())
-        rows = comparison(values(system, ""), values(system, name), larger)
+        try:
+            rows = comparison(values(system, ""), values(system, name), larger)
+        except subprocess.CalledProcessError as problem:
+            summary.append(
+                {"heuristic": name, "purpose": why, "verdict": f"failed: exit status {problem.returncode}"}
+            )
+            continue
         print(
             f"## {name}: {why}\n\n" + "\n".join(report.table_lines(rows)) + f"\n\n{verdict(rows)}\n",
             flush=True,
