@@ -1,12 +1,15 @@
 """What the comparisons measure with: masks, errors and the noise bound (no rival is needed here)."""
 
 
+import importlib
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from benchmarks import report
+from benchmarks import compare, readme, report
 from benchmarks import settings as contestants
+from benchmarks.ablation import __main__ as ablation
 from benchmarks.scores import flow as scoring
 from benchmarks.scores import noise_bound
 from benchmarks.tables import controlled
@@ -134,3 +137,32 @@ def test_a_kept_table_takes_new_sections_and_keeps_the_others(tmp_path):
     again = kept.updated(report.Record("2020-01-03", one, {"bars": [{"ms": 6.0}]}))
     assert again.elsewhere == {"tracks": other}
     assert not list(tmp_path.glob(".*"))
+
+
+def test_every_table_has_a_title_of_its_own_and_readme_needs_no_other():
+    modules = [name for names in compare.SECTIONS.values() for name in names]
+    tables = [importlib.import_module(f"benchmarks.tables.{name}").TABLES for name in modules]
+    titles = [table.title for each in tables for table in each.values()]
+    assert len(set(titles)) == len(titles)
+    assert {title for _, needed in readme.TABLES.values() for title in needed} <= set(titles)
+
+
+def test_a_mean_has_the_standard_error_of_its_finite_values():
+    mean, error = report.mean_and_error([1.0, 3.0, float("nan"), 5.0])
+    assert mean == pytest.approx(3.0) and error == pytest.approx(2.0 / np.sqrt(3))
+    assert np.isnan(report.mean_and_error([])[0]) and np.isnan(report.mean_and_error([1.0])[1])
+
+
+def test_a_heuristic_pays_if_a_row_is_worse_without_it_by_more_than_two_standard_errors():
+    base = {"error": [1.0, 2.0, 3.0], "found": [0.9, 0.8, 0.7]}
+
+    def judged(**changed):
+        return ablation.verdict(ablation.comparison(base, {**base, **changed}, ("found",)))
+
+    assert judged() == "no effect, results are the same"
+    assert judged(error=[1.5, 2.6, 3.4]) == "pays: error"
+    assert judged(error=[1.5, 1.6, 3.1]) == "no effect"
+    assert judged(error=[0.5, 1.4, 2.6]) == "harms: error"
+    # Fewer targets found are worse, even beside a smaller error.
+    assert judged(found=[0.7, 0.61, 0.5], error=[0.5, 1.4, 2.6]) == "pays: found"
+    assert ablation.is_chosen("edges.contrast", ["edges"]) and not ablation.is_chosen("edges.contrast", ["stereo"])
