@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from benchmarks import report
 from benchmarks.scenes.recordings import read_grey
 from jacoflow import plot
-from jacoflow.track import StereoStep, StereoTracker
+from jacoflow.track import StereoCamera, StereoStep, StereoTracker
 
 try:
     import cv2
@@ -82,7 +82,7 @@ DRAWN = "improved, 48 components, search 16"
 def follow(recording: Recording, settings: str) -> tuple[StereoTracker, list[StereoStep]]:
     """The tracker after the recording, and its steps."""
     tracker = StereoTracker(
-        **SETTINGS[settings], disparity_range=(0, 127), row_offset=0.0, focal=FOCAL, baseline=BASELINE
+        **SETTINGS[settings], disparity_range=(0, 127), row_offset=0.0, camera=StereoCamera(FOCAL, BASELINE)
     )
     return tracker, [tracker.update(left, right) for left, right in recording.pairs]
 

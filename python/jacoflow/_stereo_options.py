@@ -5,24 +5,19 @@ from __future__ import annotations
 import operator
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-COUNTS = ("n_components", "max_iter", "warm_max_iter", "n_init", "random_state", "search", "luminance_levels", "patience", "coast", "threads")
+COUNTS = ("n_components", "random_state", "search", "threads")
 """Counts, no unit; None where the default depends on the mode."""
-NUMBERS = (
-    "weight_concentration_prior", "mean_precision_prior", "degrees_of_freedom_prior", "covariance_prior", "prune_weight", "row_offset", "arc_threshold", "reseed_below", "least_overlap", "focal", "baseline", "d_infinity", "step_time",
-)  # fmt: skip
-"""Numbers, in the units that `StereoTracker` tells; None where one may be missing."""
-TUPLES = {"disparity_range": 2, "row_range": 2, "grid": 3, "tolerance": 3, "tolerance_per_step": 3, "jump": 2, "group_limits": 3}
+NUMBERS = ("row_offset", "step_time")
+"""Numbers, in the units of `StereoTracker`; None where one may be missing."""
+TUPLES = {"disparity_range": 2, "row_range": 2, "grid": 3}
 """How many numbers (no unit) each of these holds."""
-WORDS = {"mode": '"improved" or "paper"', "matching": '"classes" or "sgm"'}
-"""Words, no unit, and what they may be."""
-SWITCHES = ("recognition", "grouping")
-"""Switches, no unit; None where the default depends on the mode."""
-OPTIONAL = frozenset({"n_components", "threads", "row_offset", "focal", "baseline", "matching"})
+OPTIONAL = frozenset({"n_components", "threads", "row_offset"})
 """Names (no unit) of those that may be None."""
 
 
@@ -32,22 +27,47 @@ MOST_ELSE = 2**63 - 1
 """Greatest size of every other integer, no unit."""
 
 
+@dataclass(frozen=True)
+class StereoCamera:
+    """A pair of cameras, for depths.
+
+    Raises
+    ------
+    ValueError
+        For a length that is not above 0 or a disparity that is not finite, naming it; `TypeError` for no number.
+    """
+
+    focal: float
+    """Focal length, px."""
+    baseline: float
+    """Distance of the cameras, in the unit that depths shall have."""
+    d_infinity: float = 0.0
+    """Disparity of a point at infinity, px; below 0 where the cameras converge."""
+
+    def __post_init__(self) -> None:
+        for name in ("focal", "baseline", "d_infinity"):
+            value = real_number(name, getattr(self, name))
+            object.__setattr__(self, name, value)
+            if name == "d_infinity" and not np.isfinite(value):
+                raise ValueError(f"{name}: expected a disparity, px, got {value}")
+            if name != "d_infinity" and not (value > 0 and np.isfinite(value)):
+                raise ValueError(f"{name}: expected a length above 0, got {value}")
+
+
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     """The stereo tracker's options, each in the unit it had, as the compiled part takes them; what is of another kind, length or sign is refused by name."""
     out = dict(options)
-    for name, expected in WORDS.items():
-        if not (isinstance(out[name], str) or (out[name] is None and name in OPTIONAL)):
-            raise ValueError(f"{name}: expected {expected}, got {out[name]!r}")
-    for name in SWITCHES:
-        out[name] = None if out[name] is None else _switch(name, out[name], "True, False or None")
+    if not isinstance(out["mode"], str):
+        raise ValueError(f'mode: expected "improved" or "paper", got {out["mode"]!r}')
+    if out["camera"] is not None and not isinstance(out["camera"], StereoCamera):
+        raise TypeError(f"camera: expected a StereoCamera or None, got {out['camera']!r}")
+    out["camera"] = None if out["camera"] is None else astuple(out["camera"])
     for name in COUNTS:
         out[name] = _count(name, out[name])
     for name in NUMBERS:
         out[name] = _number(name, out[name])
-    if out["tol"] is not None and not isinstance(out["tol"], str):
-        out["tol"] = _converted("tol", out["tol"], float, '"auto", a number or None')
     for name, length in TUPLES.items():
-        out[name] = _several(name, out[name], length, whole=name in ("disparity_range", "row_range", "grid"))
+        out[name] = _several(name, out[name], length, whole=True)
     if any(side is not None and side < 0 for side in out["grid"]):
         raise ValueError(f"grid: expected numbers of cells, got {out['grid']}")
     return out

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import as_array, checked, checked_views, real_number, tell_doubt, whole_number
+from ._stereo_options import StereoCamera, as_array, checked, checked_views, real_number, tell_doubt, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -204,44 +204,20 @@ class StereoTracker:
         "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
     n_components : int
         Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.
-    weight_concentration_prior, mean_precision_prior, degrees_of_freedom_prior, covariance_prior : float
-        alpha_0, beta_0, nu_0 of (8) and (9), no unit, and the diagonal of W_0^-1, cells^2.
-    max_iter, warm_max_iter : int
-        Most rounds of the mixture from seeds, and from the carried components ("improved").
-    tol : "auto", float or None
-        Rounds end when the lower bound grows by less than this for each pixel; None: never. Default 1e-4 ("paper": None).
-    n_init : int
-        Fits from different seeds of which the best is kept; default 1.
-    prune_weight : float
-        Components with fewer pixels are left out of fits from seeds; default 0, none.
-    random_state : int
-        Seed of the fits.
     disparity_range, row_range : (int, int), px
-        Least and greatest disparity, and offset of the right view's rows, that are looked for.
+        Smallest and largest disparity, and row offset of the right view, that are searched.
     row_offset : float, px
-        Offset of the rows; default: found from the views, at the first step that shows enough and again where later ones contradict it ("improved"), or at every pixel ("paper").
-    matching : "sgm" or "classes"
-        How the views are matched, see `jacoflow.stereo.edge_disparity`; default "sgm" ("paper": "classes").
+        Row offset; default: estimated at the first suitable step and again where later ones contradict it ("improved"), or searched at every pixel ("paper").
     grid : (rows, columns, layers)
         Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`, and no fewer.
     search : int
-        How far templates and depths are searched, cells and disparities; default 8. What changes its disparity by more in one step has no motion.
-    luminance_levels : int
-        Levels of the reduced luminance; default 64.
-    arc_threshold : float
-        Least score of an arc that continues a track, 0 to 2.
-    reseed_below : float
-        Components with fewer pixels begin anew where the mixture explains least, and a start from seeds is looked over for pieces of one surface and for small things that share a component ("improved"); 0: neither.
-    recognition : bool
-        Whether lost tracks are waited for; default yes ("paper": no). A component loses its track where less than `least_overlap` of its moved self, and of what it then is, meets the other; the track is waited for `patience` steps and given to a new component within
-        `tolerance` + gap `tolerance_per_step` cells (x, y, disparity) of where it is expected; steady tracks coast at most `coast` steps through a `jump` of (px, disparity) behind which less than three fifths of them are seen.
-    grouping : bool
-        Whether clusters that move alike are grouped; default yes ("paper": no). `group_limits`: farthest apart (cells), motions in the picture (px) and in depth (disparity) that differ at most.
-    focal, baseline, d_infinity : float
-        Focal length (px), distance of the cameras (the unit of depths), disparity of a point at infinity (px; default 0). With the first two, clusters have a depth and a velocity in space.
+        How far templates and depths are searched, cells and disparities; default 8. A larger change of disparity in one step is not measured.
+    camera : StereoCamera
+        The cameras. With them, clusters have a depth and a velocity in space.
     step_time : float
-        Time between ordinary steps, in the unit in which `update` is told `dt` and velocities are counted; default 1: all of them in steps. What is counted in steps here (`patience`, `coast`, `tolerance_per_step`, motions that `jump` or differ in a group) means these: with
-        times in seconds and every frame taken of 30 a second, give 1/30.
+        Time between ordinary steps, in the unit of `dt` in `update` and of velocities; default 1: steps. With times in seconds and 30 frames a second, give 1/30.
+    random_state : int
+        Seed of the fits.
     threads : int
         Number of threads; default the environment's, else all.
 
@@ -266,38 +242,14 @@ class StereoTracker:
         mode: Literal["improved", "paper"] = "improved",
         *,
         n_components: int | None = None,
-        weight_concentration_prior: float = 0.1,
-        mean_precision_prior: float = 1e-3,
-        degrees_of_freedom_prior: float = 12.1,
-        covariance_prior: float = 0.1,
-        max_iter: int = 100,
-        warm_max_iter: int = 30,
-        tol: float | Literal["auto"] | None = "auto",
-        n_init: int = 1,
-        prune_weight: float = 0.0,
-        random_state: int = 0,
         disparity_range: tuple[int, int] = (-40, 24),
         row_range: tuple[int, int] = (-4, 4),
         row_offset: float | None = None,
-        matching: Literal["classes", "sgm"] | None = None,
         grid: tuple[int, int, int | None] = (60, 80, None),
         search: int = 8,
-        luminance_levels: int = 64,
-        arc_threshold: float = 0.4,
-        reseed_below: float = 20.0,
-        recognition: bool | None = None,
-        least_overlap: float = 0.2,
-        patience: int = 10,
-        tolerance: tuple[float, float, float] = (3.0, 4.0, 1.0),
-        tolerance_per_step: tuple[float, float, float] = (0.5, 0.5, 0.2),
-        coast: int = 3,
-        jump: tuple[float, float] = (24.0, 1.5),
-        grouping: bool | None = None,
-        group_limits: tuple[float, float, float] = (3.5, 1.0, 0.15),
-        focal: float | None = None,
-        baseline: float | None = None,
-        d_infinity: float = 0.0,
+        camera: StereoCamera | None = None,
         step_time: float = 1.0,
+        random_state: int = 0,
         threads: int | None = None,
     ) -> None:
         options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}

@@ -30,6 +30,7 @@ from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovF
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
 from ._stereo_options import real_number
+from ._stereo_options import StereoCamera
 from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "StereoCluster",
     "StereoStep",
     "StereoTrack",
+    "StereoCamera",
     "StereoTracker",
     "Track",
     "TrackGraph",

@@ -83,15 +83,12 @@ fn every_option_of_the_tracker_changes_what_it_is_said_to() {
         TrackGraph::from_json(&out).unwrap()
     };
     let usual = graph("");
-    // The defaults, said aloud.
-    assert_eq!(graph("--grid 60,80,16 --search 8 --n-init 1 --tol 1e-4"), usual);
+    // The defaults.
+    assert_eq!(graph("--grid 60,80,16 --search 8"), usual);
     assert_ne!(graph("--grid 30,40"), usual);
-    assert_ne!(graph("--tol none"), usual);
     // What goes 2 px, in cells of 1.2 px by 1.07 px, is within two cells.
     let moved = |graph: &TrackGraph| graph.nodes().filter(|node| node.velocity.is_some()).count();
     assert!(moved(&graph("--search 2")) > 0);
-    let weight = |graph: &TrackGraph| graph.nodes().map(|node| node.n_pixels).sum::<usize>();
-    assert_eq!(weight(&graph("--n-init 3")), weight(&usual));
 }
 
 #[test]
@@ -135,7 +132,6 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left.y4m --mode improved", &["mode", "layered"]),
         ("left.y4m --graph g.png", &["graph", "stereo"]),
         ("left.y4m --layout side-by-side", &["layout", "stereo"]),
-        ("left right --method stereo --matching magic", &["matching", "sgm"]),
         ("left right --method stereo --components 0", &["n_components"]),
         ("left right --method stereo --disparities -4000,4000", &["disparity_range"]),
         ("left right --method stereo --cameras 3", &["--cameras"]),
@@ -143,8 +139,6 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo --grid 0,40", &["grid", "1 to 4096"]),
         ("left right --method stereo --grid 10,10,10", &["grid", "-40 to 24, at least 64"]),
         ("left right --method stereo --search 65", &["search", "1 to 64"]),
-        ("left right --method stereo --n-init 0", &["n_init"]),
-        ("left right --method stereo --tol never", &["--tol", "none"]),
         ("left.y4m --search 3", &["search", "stereo"]),
         ("left right --method stereo --graph g.svg", &["graph", ".png"]),
         ("left right --method stereo --graph old.png", &["output", "--force"]),

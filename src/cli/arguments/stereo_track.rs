@@ -5,7 +5,6 @@ use super::{LayoutArguments, SearchArguments};
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::pipeline::{Numbering, PairTimes};
-use crate::stereo::Method;
 use crate::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use clap::Args;
 use std::path::PathBuf;
@@ -18,19 +17,9 @@ pub struct StereoTrackerArguments {
     pub layout: LayoutArguments,
     #[command(flatten)]
     pub matches: SearchArguments,
-    /// How views are matched, as `jacoflow stereo --method` [default: sgm, paper classes]
-    #[arg(long, value_name = "NAME")]
-    pub matching: Option<String>,
     /// Components of the mixture [default: 16, paper 12]
     #[arg(long, value_name = "N")]
     pub components: Option<usize>,
-    /// Fits from different seeds of which the best is kept [default: 1]
-    #[arg(long, value_name = "N")]
-    pub n_init: Option<usize>,
-    /// The mixture's rounds end when its bound grows by less than this for each pixel; none: never [default:
-    /// 1e-4, paper none]
-    #[arg(long, value_name = "GROWTH|none", value_parser = parse_tol)]
-    pub tol: Option<Tolerance>,
     /// Cells along y and x over the picture and layers of disparity [default: 60,80 and a layer for each
     /// disparity]
     #[arg(long, value_name = "ROWS,COLUMNS[,LAYERS]", value_parser = parse_grid)]
@@ -60,10 +49,7 @@ impl StereoTrackerArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
         let own = [
-            self.matching.as_ref().map(|_| "matching"),
             self.components.map(|_| "components"),
-            self.n_init.map(|_| "n_init"),
-            self.tol.map(|_| "tol"),
             self.grid.map(|_| "grid"),
             self.search.map(|_| "search"),
             self.cameras.map(|_| "cameras"),
@@ -92,16 +78,7 @@ impl StereoTrackerArguments {
             options.row_range = [least, greatest];
         }
         options.row_offset = self.matches.row_offset;
-        options.matching = match &self.matching {
-            Some(name) => Method::parse(name).map_err(|error| match error {
-                Error::Argument { expected, got, .. } => Error::Argument { argument: "matching", expected, got },
-                other => other,
-            })?,
-            None => options.matching,
-        };
         options.components = self.components.unwrap_or(options.components);
-        options.n_init = self.n_init.unwrap_or(options.n_init);
-        options.tol = self.tol.map_or(options.tol, |Tolerance(tol)| tol);
         if let Some(CellGrid { rows, columns, layers }) = self.grid {
             options.grid.rows = rows;
             options.grid.columns = columns;
@@ -139,18 +116,6 @@ impl StereoTrackerArguments {
     }
 }
 
-/// When rounds end, if at all.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tolerance(pub Option<f64>);
-
-fn parse_tol(text: &str) -> std::result::Result<Tolerance, String> {
-    match text.parse() {
-        _ if text == "none" => Ok(Tolerance(None)),
-        Ok(tol) => Ok(Tolerance(Some(tol))),
-        Err(_) => Err("expected a number or none".into()),
-    }
-}
-
 /// Cells over the picture, and layers where they are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CellGrid {
@@ -183,12 +148,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grids_are_two_or_three_counts_and_rounds_may_never_end() {
+    fn grids_are_two_or_three_counts() {
         assert_eq!(parse_grid("30, 40"), Ok(CellGrid { rows: 30, columns: 40, layers: None }));
         assert_eq!(parse_grid("30,40,16"), Ok(CellGrid { rows: 30, columns: 40, layers: Some(16) }));
         assert!(["30", "1,2,3,4", "a,b", "-1,2", "1.5,2"].iter().all(|text| parse_grid(text).is_err()));
-        assert_eq!((parse_tol("none"), parse_tol("1e-3")), (Ok(Tolerance(None)), Ok(Tolerance(Some(1e-3)))));
-        assert!(parse_tol("never").is_err());
     }
 
     #[test]

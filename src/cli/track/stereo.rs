@@ -14,7 +14,7 @@ use crate::pipeline::{
     StereoSummary, check_target,
 };
 use crate::track::StereoTracker;
-use crate::track::stereo::StereoTrackerOptions;
+use crate::track::stereo::{ARC_THRESHOLD, StereoTrackerOptions};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ impl TrackCommand {
         let times = self.stereo.times(numbering)?;
         let name = views.describe();
         let pairs = GreyPairs::start(views, preprocess(&self.input, None)?, threads)?;
-        let threshold = options.arc_threshold;
+        let threshold = ARC_THRESHOLD;
         let mode = options.mode.name();
         let mut run = StereoRun::new(StereoTracker::new(options)?, numbering).with_times(times);
         let begin = || self.stereo_sinks(&wanted, &pictures, threshold, numbering.rate);

@@ -2,7 +2,43 @@
 //! track is kept for a while and recognised by position, size and thickness.
 
 use super::clock::Clock;
-use super::options::Recognition;
+
+/// Recognition of lost tracks (`improved`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Recognition {
+    /// Overlap of a component with its moved self below which it loses its track; default 0.2.
+    pub least_overlap: f64,
+    /// Ordinary steps that a lost track is kept; default 10.
+    pub patience: usize,
+    /// Tolerance of the position of a recognised track, cells along x, y and disparity; default (3, 4, 1).
+    pub tolerance: [f64; 3],
+    /// Growth of the tolerance per ordinary step; default (0.5, 0.5, 0.2).
+    pub tolerance_per_step: [f64; 3],
+    /// Steps without a jump after which a track is steady; default 2.
+    pub steady: usize,
+    /// Largest number of ordinary steps that a steady track coasts through a jump with a support below 0.6;
+    /// default 3.
+    pub coast: usize,
+    /// A jump in the picture: change of the motion, px per ordinary step; default 24.
+    pub jump: f64,
+    /// A jump in disparity, per ordinary step; default 1.5.
+    pub jump_disparity: f64,
+}
+
+impl Default for Recognition {
+    fn default() -> Self {
+        Self {
+            least_overlap: 0.2,
+            patience: 10,
+            tolerance: [3.0, 4.0, 1.0],
+            tolerance_per_step: [0.5, 0.5, 0.2],
+            steady: 2,
+            coast: 3,
+            jump: 24.0,
+            jump_disparity: 1.5,
+        }
+    }
+}
 
 /// State of a component's track.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,16 +148,12 @@ impl TrackAssociation {
         k: usize,
         (measured, gap): (Option<Measured>, f64),
         cell: [f64; 3],
-        limits: Option<&Recognition>,
+        limits: &Recognition,
     ) -> Option<Carried> {
         let trust = measured.map_or(0.0, |measured| (measured.support / FULL_SUPPORT).min(1.0));
         let sure = trust >= 1.0 && crate::ablation::keeps("stereo.sure_jump");
         let measured = measured.map(|measured| measured.motion);
         let Some(track) = self.live.get_mut(k).and_then(Option::as_mut) else {
-            return measured.map(|motion| Carried { motion, coasting: false });
-        };
-        let Some(limits) = limits else {
-            track.velocity = measured.or(track.velocity);
             return measured.map(|motion| Carried { motion, coasting: false });
         };
         let like = match (track.velocity, measured) {

@@ -5,6 +5,8 @@ use super::exposure::Exposure;
 use super::voxels::Lattice;
 use crate::types::Frame;
 
+/// Levels of the reduced luminance.
+pub(super) const LUMINANCE_LEVELS: usize = 64;
 /// Level of a cell without a finite pixel.
 const NONE: i32 = -1;
 
@@ -30,9 +32,9 @@ pub(super) struct Match {
 }
 
 impl CellLuminance {
-    /// Averages grey levels (0 to 255) over cells: `floor(Y levels / 256)`. Pixels that are not finite are
+    /// Averages grey levels (0 to 255) over cells: `floor(Y 64 / 256)`. Pixels that are not finite are
     /// left out.
-    pub fn new(frame: &Frame<f32>, lattice: &Lattice, levels: usize) -> Self {
+    pub fn new(frame: &Frame<f32>, lattice: &Lattice) -> Self {
         let (columns, rows) = (lattice.grid.columns, lattice.grid.rows);
         let (cell_columns, cell_rows) = (lattice.cell_columns(), lattice.cell_rows());
         let (mut sums, mut counts) = (vec![0.0f64; columns * rows], vec![0u32; columns * rows]);
@@ -47,7 +49,7 @@ impl CellLuminance {
         }
         // Without a finite pixel 0 / 0.
         let means = sums.into_iter().zip(counts).map(|(sum, count)| sum / f64::from(count)).collect();
-        Self::of_means((columns as i32, rows as i32), means, (levels as f64 / 256.0, levels))
+        Self::of_means((columns as i32, rows as i32), means, (LUMINANCE_LEVELS as f64 / 256.0, LUMINANCE_LEVELS))
     }
 
     /// Means cut down to levels.
@@ -129,7 +131,7 @@ mod tests {
             let (x, y) = (x as i32 / 8 - dx + 64, y as i32 / 8 - dy + 64);
             (255.0 * rng.uniform((y * 200 + x) as u64)) as f32
         };
-        CellLuminance::new(&Frame::from_fn(160, 120, value), &lattice(), 64)
+        CellLuminance::new(&Frame::from_fn(160, 120, value), &lattice())
     }
 
     #[test]
@@ -144,7 +146,7 @@ mod tests {
 
     #[test]
     fn of_equal_shifts_the_shortest_is_taken() {
-        let flat = CellLuminance::new(&Frame::filled(160, 120, 90.0), &lattice(), 64);
+        let flat = CellLuminance::new(&Frame::filled(160, 120, 90.0), &lattice());
         assert_eq!(flat.find(&[[10, 7]], &flat, 8).unwrap(), Match { shift: [0, 0], difference: 0.0 });
     }
 
@@ -155,7 +157,7 @@ mod tests {
         let found = |dx| picture(0, 0).find(&template, &picture(dx, 0), 8).unwrap();
         assert_eq!(found(-2), Match { shift: [-2, 0], difference: 0.0 });
         assert_ne!(found(-3).shift, [-3, 0]);
-        let dark = CellLuminance::new(&Frame::filled(160, 120, f32::NAN), &lattice(), 64);
+        let dark = CellLuminance::new(&Frame::filled(160, 120, f32::NAN), &lattice());
         assert_eq!(picture(0, 0).find(&template, &dark, 8), None);
     }
 
@@ -167,7 +169,7 @@ mod tests {
         for y in 112..120 {
             frame.row_mut(y)[..8].fill(f32::NAN);
         }
-        let cells = CellLuminance::new(&frame, &lattice(), 64);
+        let cells = CellLuminance::new(&frame, &lattice());
         // (255 + 7 x 7.9) / 8 = 38.79, a quarter of it 9.7.
         assert_eq!((cells.level(0, 0), cells.level(1, 0)), (Some(1), Some(9)));
         assert_eq!((cells.level(0, 14), cells.level(-1, 0), cells.level(20, 0)), (None, None, None));

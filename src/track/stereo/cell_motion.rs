@@ -51,7 +51,7 @@ mod tests {
     fn a_picture_of_nothing_has_no_motion_either_way() {
         let cells: Vec<_> = (0..40).map(|i| ([20 + i % 5, 30 + i / 5, 40], 0)).collect();
         let seen = |clusters: Clusters, level: &dyn Fn(usize, usize) -> f32| {
-            let luminance = CellLuminance::new(&Frame::from_fn(640, 480, level), clusters.lattice(), 64);
+            let luminance = CellLuminance::new(&Frame::from_fn(640, 480, level), clusters.lattice());
             ObservedStep { clusters, luminance, levels: None }
         };
         let one = seen(synthetic_clusters(&cells, 1), &|x, y| ((x / 8 * 37 + y / 8 * 11) % 256) as f32);

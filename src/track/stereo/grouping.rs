@@ -1,8 +1,31 @@
 //! Clusters that touch and move alike are one object.
 
 use super::clusters::Clusters;
-use super::options::Grouping;
 use crate::math::median;
+
+/// Grouping of clusters (`improved`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Grouping {
+    /// Largest distance of grouped clusters, cells; default 3.5.
+    pub reach: f64,
+    /// Largest median difference of their affine motions, px per ordinary step; default 1.
+    pub motion: f64,
+    /// Largest difference of their depth motions, disparity per ordinary step; default 0.15.
+    pub depth_motion: f64,
+}
+
+impl Default for Grouping {
+    fn default() -> Self {
+        Self { reach: 3.5, motion: 1.0, depth_motion: 0.15 }
+    }
+}
+
+impl Grouping {
+    /// The limits over a gap, ordinary steps.
+    pub fn over(self, gap: f64) -> Self {
+        Self { motion: gap * self.motion, depth_motion: gap * self.depth_motion, ..self }
+    }
+}
 
 /// Motion of a cluster, as grouping needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]

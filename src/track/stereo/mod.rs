@@ -39,7 +39,7 @@ mod voxels;
 mod warm_start;
 
 pub use graph::{Arc, Node, TrackGraph};
-pub use options::{Grouping, Recognition, StereoCamera, StereoMode, StereoTrackerOptions, VoxelGrid};
+pub use options::{ARC_THRESHOLD, StereoCamera, StereoMode, StereoTrackerOptions, VoxelGrid};
 pub use step::{Step, Track};
 pub use tracker::StereoTracker;
 pub use voxels::EdgePoints;

@@ -6,6 +6,25 @@ use crate::mixture::{CovariancePrior, MixtureOptions};
 use crate::parallel::Threads;
 use crate::stereo::{EdgeDisparityOptions, Method};
 
+/// `alpha_0` of (8), pixels.
+pub(super) const WEIGHT_CONCENTRATION_PRIOR: f64 = 0.1;
+/// `beta_0` of (9), pixels.
+pub(super) const MEAN_PRECISION_PRIOR: f64 = 0.001;
+/// `nu_0` of (9), pixels.
+pub(super) const DEGREES_OF_FREEDOM_PRIOR: f64 = 12.1;
+/// Diagonal of `W_0^-1` of (9), cells^2.
+pub(super) const COVARIANCE_PRIOR: f64 = 0.1;
+/// Most iterations of the mixture from seeds.
+const MAX_ITERATIONS: usize = 100;
+/// Most iterations from carried components.
+const MAX_CARRIED_ITERATIONS: usize = 30;
+/// Growth of the lower bound per pixel below which iterations end (`improved`; paper: never).
+const BOUND_TOLERANCE: f64 = 1e-4;
+/// Components with fewer pixels are seeded again; smallest object that is recognised, pixels.
+pub(super) const MIN_COMPONENT_PIXELS: f64 = 20.0;
+/// Smallest score of an arc that continues a track, 0 to 2 (section 2.8 of the paper's system).
+pub const ARC_THRESHOLD: f64 = 0.4;
+
 /// Which system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StereoMode {
@@ -77,60 +96,6 @@ impl StereoCamera {
     }
 }
 
-/// Recognition of lost tracks (`improved`).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Recognition {
-    /// Overlap of a component with its moved self below which it loses its track; default 0.2.
-    pub least_overlap: f64,
-    /// Ordinary steps that a lost track is kept; default 10.
-    pub patience: usize,
-    /// Tolerance of the position of a recognised track, cells along x, y and disparity; default (3, 4, 1).
-    pub tolerance: [f64; 3],
-    /// Growth of the tolerance per ordinary step; default (0.5, 0.5, 0.2).
-    pub tolerance_per_step: [f64; 3],
-    /// Steps without a jump after which a track is steady; default 2.
-    pub steady: usize,
-    /// Largest number of ordinary steps that a steady track coasts through a jump with a support below 0.6;
-    /// default 3.
-    pub coast: usize,
-    /// A jump in the picture: change of the motion, px per ordinary step; default 24.
-    pub jump: f64,
-    /// A jump in disparity, per ordinary step; default 1.5.
-    pub jump_disparity: f64,
-}
-
-impl Default for Recognition {
-    fn default() -> Self {
-        Self {
-            least_overlap: 0.2,
-            patience: 10,
-            tolerance: [3.0, 4.0, 1.0],
-            tolerance_per_step: [0.5, 0.5, 0.2],
-            steady: 2,
-            coast: 3,
-            jump: 24.0,
-            jump_disparity: 1.5,
-        }
-    }
-}
-
-/// Grouping of clusters (`improved`).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grouping {
-    /// Largest distance of grouped clusters, cells; default 3.5.
-    pub reach: f64,
-    /// Largest median difference of their affine motions, px per ordinary step; default 1.
-    pub motion: f64,
-    /// Largest difference of their depth motions, disparity per ordinary step; default 0.15.
-    pub depth_motion: f64,
-}
-
-impl Default for Grouping {
-    fn default() -> Self {
-        Self { reach: 3.5, motion: 1.0, depth_motion: 0.15 }
-    }
-}
-
 /// Options of the stereo tracker. Begin with [`StereoTrackerOptions::new`]: some defaults differ between the
 /// modes.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,45 +111,13 @@ pub struct StereoTrackerOptions {
     /// Offset of the right view's rows, px; none (default): searched at each pixel (`Classes`), or estimated
     /// at the first suitable step and monitored (`SemiGlobal`).
     pub row_offset: Option<f64>,
-    /// How views are matched; default classes (`paper`), semi-global (`improved`).
-    pub matching: Method,
     /// Components of the mixture; default 12 (`paper`), 16 (`improved`).
     pub components: usize,
-    /// `alpha_0` of (8); default 0.1.
-    pub weight_concentration_prior: f64,
-    /// `beta_0` of (9); default 0.001.
-    pub mean_precision_prior: f64,
-    /// `nu_0` of (9); default 12.1.
-    pub degrees_of_freedom_prior: f64,
-    /// Diagonal of `W_0^-1` of (9), cells^2; default 0.1.
-    pub covariance_prior: f64,
-    /// Most iterations of a cold start; default 100.
-    pub max_iter: usize,
-    /// Most iterations from carried components (`improved`); default 30.
-    pub warm_max_iter: usize,
-    /// The mixture stops when its lower bound grows by less than this for each pixel; none: never. Default
-    /// none (`paper`), 1e-4 (`improved`).
-    pub tol: Option<f64>,
-    /// Cold starts of which the best is kept; default 1.
-    pub n_init: usize,
-    /// Components with fewer pixels are dropped while fitting; default 0, which drops none.
-    pub prune_weight: f64,
     /// Seed of cold starts; default 0.
     pub random_state: u64,
     /// Search reach from one ordinary step to the next, cells and disparities; default 8. Grows with the gap,
     /// at most to 64.
     pub search: usize,
-    /// Levels of the reduced luminance; default 64.
-    pub luminance_levels: usize,
-    /// Smallest score of an arc that continues a track, 0 to 2; default 0.4.
-    pub arc_threshold: f64,
-    /// Components with fewer pixels are seeded again, and cold starts are split and merged (`improved`); 0:
-    /// neither; default 20.
-    pub reseed_below: f64,
-    /// Recognition of lost tracks (`improved`).
-    pub recognition: Option<Recognition>,
-    /// Grouping of clusters (`improved`).
-    pub grouping: Option<Grouping>,
     /// The cameras, if depths are wanted.
     pub camera: Option<StereoCamera>,
     /// Duration of an ordinary step, in the unit of times and velocities; default 1. Every number of steps in
@@ -210,24 +143,9 @@ impl StereoTrackerOptions {
             disparity_range: [-40, 24],
             row_range: [-4, 4],
             row_offset: None,
-            matching: if improved { Method::SemiGlobal } else { Method::Classes },
             components: if improved { 16 } else { 12 },
-            weight_concentration_prior: 0.1,
-            mean_precision_prior: 1e-3,
-            degrees_of_freedom_prior: 12.1,
-            covariance_prior: 0.1,
-            max_iter: 100,
-            warm_max_iter: 30,
-            tol: improved.then_some(1e-4),
-            n_init: 1,
-            prune_weight: 0.0,
             random_state: 0,
             search: 8,
-            luminance_levels: 64,
-            arc_threshold: 0.4,
-            reseed_below: 20.0,
-            recognition: improved.then(Recognition::default),
-            grouping: improved.then(Grouping::default),
             camera: None,
             step_time: 1.0,
             threads: Threads::default(),
@@ -250,7 +168,7 @@ impl StereoTrackerOptions {
     pub(super) fn matching_options(&self, row_offset: Option<f64>) -> EdgeDisparityOptions {
         let ([least, greatest], [first_row, last_row]) = (self.disparity_range, self.row_range);
         EdgeDisparityOptions {
-            method: self.matching,
+            method: if self.mode == StereoMode::Improved { Method::SemiGlobal } else { Method::Classes },
             disparity_range: (least, greatest),
             row_range: (first_row, last_row),
             row_offset,
@@ -263,16 +181,15 @@ impl StereoTrackerOptions {
     pub(super) fn mixture_options(&self, carried: bool, step: usize) -> MixtureOptions {
         MixtureOptions {
             components: self.components,
-            weight_concentration_prior: self.weight_concentration_prior,
-            mean_precision_prior: self.mean_precision_prior,
+            weight_concentration_prior: WEIGHT_CONCENTRATION_PRIOR,
+            mean_precision_prior: MEAN_PRECISION_PRIOR,
             mean_prior: None,
-            degrees_of_freedom_prior: Some(self.degrees_of_freedom_prior),
-            covariance_prior: CovariancePrior::Isotropic(self.covariance_prior),
-            max_iter: if carried { self.warm_max_iter } else { self.max_iter },
-            tol: self.tol,
-            n_init: self.n_init,
+            degrees_of_freedom_prior: Some(DEGREES_OF_FREEDOM_PRIOR),
+            covariance_prior: CovariancePrior::Isotropic(COVARIANCE_PRIOR),
+            max_iter: if carried { MAX_CARRIED_ITERATIONS } else { MAX_ITERATIONS },
+            tol: (self.mode == StereoMode::Improved).then_some(BOUND_TOLERANCE),
             // Carried components keep their numbers.
-            prune_weight: if carried { 0.0 } else { self.prune_weight },
+            prune_weight: 0.0,
             random_state: self.random_state.wrapping_add(step as u64),
             threads: self.threads,
             ..MixtureOptions::default()

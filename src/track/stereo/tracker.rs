@@ -168,7 +168,7 @@ impl StereoTracker {
         self.clock = self.next_moment();
         let (points, left_out) = points.within(&lattice);
         let voxels = Voxels::count(&points, lattice);
-        let luminance = CellLuminance::new(left, &lattice, self.options.luminance_levels);
+        let luminance = CellLuminance::new(left, &lattice);
         let (mut step, seen, posterior) = match self.options.mode {
             StereoMode::Paper => self.advance_as_printed(points, voxels, luminance)?,
             StereoMode::Improved => self.advance_carried(left, points, voxels, luminance)?,

@@ -5,7 +5,7 @@ mod split_merge;
 
 use self::blobs::{Blob, blobs, log_density};
 pub(super) use self::split_merge::split_and_merge;
-use super::options::StereoTrackerOptions;
+use super::options::MIN_COMPONENT_PIXELS;
 use super::voxels::Voxels;
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
@@ -42,7 +42,7 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components with fewer than `reseed_below` pixels, or spread so thinly that they explain none, at the
+/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain none, at the
 /// largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels outside of such
 /// blobs; `None` if most pixels are unexplained: a new scene.
 ///
@@ -51,17 +51,12 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
 ///
 /// # Errors
 /// Those of the mixture.
-pub(super) fn reseed(
-    posterior: &mut Posterior,
-    voxels: &Voxels,
-    points: &Points,
-    options: &StereoTrackerOptions,
-) -> Result<Option<Seeded>> {
+pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<Option<Seeded>> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
     let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
-    let least = options.reseed_below.max(1.0);
-    let explained = explaining(all, options);
+    let least = MIN_COMPONENT_PIXELS;
+    let explained = explaining(all);
     let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
     let (mut blobs, outliers): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained).into_iter().partition(|blob| {
         blob.pixels >= least && (!crate::ablation::keeps("stereo.thin_blobs") || blob.explains_itself(all, explained))
@@ -78,30 +73,25 @@ pub(super) fn reseed(
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
         pixels.iter_mut().zip(row).for_each(|(sum, share)| *sum += share * f64::from(count));
     }
-    let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all), options)).collect();
+    let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all))).collect();
     let mut seeds = vec![false; components];
     for (k, blob) in dead.into_iter().zip(&blobs).filter(|_| crate::ablation::keeps("stereo.reseed")) {
-        blob.place(posterior, k, options);
+        blob.place(posterior, k);
         seeds[k] = true;
     }
     Ok(Some(Seeded { seeds, outliers }))
 }
 
-/// Whether a component has fewer than `reseed_below` of all pixels, or is spread so thinly that it explains
+/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or is spread so thinly that it explains
 /// none.
-pub(super) fn is_left_over(
-    posterior: &Posterior,
-    k: usize,
-    (pixels, all): (f64, f64),
-    options: &StereoTrackerOptions,
-) -> bool {
-    pixels < options.reseed_below || log_density(pixels / all, &covariance(posterior, k)) < explaining(all, options)
+pub(super) fn is_left_over(posterior: &Posterior, k: usize, (pixels, all): (f64, f64)) -> bool {
+    pixels < MIN_COMPONENT_PIXELS || log_density(pixels / all, &covariance(posterior, k)) < explaining(all)
 }
 
 /// Log-density from which a voxel counts as explained: that of a typical seed with the fewest pixels at one
 /// standard deviation.
-fn explaining(all: f64, options: &StereoTrackerOptions) -> f64 {
-    let least = options.reseed_below.max(1.0);
+fn explaining(all: f64) -> f64 {
+    let least = MIN_COMPONENT_PIXELS;
     log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_STD.map(|s| s * s).into()))
 }
 
@@ -123,6 +113,7 @@ pub(super) struct Seeded {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::clusters::tests::synthetic_clusters;
+    use super::super::options::COVARIANCE_PRIOR;
     use super::*;
 
     /// Two components, one of them where nothing is.
@@ -168,14 +159,13 @@ pub(super) mod tests {
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
-        let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, true]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, true]);
         let mean = &posterior.means[3..];
         assert_eq!(mean, [41.0, 21.0, 20.0]);
         // Its extent: cells 40 to 42 and 20 to 22, each counted five times, one layer.
-        let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - options.covariance_prior - 45.0 / 12.0;
+        let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - COVARIANCE_PRIOR - 45.0 / 12.0;
         assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
     }
 
     #[test]
@@ -192,15 +182,14 @@ pub(super) mod tests {
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut three = with_a_third();
-        let options = StereoTrackerOptions::default();
-        let seeded = reseed(&mut three, &voxels, &points, &options).unwrap().unwrap();
+        let seeded = reseed(&mut three, &voxels, &points).unwrap().unwrap();
         // The second is the likeliest for all that the first does not explain, and keeps its place.
         assert_eq!(seeded.seeds, [false, false, true]);
         assert_eq!(seeded.outliers.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
         // Moved away from what it explained.
         let mut lost = posterior();
         lost.means[0] = 30.0;
-        assert_eq!(reseed(&mut lost, &voxels, &points, &options).unwrap(), None);
+        assert_eq!(reseed(&mut lost, &voxels, &points).unwrap(), None);
     }
 
     #[test]
@@ -213,8 +202,7 @@ pub(super) mod tests {
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
-        let options = StereoTrackerOptions::default();
-        assert_eq!(reseed(&mut posterior, &voxels, &points, &options).unwrap().unwrap().seeds, [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
         assert_eq!(posterior.means[3..], [70.0, 50.0, 3.0]);
     }
 }

@@ -1,15 +1,14 @@
 //! From one step to the next, in either mode.
 
-use super::super::association::Carried;
-use super::super::cell_luminance::CellLuminance;
+use super::super::association::{Carried, Recognition};
+use super::super::cell_luminance::{CellLuminance, LUMINANCE_LEVELS};
 use super::super::cell_motion::{CellMotion, ObservedStep, cell_motions};
 use super::super::cluster_motion::middle;
 use super::super::cluster_motion::{ClusterMotion, places, voxel_motion};
 use super::super::clusters::Clusters;
-use super::super::grouping::{GroupMotion, groups};
+use super::super::grouping::{GroupMotion, Grouping, groups};
 use super::super::lucas_kanade::SmoothedLevels;
 use super::super::measured_motion::NextView;
-use super::super::options::Grouping;
 use super::super::overlap::Row;
 use super::super::own_pixels::{View, own_middle};
 use super::super::step::Step;
@@ -42,7 +41,7 @@ impl StereoTracker {
             Some(last) => (cell_motions(last, &seen, reach), cell_motions(&seen, last, reach)),
             None => (vec![], vec![]),
         };
-        let level = 256.0 / self.options.luminance_levels as f64;
+        let level = 256.0 / LUMINANCE_LEVELS as f64;
         let arrivals = (0..seen.clusters.components()).map(|k| {
             let motion = backward.get(k).and_then(Option::as_ref);
             Arrival {
@@ -106,7 +105,7 @@ impl StereoTracker {
         let share = |rows: &[Row], k: usize| rows.get(k).and_then(|row| row.get(k)).copied().unwrap_or(0.0);
         let overlap = |k: usize| share(&forward, k).max(share(&backward, k));
         // A seed at the predicted place continues the track.
-        let least = self.options.recognition.as_ref().map_or(0.0, |limits| limits.least_overlap);
+        let least = Recognition::default().least_overlap;
         let newcomer = |k: usize| seeded.get(k).is_some_and(|seeded| *seeded) && overlap(k) <= least;
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
         // A component of leftovers may be anywhere: it needs no new track.
@@ -136,28 +135,14 @@ impl StereoTracker {
                 None => Arrival::UNKNOWN,
             })
             .collect();
-        let grouped = match &self.options.grouping {
-            Some(limits) => {
-                let motions: Vec<_> = (0..components)
-                    .map(|k| {
-                        own(k).map(|(motion, _)| {
-                            let (flow, [x, y]) = (motion.plane.flow, motion.plane.centre);
-                            // The motion refers to the old places of the pixels, the cluster to the new ones.
-                            GroupMotion {
-                                affine: flow.to_array(),
-                                centre: [x + flow.u, y + flow.v],
-                                depth: motion.depth,
-                            }
-                        })
-                    })
-                    .collect();
-                let gap = self.clock.gap;
-                let limits =
-                    Grouping { motion: gap * limits.motion, depth_motion: gap * limits.depth_motion, ..*limits };
-                groups(&clusters, &motions, &limits)
-            }
-            None => (0..components).collect(),
+        let group_motion = |k: usize| {
+            let (motion, _) = own(k)?;
+            let (flow, [x, y]) = (motion.plane.flow, motion.plane.centre);
+            // The motion refers to the old places of the pixels, the cluster to the new ones.
+            Some(GroupMotion { affine: flow.to_array(), centre: [x + flow.u, y + flow.v], depth: motion.depth })
         };
+        let group_motions: Vec<_> = (0..components).map(group_motion).collect();
+        let grouped = groups(&clusters, &group_motions, &Grouping::default().over(self.clock.gap));
         let step = self.record(&clusters, posterior.as_ref(), rounds, (&arrivals, &middles), &grouped);
         let departures: Vec<_> =
             motions.iter().enumerate().map(|(k, motion)| self.departure(k, motion.as_ref()?.0)).collect();
@@ -174,6 +159,6 @@ impl StereoTracker {
 
     fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
         let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
-        k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64), &self.options)
+        k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64))
     }
 }

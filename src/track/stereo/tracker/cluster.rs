@@ -57,7 +57,7 @@ impl StereoTracker {
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
         };
         if let Some(mut start) = start
-            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, &self.options)?
+            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)?
         {
             let fitted = without(&start, &outliers)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
@@ -69,9 +69,8 @@ impl StereoTracker {
         let mut left_out = vec![];
         for seeding in [true, false] {
             let mut start = fitted.posterior.clone();
-            let mut changed = split_and_merge(&mut start, &voxels, &weighted, &self.options)?;
-            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, &self.options)?
-            {
+            let mut changed = split_and_merge(&mut start, &voxels, &weighted)?;
+            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)? {
                 changed |= seeds.contains(&true);
                 left_out = outliers;
             }

@@ -1,11 +1,12 @@
 //! Expected and measured motions of the last step's clusters.
 
-use super::super::association::{Carried, Measured};
+use super::super::association::{Carried, Measured, Recognition};
 use super::super::cluster_motion::middle;
 use super::super::cluster_motion::{ClusterMotion, places};
 use super::super::clusters::Clusters;
 use super::super::lucas_kanade::SmoothedLevels;
 use super::super::measured_motion::{Guess, NextView, measure_motions};
+use super::super::options::MIN_COMPONENT_PIXELS;
 use super::super::overlap::moved_overlaps;
 use super::super::voxels::EdgePoints;
 use super::StereoTracker;
@@ -104,9 +105,9 @@ impl StereoTracker {
     pub(super) fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(ClusterMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
         let (cell, gap) = (last.clusters.lattice().cell(), self.clock.gap);
-        let looked_for = (self.clock.reach(self.options.search), self.options.reseed_below);
+        let looked_for = (self.clock.reach(self.options.search), MIN_COMPONENT_PIXELS);
         let measured = measure_motions(last, view, &self.guesses(cell, last.clusters.components()), looked_for);
-        let limits = self.options.recognition.as_ref();
+        let limits = Recognition::default();
         let mut out = Vec::with_capacity(measured.len());
         for (k, measured) in measured.into_iter().enumerate() {
             if last.clusters.pixels[k].is_empty() {
@@ -117,7 +118,7 @@ impl StereoTracker {
                 motion: std::array::from_fn(|i| m.at_centre()[i] / cell[i] / gap),
                 support: m.support,
             });
-            let carried = self.association.carry(k, (in_cells, gap), cell, limits);
+            let carried = self.association.carry(k, (in_cells, gap), cell, &limits);
             out.push(carried.and_then(|carried| {
                 let motion = if carried.coasting {
                     let moved = std::array::from_fn(|i| gap * carried.motion[i] * cell[i]);

@@ -4,6 +4,7 @@ use super::super::association::Carried;
 use super::super::cluster_motion::ClusterMotion;
 use super::super::clusters::Clusters;
 use super::super::graph::Arc;
+use super::super::options::ARC_THRESHOLD;
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::succession::successors;
 use super::StereoTracker;
@@ -25,7 +26,7 @@ impl StereoTracker {
         let moves = self.moves(before, &clustered.clusters, motions);
         let (forward, backward) = both_ways(before, &clustered.clusters, &moves);
         let sizes = [before, &clustered.clusters].map(|all| all.members.iter().map(Vec::len).collect::<Vec<_>>());
-        let names = successors(&forward, &backward, [&sizes[0], &sizes[1]], self.options.arc_threshold);
+        let names = successors(&forward, &backward, [&sizes[0], &sizes[1]], ARC_THRESHOLD);
         if !crate::ablation::keeps("stereo.successors") || names.iter().enumerate().all(|(k, name)| k == *name) {
             return (clustered, seeded, (forward, backward));
         }

@@ -1,8 +1,9 @@
 //! Tracks, graph and result of a step.
 
-use super::super::association::Sighting;
+use super::super::association::{Recognition, Sighting};
 use super::super::clusters::Clusters;
 use super::super::graph::{Arc, Node};
+use super::super::options::{ARC_THRESHOLD, MIN_COMPONENT_PIXELS};
 use super::super::step::Step;
 use super::StereoTracker;
 use crate::error::Result;
@@ -48,7 +49,7 @@ impl StereoTracker {
         for (k, slot) in live.iter_mut().enumerate() {
             let Some(arc) = strongest(&|arc| arc.to == k) else { continue };
             let mutual = strongest(&|other| other.from == arc.from).is_some_and(|other| other.to == k);
-            if mutual && arc.score() >= self.options.arc_threshold {
+            if mutual && arc.score() >= ARC_THRESHOLD {
                 *slot = before.get(arc.from).cloned().flatten();
             }
         }
@@ -59,12 +60,11 @@ impl StereoTracker {
 
     /// Improved mode: a component keeps its track until it is empty or `lost`.
     pub(super) fn associate_components(&mut self, clusters: &Clusters, lost: &[bool]) {
-        let limits = self.options.recognition.as_ref();
         let lost = |k: usize| lost.get(k).is_none_or(|lost| *lost) || clusters.pixels[k].is_empty();
         self.association.set_lost(self.clock.before(), lost);
         self.association.live.resize(clusters.components(), None);
         let seen = sightings(clusters, |k| middle_and_deviation(clusters, k));
-        self.association.associate(self.clock, &seen, self.options.reseed_below, limits);
+        self.association.associate(self.clock, &seen, MIN_COMPONENT_PIXELS, Some(&Recognition::default()));
     }
 
     /// Adds the clusters to graph and tracks, and assembles the step from how each arrived and its middle,

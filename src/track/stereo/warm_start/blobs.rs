@@ -1,6 +1,8 @@
 //! Connected voxels and their moments.
 
-use super::super::options::StereoTrackerOptions;
+use super::super::options::{
+    COVARIANCE_PRIOR, DEGREES_OF_FREEDOM_PRIOR, MEAN_PRECISION_PRIOR, WEIGHT_CONCENTRATION_PRIOR,
+};
 use super::super::voxels::Voxels;
 use super::D;
 use crate::mixture::Posterior;
@@ -91,17 +93,17 @@ impl Blob {
 
     /// Sets component `k` to the posterior of these pixels alone; without pixels, to the prior at its old
     /// mean.
-    pub fn place(&self, posterior: &mut Posterior, k: usize, options: &StereoTrackerOptions) {
-        posterior.weight_concentration[k] = options.weight_concentration_prior + self.pixels;
-        posterior.mean_precision[k] = options.mean_precision_prior + self.pixels;
-        posterior.degrees_of_freedom[k] = options.degrees_of_freedom_prior + self.pixels;
+    pub fn place(&self, posterior: &mut Posterior, k: usize) {
+        posterior.weight_concentration[k] = WEIGHT_CONCENTRATION_PRIOR + self.pixels;
+        posterior.mean_precision[k] = MEAN_PRECISION_PRIOR + self.pixels;
+        posterior.degrees_of_freedom[k] = DEGREES_OF_FREEDOM_PRIOR + self.pixels;
         let scatter = if self.pixels > 0.0 { self.pixels * self.covariance() } else { Matrix3::zeros() };
         for i in 0..D {
             if self.pixels > 0.0 {
                 posterior.means[k * D + i] = self.sums[i] / self.pixels;
             }
             for j in 0..D {
-                let prior = if i == j { options.covariance_prior } else { 0.0 };
+                let prior = if i == j { COVARIANCE_PRIOR } else { 0.0 };
                 posterior.scale_inverses[(k * D + i) * D + j] = prior + scatter[(i, j)];
             }
         }

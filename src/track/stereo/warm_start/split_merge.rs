@@ -1,6 +1,6 @@
 //! Splits and merges the components of a cold start, so that each holds one object.
 
-use super::super::options::StereoTrackerOptions;
+use super::super::options::MIN_COMPONENT_PIXELS;
 use super::super::voxels::Voxels;
 use super::blobs::{Blob, blobs, split_gain, within};
 use crate::error::Result;
@@ -14,26 +14,18 @@ const MIN_SPLIT_GAIN: f64 = 1.0;
 const MAX_MERGE_LOSS: f64 = 0.1;
 
 /// Merges pieces of a surface, and splits components that hold small objects far apart; EM iterations do
-/// neither. The largest gains come first. Returns whether anything changed; never with `reseed_below` 0.
+/// neither. The largest gains come first. Returns whether anything changed.
 ///
 /// Unmerged pieces may become one component later, with either track, and leave no component for small or
 /// appearing objects.
 ///
 /// # Errors
 /// Those of the mixture.
-pub(in super::super) fn split_and_merge(
-    posterior: &mut Posterior,
-    voxels: &Voxels,
-    points: &Points,
-    options: &StereoTrackerOptions,
-) -> Result<bool> {
-    if options.reseed_below <= 0.0 {
-        return Ok(false);
-    }
+pub(in super::super) fn split_and_merge(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<bool> {
     let labels = posterior.labels(points)?;
     let mut members = vec![vec![]; posterior.components()];
     labels.iter().enumerate().for_each(|(n, &k)| members[k as usize].push(n));
-    let least = options.reseed_below.max(1.0);
+    let least = MIN_COMPONENT_PIXELS;
     let mut several: Vec<(usize, Split)> =
         members.iter().enumerate().filter_map(|(k, own)| Some((k, Split::of(voxels, own, least)?))).collect();
     several.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
@@ -46,7 +38,7 @@ pub(in super::super) fn split_and_merge(
     for (k, parts) in several.into_iter().filter(|_| crate::ablation::keeps("stereo.part")) {
         pool.split(k, parts);
     }
-    pool.changed.iter().for_each(|&k| pool.wholes[k].place(posterior, k, options));
+    pool.changed.iter().for_each(|&k| pool.wholes[k].place(posterior, k));
     Ok(!pool.changed.is_empty())
 }
 
@@ -207,7 +199,7 @@ mod tests {
             let mut both = posterior();
             both.means[..3].copy_from_slice(&[20.0, 16.0, 35.0]);
             (0..3).for_each(|i| both.scale_inverses[4 * i] = 60.0 * 40.0);
-            (split_and_merge(&mut both, &voxels, &points, &StereoTrackerOptions::default()).unwrap(), both.means)
+            (split_and_merge(&mut both, &voxels, &points).unwrap(), both.means)
         };
         let (parted, means) = result([30, 20, 40]);
         assert!(parted);
@@ -232,10 +224,7 @@ mod tests {
             .flat_map(|&s| [s, 0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s / 12.0])
             .collect();
         three.scale_inverses[26] = 60.0 * 25.0;
-        // Not without reseeding.
-        let never = StereoTrackerOptions { reseed_below: 0.0, ..StereoTrackerOptions::default() };
-        assert!(!split_and_merge(&mut three, &voxels, &points, &never).unwrap());
-        assert!(split_and_merge(&mut three, &voxels, &points, &StereoTrackerOptions::default()).unwrap());
+        assert!(split_and_merge(&mut three, &voxels, &points).unwrap());
         let labels = three.labels(&points).unwrap();
         let of = |x: u16, y: u16| labels[voxels.cells.iter().position(|c| c[..2] == [x, y]).unwrap()];
         assert_eq!(of(10, 40), of(33, 44));
@@ -259,7 +248,7 @@ mod tests {
                 .enumerate()
                 .flat_map(|(i, s)| (0..3).map(move |j| if i % 3 == j { 60.0 * s } else { 0.0 }))
                 .collect();
-            let changed = split_and_merge(&mut two, &voxels, &points, &StereoTrackerOptions::default()).unwrap();
+            let changed = split_and_merge(&mut two, &voxels, &points).unwrap();
             let labels = two.labels(&points).unwrap();
             (changed, labels.iter().collect::<std::collections::BTreeSet<_>>().len())
         };
@@ -280,7 +269,7 @@ mod tests {
         two.means = vec![20.0, 16.0, 35.0, 61.0, 51.0, 10.0];
         (0..3).for_each(|i| two.scale_inverses[4 * i] = 60.0 * 40.0);
         let before = two.clone();
-        assert!(!split_and_merge(&mut two, &voxels, &points, &StereoTrackerOptions::default()).unwrap());
+        assert!(!split_and_merge(&mut two, &voxels, &points).unwrap());
         assert_eq!(two, before);
     }
 }
