@@ -29,8 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
-from ._stereo_options import real_number
-from ._stereo_options import StereoCamera
+from ._stereo_options import StereoCamera, real_number
 from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
 __all__ = [
@@ -44,10 +43,10 @@ __all__ = [
     "ParticleTracker",
     "ParticleTracks",
     "PixelFlow",
+    "StereoCamera",
     "StereoCluster",
     "StereoStep",
     "StereoTrack",
-    "StereoCamera",
     "StereoTracker",
     "Track",
     "TrackGraph",
