@@ -1,45 +1,52 @@
-//! The everyday estimator: affine flow from coarse to fine, for motions of many pixels, edges between motions
-//! and untextured areas.
+//! Coarse-to-fine estimator: affine flow for motions of many pixels, motion boundaries and untextured areas.
 //!
-//! A pyramid of the frames is walked from its coarsest level. On each level the motion at every second pixel
-//! is improved a few times: the frames are warped by it towards the middle of their times (`data`: rows 1 to
-//! 3 of WO2010/098160, (21), transported, over a small window), and neighbouring sites are bound together,
-//! robustly (`couple`). On the finest level the windows that the motion may be averaged over are chosen site
-//! by site (`refine`), the pull of undersampled texture is taken out (`locking`), and the covariance follows
-//! from all this (`covariance`). `docs/theory.md` tells why.
+//! Data pass the stages in this order:
 //!
-//! Flow of a pair belongs to the pixels of the first frame. Every pixel with data gets an estimate; what is
-//! untextured or leaves the frame is filled from its surroundings. Fine random texture that moves by more
-//! than its own grain on every level of the pyramid may not be found. The covariance does not know of motions
-//! that were not found, nor of what happens at motion boundaries.
+//! 1. [`brightness_scale`], [`pyramid`]: frames are scaled to a common contrast and halved repeatedly.
+//! 2. [`descent`]: from the coarsest level down, each level repeats two steps: [`data_term`] warps the frames
+//!    by the present motion and sums windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every
+//!    second pixel; [`regularize`] minimises data and robust smoothness terms together. [`resample`] carries
+//!    the motion to the next level.
+//! 3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged.
+//! 4. [`peak_locking`]: measures and removes the bias of undersampled texture.
+//! 5. [`acceleration`]: three frames only; from the mean of both steps to the step after the middle frame.
+//! 6. [`covariance`]: error sources measured in the same frames.
+//! 7. [`output`]: the field at the requested sites, with status and diagnostics.
+//!
+//! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
+//! stages leave for covariance and output. [`planes`], [`plane_pool`] and [`workspace`] hold the memory.
+//!
+//! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
+//! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves by
+//! more than its grain on every level may not be found. The covariance includes neither motions that were not
+//! found nor errors at motion boundaries. `docs/flow.md` has the equations, `docs/design/coarse_to_fine.md`
+//! the origin of the constants.
 
-mod candidates;
-mod change;
-mod couple;
+mod acceleration;
+mod brightness_scale;
 mod covariance;
-mod data;
-mod descend;
-mod further;
-mod grid;
-mod levels;
-mod locking;
-mod memory;
+mod data_term;
+mod descent;
+mod estimate;
+mod estimator;
 mod options;
 mod output;
-mod range;
-mod reference;
+mod peak_locking;
+mod plane_pool;
+mod planes;
+mod pyramid;
 mod refine;
+mod regularize;
 mod resample;
-mod rows;
-mod run;
-mod step;
+mod schedule;
+mod workspace;
 
-pub use options::{CoarseToFineOptions, LEAST_SIDE, Preset};
-pub(super) use run::CoarseToFine;
+pub(super) use estimator::CoarseToFine;
+pub use options::{CoarseToFineOptions, MIN_LEVEL_SIDE, Preset};
 
-/// How far errors of neighbouring estimates from so many frames go together, px: that of wide windows, so
-/// that means over regions are not told too well. Those of three frames, whose windows are chosen once more
-/// in what they have made smooth, go together further.
+/// Distance, px, over which errors of neighbouring estimates from `frames` frames are correlated: that of wide
+/// windows, so that means over regions are not given too small a standard deviation. Three frames have more,
+/// since their windows are chosen a second time in a motion that is already smooth.
 pub(super) fn correlation_length(frames: usize) -> f64 {
     if frames == 3 { 17.0 } else { 8.0 }
 }

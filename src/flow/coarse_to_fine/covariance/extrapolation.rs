@@ -5,10 +5,10 @@
 //! that is continued by `d`. They are taken from mean absolute values, as of Gaussian errors, so that the few
 //! pairs of places across a motion boundary do not tell for all others.
 
-use super::super::grid::Planes;
-use super::super::refine::{Evidence, PITCH, SPACING};
-use super::seen::Seen;
-use super::{Entries, bending};
+use super::data_support::DataSupport;
+use super::{Entries, curvature_bias};
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, WindowStatistics};
 use crate::flow::windowed::solve::upper;
 use crate::simd::SimdReal;
 use std::f64::consts::FRAC_PI_2;
@@ -17,17 +17,17 @@ use std::f64::consts::FRAC_PI_2;
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
 /// Windows at the edge see one side: their motion is that of half a deviation further in, continued.
-const ONE_SIDED: f64 = 0.5;
+const EDGE_SHIFT: f64 = 0.5;
 /// The widest of them, px: wider ones are only chosen where nothing bends.
-const WIDEST: f64 = 8.0;
+const MAX_EDGE_SIGMA: f64 = 8.0;
 /// Deviation of the windows of the data and of the coupling, px.
-const FIXED: f64 = 2.0;
+const FIXED_WINDOW_STD: f64 = 2.0;
 
 /// How far motion is continued, px, at a signed distance from the edge of the seen by windows of `sigma` px.
 fn continued(distance: f64, sigma: f64) -> f64 {
-    let reach = sigma.min(WIDEST) + FIXED;
+    let reach = sigma.min(MAX_EDGE_SIGMA) + FIXED_WINDOW_STD;
     let inner = distance.max(0.0) / reach;
-    (-distance).max(0.0) + ONE_SIDED * reach * (-2.0 * inner * inner).exp()
+    (-distance).max(0.0) + EDGE_SHIFT * reach * (-2.0 * inner * inner).exp()
 }
 
 /// Variances of continued motion.
@@ -37,11 +37,11 @@ pub(super) struct Extrapolation {
 }
 
 impl Extrapolation {
-    pub fn new<T: SimdReal>(motion: &Planes<T>, evidence: &Evidence<T>, seen: &Seen) -> Self {
-        let (width, height) = evidence.size();
+    pub fn new<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistics<T>, support: &DataSupport) -> Self {
+        let (width, height) = statistics.size();
         let places: Vec<Option<[f64; 6]>> = (0..width * height)
             .map(|n| (n % width, n / width))
-            .map(|(x, y)| (seen.beyond(x, y) == 0.0).then(|| bending::motion_at(motion, (x, y))))
+            .map(|(x, y)| (support.continued_distance(x, y) == 0.0).then(|| curvature_bias::motion_at(motion, (x, y))))
             .collect();
         let mut variances = [[0.0; 2]; STEPS.len()];
         for (n, step) in STEPS.into_iter().enumerate() {
@@ -89,16 +89,16 @@ impl Extrapolation {
     /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one,
     /// and between them; constant beyond the last.
     fn variance(&self, kind: usize, distance: f64) -> f64 {
-        let (mut from, mut least) = (0.0, 0.0);
+        let (mut from, mut below) = (0.0, 0.0);
         for (step, variances) in STEPS.into_iter().zip(&self.variances) {
             let to = PITCH * (SPACING * step) as f64;
             if distance < to {
                 let share = (distance * distance - from * from) / (to * to - from * from);
-                return least + share * (variances[kind] - least);
+                return below + share * (variances[kind] - below);
             }
-            (from, least) = (to, variances[kind]);
+            (from, below) = (to, variances[kind]);
         }
-        least
+        below
     }
 }
 

@@ -19,43 +19,50 @@
 //! and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge
 //! has been continued with slopes as noisy as those of the data's windows.
 
-use super::super::data::{SEEN, UU, UV, VV};
-use super::super::grid::Planes;
-use super::super::refine::{Evidence, SPACING, TERMS};
-use super::led::{self, Directions};
-use super::seen::{Edge, Seen};
+use super::data_support::{DataSupport, Edge};
+use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::refine::{SPACING, TERMS, WindowStatistics};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 
 /// Bounds of the excess: beyond them the flow tells nothing about noise.
-const EXCESS: [f64; 2] = [0.5, 50.0];
+const EXCESS_BOUNDS: [f64; 2] = [0.5, 50.0];
 /// Of white noise with variance 1, rows 1 to 3 with gradients weighing 4 have the information 52.25 times the
 /// variance of the mean frame and the residual energy 8.25 times that of the rate: 1/2 and 2 for pairs, 3/8
 /// and 1/2 for triples. A third of that is hidden where motion was fitted to nothing but noise.
-const PAIR_GRADIENT: f64 = 52.25 / 8.25 * 0.25 * HIDDEN;
-const TRIPLE_GRADIENT: f64 = 52.25 / 8.25 * 0.75 * HIDDEN;
-const HIDDEN: f64 = 1.5;
+const PAIR_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.25 * FITTED_NOISE_FACTOR;
+const TRIPLE_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.75 * FITTED_NOISE_FACTOR;
+const FITTED_NOISE_FACTOR: f64 = 1.5;
 /// Width of an unseen strip, px, that doubles the variance at its edge of the frame: of means and of slopes.
-const STRIP: [f64; 2] = [3.5, 4.0];
+const STRIP_UNIT: [f64; 2] = [3.5, 4.0];
 /// Wider strips are as uncertain as this one, px; what they are continued by tells the rest.
-const MOST_STRIP: f64 = 16.0;
+const MAX_STRIP: f64 = 16.0;
 /// Windows at whose edge nothing more is felt.
-const FAR: f64 = 2.5;
+const MAX_EDGE_DISTANCE: f64 = 2.5;
 /// Share of the information that is believed in any case.
-const LEAST_LEFT: f64 = 1e-3;
+const MIN_INFORMATION_SHARE: f64 = 1e-3;
 /// Least weight of wider windows at a place that counts.
-const COUNTS: f64 = 0.1;
+const MIN_WIDE_WEIGHT: f64 = 0.1;
 /// Texture is looked for within so many sites of a place.
-const NEAR: usize = 2;
+const TEXTURE_REACH: usize = 2;
 /// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2
 /// px.
-const TEXTURED: f64 = 10.0;
+const MAX_TEXTURED_DENSITY: f64 = 10.0;
 
 /// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are
 /// stronger, but pull where the neighbours are led as well.
-const LEADING: f64 = 0.5;
+const MIN_CONSTRAINING_INFORMATION: f64 = 0.5;
 /// The same, where motion in the other direction is not led: as strong as the bonds.
-const BOUND: f64 = 20.0;
+const MIN_INFORMATION_OF_ONE_DIRECTION: f64 = 20.0;
+
+/// The matrix `xx, xy, yy` that leaves of motion what data do not lead: zero where they lead all of it, the
+/// unit matrix where they lead nothing, and else the projection onto the direction without texture.
+pub(super) type UnconstrainedDirections = [f32; 3];
+/// Nothing is led.
+pub(super) const ALL: UnconstrainedDirections = [1.0, 0.0, 1.0];
+/// Everything is.
+pub(super) const NONE: UnconstrainedDirections = [0.0; 3];
 
 /// The residual energy that noise leaves, grey^2.
 #[derive(Debug, Clone, Copy)]
@@ -85,51 +92,56 @@ fn of_white_noise(power: i32) -> f64 {
 
 /// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the
 /// flow and into the derivatives along x and y.
-pub(super) struct Left {
+pub(super) struct RemainingNoise {
     pub density: [f64; 3],
     pub flow: f64,
     pub slopes: [f64; 2],
 }
 
 /// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
-const UNSEEN: f64 = 0.5;
+const VANISHED_NOISE_SHARE: f64 = 0.5;
 
 /// What an edge of the frame adds to the noise that a window leaves: the factor of means and of slopes along
 /// the edge, and that of slopes across it.
 fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
     let t = edge.distance / sigma;
-    if t > FAR {
+    if t > MAX_EDGE_DISTANCE {
         return [1.0; 2];
     }
-    let [means, slopes] = STRIP.map(|unit| 1.0 + (edge.strip.min(MOST_STRIP) / unit).powi(2));
+    let [means, slopes] = STRIP_UNIT.map(|unit| 1.0 + (edge.strip.min(MAX_STRIP) / unit).powi(2));
     [1.0 + 14.0 * means * (-2.1 * t - 3.6 * t * t).exp(), 1.0 + 22.7 * slopes * (-(t / 0.74).powi(2)).exp()]
 }
 
 /// The noise of one estimate.
 pub(super) struct Noise<'a, T> {
-    evidence: &'a Evidence<T>,
+    statistics: &'a WindowStatistics<T>,
     energy: Energy,
     excess: f64,
     /// Information, in any direction, that white noise seems to have, over the residual energy it leaves.
-    gradient: f64,
-    seen: &'a Seen,
+    noise_information: f64,
+    support: &'a DataSupport,
 }
 
 impl<'a, T: SimdReal> Noise<'a, T> {
     /// For the estimate's last data term.
-    pub fn new(evidence: &'a Evidence<T>, (data, seen): (&Planes<T>, &'a Seen), energy: Energy, is_pair: bool) -> Self {
+    pub fn new(
+        statistics: &'a WindowStatistics<T>,
+        (data, support): (&Planes<T>, &'a DataSupport),
+        energy: Energy,
+        is_pair: bool,
+    ) -> Self {
         Self {
-            evidence,
+            statistics,
             energy,
-            excess: excess(evidence, data),
-            gradient: if is_pair { PAIR_GRADIENT } else { TRIPLE_GRADIENT },
-            seen,
+            excess: excess(statistics, data),
+            noise_information: if is_pair { PAIR_NOISE_INFORMATION } else { TRIPLE_NOISE_INFORMATION },
+            support,
         }
     }
 
     /// With an excess that is no less than that of the `other`, from the same frames: where nearly nothing is
     /// accepted, little is seen of it.
-    pub fn no_quieter_than(self, other: &Self) -> Self {
+    pub fn at_least_as_noisy_as(self, other: &Self) -> Self {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
@@ -137,7 +149,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     fn energy(&self, x: usize, y: usize) -> f64 {
         match self.energy {
             Energy::Known(energy) => energy,
-            Energy::AtLeast(least) => self.evidence.energy(x, y).max(least),
+            Energy::AtLeast(floor) => self.statistics.energy(x, y).max(floor),
         }
     }
 
@@ -146,7 +158,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
         let around = |place: usize, len: usize| {
             let middle = (SPACING * place).min(len - 1);
-            middle.saturating_sub(NEAR)..(middle + NEAR + 1).min(len)
+            middle.saturating_sub(TEXTURE_REACH)..(middle + TEXTURE_REACH + 1).min(len)
         };
         let (columns, rows) = (around(x, data.width), around(y, data.height));
         let count = (columns.len() * rows.len()) as f64;
@@ -155,22 +167,22 @@ impl<'a, T: SimdReal> Noise<'a, T> {
             rows.clone().map(row).sum::<f64>() / count
         };
         let energy = self.energy(x, y);
-        let [a, b, c] = inverse_without_noise([UU, UV, VV].map(mean), self.gradient * energy);
+        let [a, b, c] = inverse_without_noise([UU, UV, VV].map(mean), self.noise_information * energy);
         let best = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
-        self.excess * energy * best <= TEXTURED
+        self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
 
     /// In which directions the data of sites near a place, whose mean information this is, do not lead their
     /// motion, so that the first visits do not correct it.
-    pub fn not_led(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> Directions {
+    pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
         let radius = half.hypot(b);
-        let beyond = |share: f64| (self.gradient + share) * self.energy(x, y);
-        if middle - radius >= beyond(LEADING) {
-            return led::NONE;
+        let beyond = |share: f64| (self.noise_information + share) * self.energy(x, y);
+        if middle - radius >= beyond(MIN_CONSTRAINING_INFORMATION) {
+            return NONE;
         }
-        if middle + radius < beyond(BOUND) || radius <= 0.0 {
-            return led::ALL;
+        if middle + radius < beyond(MIN_INFORMATION_OF_ONE_DIRECTION) || radius <= 0.0 {
+            return ALL;
         }
         // The direction with the least information.
         let (cosine, sine) = (half / radius, b / radius);
@@ -178,25 +190,28 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     }
 
     /// What is left at a place.
-    pub fn at(&self, x: usize, y: usize) -> Left {
+    pub fn at(&self, x: usize, y: usize) -> RemainingNoise {
         let energy = self.energy(x, y);
-        let inverse = inverse_without_noise(informed(self.evidence.information(x, y)), self.gradient * energy);
+        let inverse = inverse_without_noise(
+            positive_definite(self.statistics.information(x, y)),
+            self.noise_information * energy,
+        );
         let scale = self.excess * energy;
         let (flow_share, slope_share) = (of_white_noise(1), of_white_noise(2));
-        let widest = self.evidence.sigmas.len() - 1;
+        let widest = self.statistics.sigmas.len() - 1;
         let windows = 0..=widest;
-        let weights: Vec<[f64; 2]> = windows.map(|l| self.evidence.weights(l, x, y)).collect();
-        let nothing = [0, 1].map(|k| UNSEEN * (1.0 - weights.iter().map(|w| w[k]).sum::<f64>()).max(0.0));
-        let mut left = Left { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
-        for (l, sigma) in self.evidence.sigmas.iter().enumerate() {
+        let weights: Vec<[f64; 2]> = windows.map(|l| self.statistics.weights(l, x, y)).collect();
+        let nothing = [0, 1].map(|k| VANISHED_NOISE_SHARE * (1.0 - weights.iter().map(|w| w[k]).sum::<f64>()).max(0.0));
+        let mut remaining = RemainingNoise { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
+        for (l, sigma) in self.statistics.sigmas.iter().enumerate() {
             let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
             let (flow, slope) = (flow_share / (4.0 * PI * sigma.powi(2)), slope_share / (8.0 * PI * sigma.powi(4)));
-            let [[mean_x, across_x], [mean_y, across_y]] = self.seen.edges(x, y).map(|edge| at_edge(&edge, *sigma));
-            left.flow += weight[0] * flow * mean_x * mean_y;
-            left.slopes[0] += weight[1] * slope * across_x * mean_y;
-            left.slopes[1] += weight[1] * slope * mean_x * across_y;
+            let [[mean_x, across_x], [mean_y, across_y]] = self.support.edges(x, y).map(|edge| at_edge(&edge, *sigma));
+            remaining.flow += weight[0] * flow * mean_x * mean_y;
+            remaining.slopes[0] += weight[1] * slope * across_x * mean_y;
+            remaining.slopes[1] += weight[1] * slope * mean_x * across_y;
         }
-        left
+        remaining
     }
 }
 
@@ -206,38 +221,38 @@ impl<'a, T: SimdReal> Noise<'a, T> {
 fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
     let radius = half.hypot(b);
-    let inverse = |value: f64| 1.0 / (value - noise).max(LEAST_LEFT * value.max(f64::MIN_POSITIVE));
-    let (strong, weak) = (inverse(middle + radius), inverse((middle - radius).max(LEAST_LEFT * middle)));
+    let inverse = |value: f64| 1.0 / (value - noise).max(MIN_INFORMATION_SHARE * value.max(f64::MIN_POSITIVE));
+    let (strong, weak) = (inverse(middle + radius), inverse((middle - radius).max(MIN_INFORMATION_SHARE * middle)));
     let (mean, spread) = (0.5 * (strong + weak), 0.5 * (strong - weak));
     let (cosine, sine) = if radius > 0.0 { (half / radius, b / radius) } else { (1.0, 0.0) };
     [mean + spread * cosine, spread * sine, mean - spread * cosine]
 }
 
 /// Information that is positive definite.
-fn informed([a, b, c]: [f64; 3]) -> [f64; 3] {
-    let least = 1e-6 + 1e-4 * (a + c);
-    [a + least, b, c + least]
+fn positive_definite([a, b, c]: [f64; 3]) -> [f64; 3] {
+    let floor = 1e-6 + 1e-4 * (a + c);
+    [a + floor, b, c + floor]
 }
 
 /// Geometric mean over the places with data: the density that the accepted changes show over that of the
 /// residuals.
-fn excess<T: SimdReal>(evidence: &Evidence<T>, data: &Planes<T>) -> f64 {
-    let (width, height) = evidence.size();
+fn excess<T: SimdReal>(statistics: &WindowStatistics<T>, data: &Planes<T>) -> f64 {
+    let (width, height) = statistics.size();
     let (mut sum, mut count) = (0.0, 0.0);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let (mut weights, mut changes) = (0.0, 0.0);
-        for l in 1..evidence.sigmas.len() {
-            let [weight, _] = evidence.weights(l, x, y);
+        for l in 1..statistics.sigmas.len() {
+            let [weight, _] = statistics.weights(l, x, y);
             weights += weight;
-            changes += weight * evidence.change(l - 1, x, y);
+            changes += weight * statistics.change(l - 1, x, y);
         }
-        let [a, b, c] = informed(evidence.information(x, y));
-        let density = evidence.energy(x, y) * (a + c) / (a * c - b * b);
+        let [a, b, c] = positive_definite(statistics.information(x, y));
+        let density = statistics.energy(x, y) * (a + c) / (a * c - b * b);
         let valid = data.at(SEEN, (SPACING * x).min(data.width - 1), (SPACING * y).min(data.height - 1)).to_f64();
-        if valid > 0.5 && weights > COUNTS && density > 0.0 && changes > 0.0 {
+        if valid > 0.5 && weights > MIN_WIDE_WEIGHT && density > 0.0 && changes > 0.0 {
             sum += (changes / (weights * density)).ln();
             count += 1.0;
         }
     }
-    if count > 0.0 { (sum / count).exp().clamp(EXCESS[0], EXCESS[1]) } else { 1.0 }
+    if count > 0.0 { (sum / count).exp().clamp(EXCESS_BOUNDS[0], EXCESS_BOUNDS[1]) } else { 1.0 }
 }

@@ -1,24 +1,24 @@
 //! Where the frames do not agree with the motion that was found.
 
-use super::super::data::{DataOptions, ENERGY, UU, VV};
-use super::super::grid::Planes;
-use super::super::run::Estimate;
+use crate::flow::coarse_to_fine::data_term::{DataOptions, ENERGY, UU, VV};
+use crate::flow::coarse_to_fine::estimate::Estimate;
+use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::SimdReal;
 use crate::types::Mask;
 use rayon::prelude::*;
 
 /// SamplingGrid that the usual energy is taken from, about.
-const MOST_SAMPLES: usize = 20_000;
+const MAX_SAMPLES: usize = 20_000;
 /// Rows of a task, at least.
-const ROWS: usize = 16;
+const ROWS_PER_TASK: usize = 16;
 
 /// Residual energy, over that of the usual textured site, from which on frames contradict the motion.
-const CONTRADICTION: f64 = 10.0;
+const MAX_ENERGY_RATIO: f64 = 10.0;
 /// Residual energy over information, px^2: where texture is strong, so are the errors of its interpolation,
 /// and a residual that a shift of this square explains is none.
-const EXPLAINED: f64 = 0.01;
+const MAX_EXPLAINED_SHIFT_SQUARE: f64 = 0.01;
 /// Share of the brightness' standard deviation that is never a residual.
-const LEAST: f64 = 4e-3;
+const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 
 /// Residual energy over information, px^2, beyond which frames have nothing to do with each other, however
 /// usual that is; and the share of the brightness' standard deviation that the residual then has at least, so
@@ -35,18 +35,19 @@ pub(super) struct Consistency {
 
 impl Consistency {
     pub fn of<T: SimdReal>(estimate: &Estimate<T>) -> Self {
-        let (data, contrast) = (&estimate.data, estimate.range.contrast);
-        let usual = usual(data).max((LEAST * contrast).powi(2));
+        let (data, contrast) = (&estimate.data, estimate.brightness.contrast);
+        let typical_energy = typical_energy(data).max((MIN_RESIDUAL_SHARE * contrast).powi(2));
         let rows = 1.0 + 2.0 * DataOptions::default().gradient.powi(2);
         let least = rows * (UNRELATED.1 * contrast).powi(2);
         let is_contradicted = |[information, energy]: [f64; 2]| {
-            let stands_out = energy > CONTRADICTION * usual && energy > EXPLAINED * information;
+            let stands_out =
+                energy > MAX_ENERGY_RATIO * typical_energy && energy > MAX_EXPLAINED_SHIFT_SQUARE * information;
             stands_out || (energy > UNRELATED.0 * information && energy > least)
         };
         let mut contradicted = Mask::filled(data.width, data.height, false);
-        let rows = contradicted.data_mut().par_chunks_mut(data.width.max(1)).enumerate().with_min_len(ROWS);
+        let rows = contradicted.data_mut().par_chunks_mut(data.width.max(1)).enumerate().with_min_len(ROWS_PER_TASK);
         let rows = rows.map(|(y, row)| {
-            row.iter_mut().zip(sites(data, y)).for_each(|(out, site)| *out = is_contradicted(site));
+            row.iter_mut().zip(row_energies(data, y)).for_each(|(out, site)| *out = is_contradicted(site));
             row.contains(&true)
         });
         let rows = rows.collect();
@@ -65,16 +66,16 @@ impl Consistency {
 }
 
 /// Information, grey^2 px^-2, and residual energy, grey^2, of the sites of a row.
-fn sites<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item = [f64; 2]> {
+fn row_energies<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item = [f64; 2]> {
     let [uu, vv, energy] = [UU, VV, ENERGY].map(|k| data.line(k, y));
     uu.iter().zip(vv).zip(energy).map(|((uu, vv), energy)| [uu.to_f64() + vv.to_f64(), energy.to_f64()])
 }
 
 /// Median of the energies of that half of the sites which has most information: untextured ones show no
 /// residual whatever the motion is.
-fn usual<T: SimdReal>(data: &Planes<T>) -> f64 {
-    let every = (data.width * data.height / MOST_SAMPLES).max(1);
-    let mut known: Vec<_> = (0..data.height).flat_map(|y| sites(data, y)).step_by(every).collect();
+fn typical_energy<T: SimdReal>(data: &Planes<T>) -> f64 {
+    let stride = (data.width * data.height / MAX_SAMPLES).max(1);
+    let mut known: Vec<_> = (0..data.height).flat_map(|y| row_energies(data, y)).step_by(stride).collect();
     if known.is_empty() {
         return 0.0;
     }

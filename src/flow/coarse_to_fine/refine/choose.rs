@@ -3,25 +3,25 @@
 //! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider
 //! windows as long as the estimate changes by no more than noise explains.
 
-use super::Options;
+use super::RefineOptions;
 use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
-use super::region::Layout;
-use crate::flow::coarse_to_fine::grid::{LEFT, Planes};
-use crate::flow::coarse_to_fine::memory::Space;
+use super::regional_means::Layout;
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 
 /// Weights below this count as none, so that whole rows can pass a window by.
-const NONE: f64 = 1e-2;
+const MIN_WEIGHT: f64 = 1e-2;
 /// Least noise density, px^4: below what frames of any kind show.
-const QUIET: f64 = 1e-9;
+const MIN_NOISE_DENSITY: f64 = 1e-9;
 /// The step of the ladder that tells whether the flow is restless: wider than what the coupling smooths,
 /// narrower than what smooth flow bends in.
-const RESTLESS_STEP: usize = 2;
+const UNREST_WINDOW: usize = 2;
 /// Share of the change that counts.
-const RESTLESS_SHARE: f64 = 0.8;
+const UNREST_SHARE: f64 = 0.8;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
-const FLAT: f64 = 1e-6;
+const MIN_DETERMINANT: f64 = 1e-6;
 
 /// What windows are chosen for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl Use {
     const ALL: [Self; 3] = [Self::Flow, Self::Slopes, Self::Edges];
 
     /// Change, over what noise explains, that is accepted.
-    fn kappa(self, options: &Options) -> f64 {
+    fn kappa(self, options: &RefineOptions) -> f64 {
         match self {
             Self::Flow => options.kappa,
             Self::Slopes => options.kappa_slopes,
@@ -97,8 +97,8 @@ impl<T: SimdReal> Choice<T> {
 /// The choice at the sites of the regional `means`.
 pub(super) fn choose<T: SimdReal>(
     simd: Level,
-    space: &Space<T>,
-    options: &Options,
+    space: &PlanePool<T>,
+    options: &RefineOptions,
     ladder: &Ladder<T>,
     means: &Planes<T>,
 ) -> Choice<T> {
@@ -121,7 +121,7 @@ pub(super) fn choose<T: SimdReal>(
 /// The climb from narrow windows to wide ones.
 struct Climb<'a, T> {
     means: &'a Planes<T>,
-    options: &'a Options,
+    options: &'a RefineOptions,
     /// Standard deviations of the windows, px.
     sigmas: Vec<f64>,
     /// The grids they are computed on.
@@ -150,9 +150,9 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
             let out = &mut out[LEFT + x..];
             let density = density::<V>(means, stride);
             density.store(&mut out[order.density() * stride..]);
-            let restless = climb.restless::<V>(density, means);
+            let unrest = climb.unrest::<V>(density, means);
             for of in Use::ALL {
-                let noise = if of == Use::Slopes { density * restless } else { density };
+                let noise = if of == Use::Slopes { density * unrest } else { density };
                 climb.weights::<V>(of, noise, means, out);
             }
             for l in 0..order.windows {
@@ -173,14 +173,14 @@ impl<T: SimdReal> Climb<'_, T> {
     /// How restless the flow is, from 1 on: its change from one of the narrow windows to the next, over what
     /// white noise explains.
     #[inline(always)]
-    fn restless<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
+    fn unrest<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
         let one = V::constant(1.0);
-        if self.options.restless <= 1.0 || Layout::new(self.options).steps <= RESTLESS_STEP {
+        if self.options.max_unrest <= 1.0 || Layout::new(self.options).steps <= UNREST_WINDOW {
             return one;
         }
-        let change = power4(V::load(&means[Layout::change(RESTLESS_STEP) * self.means.stride()..]));
-        let ratio = change / (density * V::constant(self.noise[RESTLESS_STEP] / RESTLESS_SHARE));
-        ratio.max(one).min(V::constant(self.options.restless))
+        let change = power4(V::load(&means[Layout::change(UNREST_WINDOW) * self.means.stride()..]));
+        let ratio = change / (density * V::constant(self.noise[UNREST_WINDOW] / UNREST_SHARE));
+        ratio.max(one).min(V::constant(self.options.max_unrest))
     }
 
     /// The weights of one use at some sites, for noise of the given density.
@@ -200,7 +200,7 @@ impl<T: SimdReal> Climb<'_, T> {
                 let ratio = change / (density * V::constant(self.noise[l] * kappa));
                 next = accepted / (V::constant(1.0) + power4(ratio));
             }
-            let weight = (accepted - next - V::constant(NONE)).max(V::zero());
+            let weight = (accepted - next - V::constant(MIN_WEIGHT)).max(V::zero());
             accepted = next;
             sigma = weight.mul_add(V::constant(self.sigmas[l]), sigma);
             sum = sum + weight;
@@ -236,6 +236,6 @@ fn power4<V: Lanes>(value: V) -> V {
 fn density<V: Lanes>(means: &[V::Scalar], stride: usize) -> V {
     let (uu, uv, vv) = (V::load(means), V::load(&means[stride..]), V::load(&means[2 * stride..]));
     let energy = power4(V::load(&means[Layout::ENERGY * stride..]));
-    let determinant = uv.neg_mul_add(uv, uu * vv).max(V::zero()) + V::constant(FLAT);
-    (energy * (uu + vv) / determinant).max(V::constant(QUIET))
+    let determinant = uv.neg_mul_add(uv, uu * vv).max(V::zero()) + V::constant(MIN_DETERMINANT);
+    (energy * (uu + vv) / determinant).max(V::constant(MIN_NOISE_DENSITY))
 }

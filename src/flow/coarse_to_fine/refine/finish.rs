@@ -1,40 +1,40 @@
 //! The last step: across motion boundaries, fits from windows that keep to one side take over.
 
-use super::Options;
+use super::RefineOptions;
 use super::choose::{Choice, Use};
-use super::edges::{Edges, Lines, Site};
-use super::field::Field;
+use super::edge_fits::{Edges, Lines, Site};
+use super::extended::{Field, chunk_of};
 use super::fit::FIT;
-use super::grow::widen;
-use super::mix::any;
-use crate::flow::coarse_to_fine::grid::{CHUNK, LEFT, Planes};
-use crate::flow::coarse_to_fine::memory::Space;
+use super::plain_fits::any_positive;
+use super::upsample::widen;
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT, Planes};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
 /// Shares of the edge fits below this count as none, so that calm places can pass them by.
-const SHUT: f64 = 0.2;
+const MIN_EDGE_SHARE: f64 = 0.2;
 /// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for
 /// single precision.
-const WHOLE: f64 = 1e5;
+const MAX_MISFIT: f64 = 1e5;
 /// What the windows of the data and of the coupling, the same everywhere, smooth away: so much of the
 /// Laplacian of the flow and of its slopes, sites^2 (1 px^2 and somewhat less: at motion boundaries slopes
 /// lose more by it than they gain elsewhere).
-const SMOOTHED: [f64; 2] = [0.25, 0.2];
+const SHARPENING: [f64; 2] = [0.25, 0.2];
 /// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
 /// What the last step rests on.
-pub(super) struct Last<'a, T> {
+pub(super) struct FinishInputs<'a, T> {
     pub choice: &'a Choice<T>,
     /// The flow on the finest grid.
     pub grid: &'a Field<T>,
     /// The plain estimate on the finest grid.
     pub plain: &'a Field<T>,
-    pub options: &'a Options,
+    pub options: &'a RefineOptions,
 }
 
 /// How far edge fits count at [`CHUNK`] sites, and how far slopes are those of wider ones.
@@ -43,27 +43,27 @@ struct Gates<T> {
     steps: [T; CHUNK],
 }
 
-impl<T: SimdReal> Last<'_, T> {
+impl<T: SimdReal> FinishInputs<'_, T> {
     /// Whether edge fits count anywhere.
-    pub fn is_broken(&self) -> bool {
+    pub fn has_edges(&self) -> bool {
         // The relative misfit whose share is [`SHUT`].
-        let least = T::from_f64(self.options.gate * (SHUT / (1.0 - SHUT)).cbrt());
+        let threshold = T::from_f64(self.options.edge_misfit * (MIN_EDGE_SHARE / (1.0 - MIN_EDGE_SHARE)).cbrt());
         let misfits = |y: usize| &self.plain.line(FIT - 1, y as isize)[LEFT..LEFT + self.grid.width];
-        (0..self.grid.height).any(|y| misfits(y).iter().any(|misfit| *misfit > least))
+        (0..self.grid.height).any(|y| misfits(y).iter().any(|misfit| *misfit > threshold))
     }
 
     /// From the relative misfit of the plain fits.
     #[inline(always)]
     fn gates<V: Lanes<Scalar = T>>(&self, x: usize, y: usize) -> Gates<T> {
-        let cube = V::constant(self.options.gate.powi(3));
-        let sixth = V::constant(self.options.step_gate.powi(6));
+        let cube = V::constant(self.options.edge_misfit.powi(3));
+        let sixth = V::constant(self.options.step_misfit.powi(6));
         let misfits = &self.plain.line(FIT - 1, y as isize)[LEFT + x..];
         let mut gates = Gates { shares: [T::from_f64(0.0); CHUNK], steps: [T::from_f64(0.0); CHUNK] };
         for i in (0..CHUNK).step_by(V::LANES) {
-            let misfit = V::load(&misfits[i..]).max(V::zero()).min(V::constant(WHOLE));
+            let misfit = V::load(&misfits[i..]).max(V::zero()).min(V::constant(MAX_MISFIT));
             let third = misfit * misfit * misfit;
-            let share = ((third / (third + cube)) - V::constant(SHUT)).max(V::zero());
-            (share * V::constant(1.0 / (1.0 - SHUT))).store(&mut gates.shares[i..]);
+            let share = ((third / (third + cube)) - V::constant(MIN_EDGE_SHARE)).max(V::zero());
+            (share * V::constant(1.0 / (1.0 - MIN_EDGE_SHARE))).store(&mut gates.shares[i..]);
             (third * third / third.mul_add(third, sixth)).store(&mut gates.steps[i..]);
         }
         gates
@@ -80,14 +80,14 @@ impl<T: SimdReal> Last<'_, T> {
         let around =
             V::load(&here[at - 1..]) + V::load(&here[at + 1..]) + V::load(&above[at..]) + V::load(&below[at..]);
         let laplacian = value.mul_add(V::constant(-4.0), around);
-        let smoothed = V::constant(SMOOTHED[usize::from(k >= 2)]);
+        let smoothed = V::constant(SHARPENING[usize::from(k >= 2)]);
         ((V::constant(1.0) - share) * smoothed).neg_mul_add(laplacian, value)
     }
 }
 
 /// Edge fits of one window, added along some rows.
 struct Add<'a, T> {
-    last: &'a Last<'a, T>,
+    inputs: &'a FinishInputs<'a, T>,
     edges: &'a Edges<'a, T>,
     rows: Range<usize>,
     sums: &'a mut [T],
@@ -97,15 +97,15 @@ impl<T: SimdReal> Kernel<T> for Add<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { last, edges, rows, sums } = self;
-        let stride = last.grid.stride();
+        let Self { inputs, edges, rows, sums } = self;
+        let stride = inputs.grid.stride();
         let mut lines = Lines::new(stride);
         for (y, sums) in rows.zip(sums.chunks_exact_mut(SUMS * stride)) {
-            edges.widen::<V>(last.choice, y, &mut lines);
-            for x in (0..last.grid.width).step_by(CHUNK) {
-                let gates = last.gates::<V>(x, y);
-                if any(&gates.shares) {
-                    let own = [0, 1].map(|k| chunk_of(&last.grid.line(k, y as isize)[LEFT + x..]));
+            edges.widen::<V>(inputs.choice, y, &mut lines);
+            for x in (0..inputs.grid.width).step_by(CHUNK) {
+                let gates = inputs.gates::<V>(x, y);
+                if any_positive(&gates.shares) {
+                    let own = [0, 1].map(|k| chunk_of(&inputs.grid.line(k, y as isize)[LEFT + x..]));
                     edges.add::<V>(&Site { x, y, own, steps: &gates.steps }, &lines, sums);
                 }
             }
@@ -114,21 +114,21 @@ impl<T: SimdReal> Kernel<T> for Add<'_, T> {
 }
 
 /// The sums over edge fits, before the first of them is added.
-pub(super) fn no_sums<T: SimdReal>(space: &Space<T>, grid: &Field<T>) -> Planes<T> {
+pub(super) fn no_sums<T: SimdReal>(space: &PlanePool<T>, grid: &Field<T>) -> Planes<T> {
     let mut sums = space.planes(grid.width, grid.height, SUMS);
     sums.data_mut().fill(T::from_f64(0.0));
     sums
 }
 
 /// Adds the edge fits of one window.
-pub(super) fn add<T: SimdReal>(simd: Level, last: &Last<'_, T>, edges: &Edges<'_, T>, sums: &mut Planes<T>) {
+pub(super) fn add<T: SimdReal>(simd: Level, inputs: &FinishInputs<'_, T>, edges: &Edges<'_, T>, sums: &mut Planes<T>) {
     let len = sums.row_len();
-    for_each_band(sums.data_mut(), len, |_, rows, sums| dispatch(simd, Add { last, edges, rows, sums }));
+    for_each_band(sums.data_mut(), len, |_, rows, sums| dispatch(simd, Add { inputs, edges, rows, sums }));
 }
 
 /// Everything together.
 struct Finish<'a, T> {
-    last: &'a Last<'a, T>,
+    inputs: &'a FinishInputs<'a, T>,
     sums: Option<&'a Planes<T>>,
     base: &'a [f64; 6],
     pitch: f64,
@@ -140,27 +140,27 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { last, sums, base, pitch, rows, out } = self;
-        let (stride, order) = (last.grid.stride(), last.choice.order);
+        let Self { inputs, sums, base, pitch, rows, out } = self;
+        let (stride, order) = (inputs.grid.stride(), inputs.choice.order);
         let slope = [base[2], base[3], base[4], base[5]].map(|b| b * pitch);
         let mut lines = [0; 3].map(|_| vec![T::from_f64(0.0); 2 * stride]);
         let mut down = vec![T::from_f64(0.0); stride];
         for (y, out) in rows.zip(out.chunks_exact_mut(RESULT * stride)) {
             let planes = [order.density(), order.sigma(Use::Flow), order.sigma(Use::Edges)];
             for (plane, line) in planes.into_iter().zip(&mut lines) {
-                widen::<V>(last.choice, plane, 0, y, &mut down, line);
+                widen::<V>(inputs.choice, plane, 0, y, &mut down, line);
             }
             let sums = sums.map(|sums| sums.row(y));
-            for x in (0..last.grid.width).step_by(CHUNK) {
+            for x in (0..inputs.grid.width).step_by(CHUNK) {
                 let mut shares = [T::from_f64(0.0); CHUNK];
                 if sums.is_some() {
-                    shares = last.gates::<V>(x, y).shares;
+                    shares = inputs.gates::<V>(x, y).shares;
                 }
                 for i in (0..CHUNK).step_by(V::LANES) {
                     let at = LEFT + x + i;
                     let share = V::load(&shares[i..]);
                     for (k, base) in base.iter().enumerate() {
-                        let mut value = last.sharpened(k, (at, y), share);
+                        let mut value = inputs.sharpened(k, (at, y), share);
                         if let Some(sums) = sums {
                             value = (V::load(&sums[k * stride + at..]) - value).mul_add(share, value);
                         }
@@ -180,11 +180,6 @@ impl<T: SimdReal> Kernel<T> for Finish<'_, T> {
     }
 }
 
-#[inline(always)]
-pub(super) fn chunk_of<T>(values: &[T]) -> &[T; CHUNK] {
-    values.first_chunk().expect("rows end with a rim")
-}
-
 /// 0, 1, 2, ...
 #[inline(always)]
 fn ramp<T: SimdReal>() -> [T; CHUNK] {
@@ -195,15 +190,15 @@ fn ramp<T: SimdReal>() -> [T; CHUNK] {
 /// then the slopes, about site (0, 0)) is added; sites are `pitch` px apart.
 pub(super) fn finish<T: SimdReal>(
     simd: Level,
-    space: &Space<T>,
-    last: &Last<'_, T>,
+    space: &PlanePool<T>,
+    inputs: &FinishInputs<'_, T>,
     sums: Option<&Planes<T>>,
     (base, pitch): (&[f64; 6], f64),
 ) -> Planes<T> {
-    let mut out = space.planes(last.grid.width, last.grid.height, RESULT);
+    let mut out = space.planes(inputs.grid.width, inputs.grid.height, RESULT);
     let len = out.row_len();
     for_each_band(out.data_mut(), len, |_, rows, out| {
-        dispatch(simd, Finish { last, sums, base, pitch, rows, out });
+        dispatch(simd, Finish { inputs, sums, base, pitch, rows, out });
     });
     out
 }

@@ -1,9 +1,9 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
-use super::field::{Beyond, Field, RIM};
-use super::ladder::{AGAIN, Scale, TERMS, Taps};
-use crate::flow::coarse_to_fine::grid::LEFT;
-use crate::flow::coarse_to_fine::memory::Space;
+use super::extended::{Continuation, Field, RIM};
+use super::ladder::{EXTRA_PASSES, Scale, TERMS, Taps};
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::LEFT;
 use crate::flow::windowed::window::filter;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
@@ -15,7 +15,7 @@ pub(super) const FLOW: usize = 3;
 /// Planes of a fit: u, v, u_x, v_x, u_y, v_y and the misfit's variance in the window, px^2.
 pub(super) const FIT: usize = 7;
 /// Least misfit that is told apart from none, px^2.
-pub(super) const LEAST: f64 = 1e-6;
+pub(super) const MIN_MISFIT: f64 = 1e-6;
 
 /// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds
 /// four lines.
@@ -72,19 +72,19 @@ impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
                 }
                 let means = u.mul_add(u, v * v);
                 let misfit = slopes.neg_mul_add(variance, V::load(&square[x..]) - means);
-                misfit.max(V::constant(LEAST)).store(&mut square[x..]);
+                misfit.max(V::constant(MIN_MISFIT)).store(&mut square[x..]);
             }
         }
     }
 }
 
 /// Single fits of the window `scale` to `from` (planes of [`FLOW`]): planes of [`FIT`].
-pub(super) fn fits<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
+pub(super) fn fits<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
     let mut out = Field::make(space, from.width, from.height, FIT);
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Fits { from, scale, rows, out }));
-    out.extend(0..2, Beyond::Odd, RIM);
-    out.extend(2..FIT, Beyond::Even, RIM);
+    out.extend(0..2, Continuation::Odd, RIM);
+    out.extend(2..FIT, Continuation::Even, RIM);
     out
 }
 
@@ -149,7 +149,7 @@ pub(super) fn pick<T: Copy>(from: &[T], step: usize, out: &mut [T]) {
 }
 
 /// The next coarser grid: planes of [`FLOW`], ready to be fitted.
-pub(super) fn halve<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
+pub(super) fn halve<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field<T>, taps: &Taps<T>) -> Field<T> {
     let (width, height) = (from.width.div_ceil(2), from.height.div_ceil(2));
     let mut out = Field::make(space, width, height, FLOW);
     let (len, stride) = (out.row_len(), out.stride());
@@ -163,8 +163,8 @@ pub(super) fn halve<T: SimdReal>(simd: Level, space: &Space<T>, from: &Field<T>,
 /// Continues a flow beyond the frame and completes its third plane, which holds the variance that smoothing
 /// took away.
 pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
-    flow.extend(0..2, Beyond::Odd, RIM);
-    flow.extend(2..3, Beyond::Even, RIM);
+    flow.extend(0..2, Continuation::Odd, RIM);
+    flow.extend(2..3, Continuation::Even, RIM);
     let (len, stride) = (flow.row_len(), flow.stride());
     for row in flow.data_mut().chunks_exact_mut(len) {
         let (flow, square) = row.split_at_mut(2 * stride);
@@ -178,7 +178,7 @@ pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
 /// u and v, smoothed repeatedly, at every `step`-th site.
 struct Samples<'a, T> {
     fits: &'a Field<T>,
-    again: &'a [Taps<T>; AGAIN],
+    again: &'a [Taps<T>; EXTRA_PASSES],
     step: usize,
     rows: Range<usize>,
     out: &'a mut [T],
@@ -210,7 +210,7 @@ impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
 /// u and v of `1 - (1 - K)^4` at every `step`-th site.
 pub(super) fn samples<T: SimdReal>(
     simd: Level,
-    space: &Space<T>,
+    space: &PlanePool<T>,
     fits: &Field<T>,
     scale: &Scale<T>,
     step: usize,

@@ -1,7 +1,7 @@
 //! The ladder of windows: which grid each is computed on, its taps, and how noise passes from one to the
 //! next.
 
-use super::field::RIM;
+use super::extended::RIM;
 use crate::flow::windowed::window::weights;
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
@@ -11,15 +11,15 @@ pub(super) const MAX_OCTAVE: usize = 2;
 /// Steps towards a variance: enough for single precision's last bits.
 const VARIANCE_STEPS: usize = 12;
 /// The widest window of a grid, sites: beyond it, the next grid is fine enough.
-const WIDEST: f64 = 2.9;
+const MAX_GRID_SIGMA: f64 = 2.9;
 /// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a
 /// thousand times.
-const BEFORE_HALVING: f64 = 1.5;
+const HALVING_VARIANCE: f64 = 1.5;
 
 /// Factors of what is smoothed once, twice, ...: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
 pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
 /// Passes after the first.
-pub(super) const AGAIN: usize = TERMS.len() - 1;
+pub(super) const EXTRA_PASSES: usize = TERMS.len() - 1;
 
 /// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a
 /// weighted straight line.
@@ -86,7 +86,7 @@ pub(super) struct Scale<T> {
     /// What is left of the window after the smoothing that came with the grid.
     pub first: Taps<T>,
     /// Windows of one, two, ... times its variance: smoothing once, twice, ... more.
-    pub again: [Taps<T>; AGAIN],
+    pub again: [Taps<T>; EXTRA_PASSES],
     /// Variance of the whole window as it comes out, px^2.
     pub variance: f64,
 }
@@ -104,10 +104,10 @@ pub(super) struct Ladder<T> {
 impl<T: SimdReal> Ladder<T> {
     /// For windows of `sigmas` px, growing, on sites `pitch` px apart.
     pub fn new(sigmas: &[f64], pitch: f64) -> Self {
-        let halving = Taps::gaussian(BEFORE_HALVING.sqrt(), 1.0);
+        let halving = Taps::gaussian(HALVING_VARIANCE.sqrt(), 1.0);
         let scales = sigmas.iter().map(|&sigma| {
             let (mut octave, mut whole, mut smoothed, mut distance) = (0, sigma / pitch, 0.0, pitch);
-            while whole > WIDEST && octave < MAX_OCTAVE {
+            while whole > MAX_GRID_SIGMA && octave < MAX_OCTAVE {
                 smoothed = (smoothed + halving.variance) / 4.0;
                 (octave, whole, distance) = (octave + 1, whole / 2.0, 2.0 * distance);
             }

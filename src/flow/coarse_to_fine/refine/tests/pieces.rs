@@ -3,7 +3,7 @@
 use super::*;
 use crate::flow::coarse_to_fine::refine::choose::Use;
 use crate::flow::coarse_to_fine::refine::ladder::{Scale, Taps, difference_variance};
-use crate::flow::coarse_to_fine::refine::region::Layout;
+use crate::flow::coarse_to_fine::refine::regional_means::Layout;
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 26;
@@ -51,7 +51,7 @@ fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize
 
 fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
     let ladder = Ladder::new(seven().ladder, PITCH);
-    let grids = grids(Level::detect(), &Space::default(), &ladder, motion, &[0.0; 6]);
+    let grids = grids(Level::detect(), &PlanePool::default(), &ladder, motion, &[0.0; 6]);
     (ladder, grids)
 }
 
@@ -82,8 +82,8 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[..3] {
-        let fits = fit::fits(Level::detect(), &Space::default(), &grids[0], scale);
-        let samples = fit::samples(Level::detect(), &Space::default(), &fits, scale, 2);
+        let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
+        let samples = fit::samples(Level::detect(), &PlanePool::default(), &fits, scale, 2);
         for (x, y) in [(0, 0), (3, 1), (18, 12), (36, 25), (20, 24)] {
             let mut misfit = 0.0;
             for k in 0..2 {
@@ -107,7 +107,7 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
                 let want = TERMS[0] * fits.at(k, x, y) + again.sum::<f64>();
                 assert!((samples.at(k, x / 2, y / 2) - want).abs() < 1e-12);
             }
-            assert!((fits.at(6, x, y) - misfit.max(fit::LEAST)).abs() < 1e-12, "{} {x} {y}", scale.sigma);
+            assert!((fits.at(6, x, y) - misfit.max(fit::MIN_MISFIT)).abs() < 1e-12, "{} {x} {y}", scale.sigma);
         }
     }
 }
@@ -117,7 +117,7 @@ fn coarse_grids_give_nearly_the_fit_of_the_whole_window() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[3..] {
-        let fits = fit::fits(Level::detect(), &Space::default(), &grids[scale.octave], scale);
+        let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[scale.octave], scale);
         let step = 1 << scale.octave;
         for (x, y) in [(8, 8), (16, 12), (24, 16)] {
             let z = |x: isize, y: isize| motion.at(0, x as usize, y as usize);
@@ -139,7 +139,7 @@ fn grids_grow_back_without_bending_cubics() {
             coarse.data_mut()[at] = cubic(2.0 * x as f64, 2.0 * y as f64);
         }
     }
-    let fine = grow::grow(Level::detect(), &Space::default(), &coarse, 2, &Field::new(39, 28, 1));
+    let fine = upsample::grow(Level::detect(), &PlanePool::default(), &coarse, 2, &Field::new(39, 28, 1));
     for (x, y) in (0..39).flat_map(|x| (0..28).map(move |y| (x, y))) {
         assert!((fine.at(0, x, y) - cubic(x as f64, y as f64)).abs() < 1e-11, "{x} {y}");
     }
@@ -162,14 +162,14 @@ fn choices_follow_the_formulas() {
         }
         (0..7).for_each(|l| means.line_mut(layout.misfit(l), 0)[x] = 2.0 + l as f64);
     }
-    let choice = choose::choose(Level::detect(), &Space::default(), &options, &ladder, &means);
+    let choice = choose::choose(Level::detect(), &PlanePool::default(), &options, &ladder, &means);
     let order = choice.order;
     let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
     for x in 0..9 {
         assert!((choice.planes.at(order.density(), x, 0) / a - 1.0).abs() < 1e-12);
         // What the third window changes to the fourth, over what white noise would.
-        let restless = roots(2, x).powi(4) / (difference_variance(options.ladder[2], options.ladder[3]) * a);
-        let slopes = 4.0 * (0.8 * restless).clamp(1.0, 3.1);
+        let max_unrest = roots(2, x).powi(4) / (difference_variance(options.ladder[2], options.ladder[3]) * a);
+        let slopes = 4.0 * (0.8 * max_unrest).clamp(1.0, 3.1);
         for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, slopes, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
             let (mut accepted, mut weights) = (1.0, Vec::new());
             for l in 0..7 {
@@ -211,17 +211,19 @@ fn regional_levels_are_power_means() {
     let (options, level) = (seven(), Level::detect());
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let data = {
-        let mut data = evidence::<f64>(WIDTH, HEIGHT, 1.0);
+        let mut data = statistics::<f64>(WIDTH, HEIGHT, 1.0);
         (0..HEIGHT).for_each(|y| (0..WIDTH).for_each(|x| data.line_mut(ENERGY, y)[x] = 1.0 + (x * y % 7) as f64));
         data
     };
     let (ladder, grids) = finest(&motion);
-    let fits: Vec<_> = ladder.scales.iter().map(|s| fit::fits(level, &Space::default(), &grids[s.octave], s)).collect();
+    let fits: Vec<_> =
+        ladder.scales.iter().map(|s| fit::fits(level, &PlanePool::default(), &grids[s.octave], s)).collect();
     let samples = ladder.scales.iter().zip(&fits);
-    let samples =
-        samples.map(|(s, f)| fit::samples(level, &Space::default(), f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    let samples = samples
+        .map(|(s, f)| fit::samples(level, &PlanePool::default(), f, s, if s.octave == 0 { 2 } else { 1 }))
+        .collect();
     let fitted = Fitted { fits: &fits, samples };
-    let means = region::regional_means(level, &Space::default(), &options, &ladder, &fitted, &data);
+    let means = regional_means::regional_means(level, &PlanePool::default(), &options, &ladder, &fitted, &data);
     let (half_width, half_height) = (WIDTH.div_ceil(2), HEIGHT.div_ceil(2));
     let mean = |sigma: f64, x: usize, y: usize, f: &dyn Fn(usize, usize) -> f64| {
         let taps = Taps::<f64>::gaussian(sigma / 4.0, 1.0);
@@ -260,14 +262,14 @@ fn regional_levels_are_power_means() {
 #[test]
 fn edge_fits_are_the_mixture_of_nine_windows() {
     let motion = field::<f64>(WIDTH, HEIGHT, |k, x, y| if x > 30.0 { 2.0 } else { rough(k, x, y) });
-    let data = evidence::<f64>(WIDTH, HEIGHT, 1e6);
-    let options = Options { ladder: &[2.5], gate: 1e-9, ..seven() };
-    let got = refine(Level::detect(), &Space::default(), &options, &motion, &data).0;
+    let data = statistics::<f64>(WIDTH, HEIGHT, 1e6);
+    let options = RefineOptions { ladder: &[2.5], edge_misfit: 1e-9, ..seven() };
+    let got = refine(Level::detect(), &PlanePool::default(), &options, &motion, &data).0;
     let base = mean_motion(&motion);
     let ladder = Ladder::<f64>::new(options.ladder, PITCH);
-    let grids = grids(Level::detect(), &Space::default(), &ladder, &motion, &base);
+    let grids = grids(Level::detect(), &PlanePool::default(), &ladder, &motion, &base);
     let scale: &Scale<f64> = &ladder.scales[0];
-    let fits = fit::fits(Level::detect(), &Space::default(), &grids[0], scale);
+    let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
     for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
         // Of the flow, and of its slopes, which are weighed more sharply.
         let (mut sum, mut total) = ([0.0; 6], [0.0; 2]);

@@ -1,0 +1,251 @@
+//! What a triple's step to the next frame differs by from the mean of its two steps.
+//!
+//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a
+//! scene, that follows from the flow alone ([`steady`]); where things go on as they are, as objects do, it is
+//! nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left
+//! is measured like motion itself and believed as far as noise does not explain it.
+
+mod steady;
+
+use super::data_term::{MOTION, SEEN};
+use super::descent::{DescentPlan, DescentResult};
+use super::peak_locking::PeakLocking;
+use super::plane_pool::PlanePool;
+use super::planes::Planes;
+use super::pyramid::ComparedFrames;
+use super::refine::{PITCH, RefineOptions, WindowStatistics, refine};
+use super::workspace::Workspace;
+use crate::flow::coarse_to_fine::descent::comparison::Comparison;
+use crate::simd::SimdReal;
+
+/// Rounds of reweighing.
+const REWEIGHTING_ROUNDS: usize = 4;
+
+/// A flow whose change is steady to this share is steady, and one that lacks this share of it is not steady
+/// at all: the rest is what estimates smooth away.
+const STEADY_SHARE: f64 = 0.9;
+
+/// Brings the `motion` of a triple to the pixels of the middle frame; `coupled` is what it was before it was
+/// refined. It becomes the mean of the two steps (`central`) or the step to the next frame, whether or not
+/// things go on as they came. Returns what the windows of the change were chosen by.
+///
+/// Frames that are warped by equal and opposite motions meet between where things were and will be, which is
+/// where the middle frame has them only if they do not accelerate.
+pub(super) fn to_middle_frame<T: SimdReal>(
+    plan: &DescentPlan,
+    workspace: &mut Workspace<T>,
+    mut regularized: Planes<T>,
+    motion: &mut Planes<T>,
+    central: bool,
+) -> Option<WindowStatistics<T>> {
+    let (simd, finest) = (plan.simd, plan.finest);
+    workspace.release_to_system_if_large();
+    let DescentResult { motion: mut next_step_motion, data, residual_std, .. } =
+        plan.next_step(workspace, &regularized);
+    let Workspace { pyramid, pool, space, .. } = &*workspace;
+    let locking =
+        PeakLocking::measure(simd, (&pyramid.levels()[finest], ComparedFrames::Ahead), &next_step_motion, residual_std);
+    locking.correct(simd, &mut next_step_motion);
+    let mut rest = difference(space, &next_step_motion, &regularized, &data);
+    let acceleration = acceleration(space, motion, &rest);
+    if let Some(acceleration) = &acceleration {
+        for mean in [&mut *motion, &mut regularized] {
+            let next = steady::next_step(space, mean, acceleration);
+            space.keep(std::mem::replace(mean, next));
+        }
+        let left = difference(space, &next_step_motion, &regularized, &data);
+        space.keep(std::mem::replace(&mut rest, left));
+    }
+    space.keep(regularized);
+    if let Some(acceleration) = acceleration {
+        if central {
+            add(motion, &acceleration, -1.0);
+        }
+        space.keep(acceleration);
+    }
+    let mut statistics = None;
+    if !central {
+        workspace.release_to_system_if_large();
+        let (change, chosen) = refine(simd, space, &RefineOptions::for_changes(), &rest, &data);
+        add(motion, &change, 1.0);
+        for planes in [change, rest] {
+            space.keep(planes);
+        }
+        statistics = chosen;
+        // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or
+        // turns back does not go on as it came.
+        workspace.release_to_system_if_large();
+        let (own, chosen) = refine(simd, space, &RefineOptions::default(), &next_step_motion, &data);
+        chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
+        workspace.release_to_system_if_large();
+        let level = &pyramid.levels()[finest];
+        Comparison { simd, level, compared: ComparedFrames::Ahead, residual_std, pool, space }
+            .replace_where_better(motion, &own, 0.0);
+        space.keep(own);
+    }
+    for planes in [next_step_motion, data] {
+        space.keep(planes);
+    }
+    statistics
+}
+
+/// What the step `ahead` differs by from the step that is `known`.
+fn difference<T: SimdReal>(
+    space: &PlanePool<T>,
+    next_step_motion: &Planes<T>,
+    known: &Planes<T>,
+    data: &Planes<T>,
+) -> Planes<T> {
+    let mut out = space.planes(next_step_motion.width, next_step_motion.height, MOTION);
+    out.data_mut().copy_from_slice(next_step_motion.data());
+    add(&mut out, known, -1.0);
+    continue_beyond(data, &mut out);
+    out
+}
+
+/// Half the acceleration of that part of the `motion` which is steady, if the `change` from its mean step to
+/// the next shows any.
+fn acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>, change: &Planes<T>) -> Option<Planes<T>> {
+    let slow = steady::half_acceleration(space, motion);
+    let mut whole = steady::next_step(space, motion, &slow);
+    add(&mut whole, motion, -1.0);
+    let share = share(change, &whole);
+    space.keep(whole);
+    if share < 1.0 - STEADY_SHARE {
+        space.keep(slow);
+        return None;
+    }
+    let mut acceleration = steady::refine_acceleration(space, motion, slow);
+    if share < STEADY_SHARE {
+        let share = T::from_f64(share);
+        acceleration.data_mut().iter_mut().for_each(|value| *value *= share);
+    }
+    Some(acceleration)
+}
+
+/// Adds `factor` times the first planes of `more`.
+fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
+    let factor = T::from_f64(factor);
+    for (y, k) in (0..to.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
+        to.line_mut(k, y).iter_mut().zip(more.line(k, y)).for_each(|(to, more)| *to += factor * *more);
+    }
+}
+
+/// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of
+/// two estimates is one of extrapolations.
+const MIN_WINDOW_SHARE: f64 = 0.95;
+
+/// Gives the sites whose windows are not whole the flow of the nearest in their row and in their column whose
+/// are, by their nearness; in corners without such that of the nearest in the nearest row.
+fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
+    let (width, height) = (data.width, data.height);
+    let is_complete = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= MIN_WINDOW_SHARE;
+    let rows: Vec<Vec<usize>> = (0..height).map(|y| (0..width).filter(|&x| is_complete(x, y)).collect()).collect();
+    let columns: Vec<Vec<usize>> = (0..width).map(|x| (0..height).filter(|&y| is_complete(x, y)).collect()).collect();
+    let filled: Vec<usize> = (0..height).filter(|&y| !rows[y].is_empty()).collect();
+    if filled.is_empty() {
+        return;
+    }
+    let known = flow.clone();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| !is_complete(x, y)) {
+        let beside = (!rows[y].is_empty()).then(|| (nearest(&rows[y], x), y));
+        let above = (!columns[x].is_empty()).then(|| (x, nearest(&columns[x], y)));
+        let row = nearest(&filled, y);
+        let diagonal = (beside.is_none() && above.is_none()).then(|| (nearest(&rows[row], x), row));
+        let (mut sum, mut weights) = ([0.0; 2], 0.0);
+        for (i, j) in [beside, above, diagonal].into_iter().flatten() {
+            let weight = 1.0 / (x.abs_diff(i) + y.abs_diff(j)).max(1) as f64;
+            weights += weight;
+            (0..2).for_each(|k| sum[k] += weight * known.at(k, i, j).to_f64());
+        }
+        (0..2).for_each(|k| flow.line_mut(k, y)[x] = T::from_f64(sum[k] / weights));
+    }
+}
+
+/// The nearest of some numbers that ascend.
+fn nearest(numbers: &[usize], to: usize) -> usize {
+    let after = numbers.partition_point(|&n| n < to).min(numbers.len() - 1);
+    let (before, after) = (numbers[after.saturating_sub(1)], numbers[after]);
+    if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
+}
+
+/// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights
+/// that fall where the rest is larger than usual (Cauchy's).
+fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
+    let (mut share, mut typical) = (0.0, f64::INFINITY);
+    for _ in 0..REWEIGHTING_ROUNDS {
+        let (mut product, mut square, mut rests) = (0.0, 0.0, Vec::new());
+        for y in 0..change.height {
+            let [u, v] = [0, 1].map(|k| (change.line(k, y), steady.line(k, y)));
+            for x in 0..change.width {
+                let [(d, s), (e, t)] = [u, v].map(|(d, s)| (d[x].to_f64(), s[x].to_f64()));
+                let rest = (d - share * s).powi(2) + (e - share * t).powi(2);
+                let weight = 1.0 / (1.0 + rest / typical);
+                product += weight * (d * s + e * t);
+                square += weight * (s * s + t * t);
+                rests.push(rest);
+            }
+        }
+        if rests.is_empty() || square <= f64::MIN_POSITIVE {
+            return 0.0;
+        }
+        let middle = rests.len() / 2;
+        typical = rests.select_nth_unstable_by(middle, f64::total_cmp).1.max(f64::MIN_POSITIVE);
+        share = (product / square).clamp(0.0, 1.0);
+    }
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
+        let mut planes = Planes::new(20, 15, MOTION);
+        for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
+            let line = planes.line_mut(k, y);
+            line.iter_mut().enumerate().for_each(|(x, m)| *m = f(k, PITCH * x as f64, PITCH * y as f64));
+        }
+        planes
+    }
+
+    /// Rotation about (20, 15) px with `w` radians a frame.
+    pub(super) fn rotation(w: f64) -> Planes<f64> {
+        filled(|k, x, y| [-w * (y - 15.0), w * (x - 20.0), 0.0, w, -w, 0.0][k])
+    }
+
+    #[test]
+    fn what_is_not_seen_goes_on_as_what_is() {
+        let mut data = Planes::<f64>::new(20, 15, SEEN + 1);
+        (1..14).for_each(|y| data.line_mut(SEEN, y)[2..18].fill(1.0));
+        let mut flow = filled(|_, x, y| x + 100.0 * y);
+        data.line_mut(SEEN, 5)[7..10].fill(0.0);
+        continue_beyond(&data, &mut flow);
+        let at = |x: usize, y: usize| flow.at(1, x, y);
+        assert_eq!([at(0, 0), at(19, 14), at(3, 3)], [204.0, 2634.0, 606.0]);
+        // From (6, 5) and (7, 6).
+        assert_eq!(at(7, 5), 0.5 * (1012.0 + 1214.0));
+        let nothing = Planes::<f64>::new(20, 15, SEEN + 1);
+        let before = flow.clone();
+        continue_beyond(&nothing, &mut flow);
+        assert_eq!(flow.data(), before.data());
+    }
+
+    #[test]
+    fn the_share_of_steady_flow_is_found_beside_objects_with_their_own_ways() {
+        let steady = steady::half_acceleration(&PlanePool::default(), &rotation(0.03));
+        let seen = |share: f64| {
+            let mut change = steady.clone();
+            change.data_mut().iter_mut().for_each(|m| *m *= share);
+            (0..15).for_each(|y| change.line_mut(0, y)[14..].fill(0.5));
+            change
+        };
+        for want in [0.0, 0.4, 1.0] {
+            let got = share(&seen(want), &steady);
+            assert!((got - want).abs() < 0.1, "{got} {want}");
+        }
+        assert_eq!(share(&seen(-1.0), &steady), 0.0);
+        let nothing = Planes::<f64>::new(20, 15, MOTION);
+        assert_eq!(share(&nothing, &nothing), 0.0);
+    }
+}

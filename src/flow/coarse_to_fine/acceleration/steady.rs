@@ -1,0 +1,196 @@
+//! Steady flow: how things accelerate that pass through a field of velocities which stays as it is.
+
+use super::PITCH;
+use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::flow::coarse_to_fine::resample::motion_at;
+use crate::parallel::for_each_band;
+use crate::simd::SimdReal;
+
+/// Most rounds of [`settled`]; each leaves a small part of the error of the one before.
+const MAX_ROUNDS: usize = 3;
+/// Root-mean-square change of a round that was the last, px.
+const ROUND_TOLERANCE: f64 = 0.004;
+
+/// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with its derivatives by differences of
+/// neighbouring sites.
+pub(super) fn half_acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>) -> Planes<T> {
+    let (width, height) = (motion.width, motion.height);
+    let mut out = space.planes(width, height, MOTION);
+    let half = T::from_f64(0.5);
+    for y in 0..height {
+        let [u, v, u_x, v_x, u_y, v_y] = std::array::from_fn(|k| motion.line(k, y));
+        for (k, along, across) in [(0, u_x, u_y), (1, v_x, v_y)] {
+            for (x, out) in out.line_mut(k, y).iter_mut().enumerate() {
+                *out = half * (along[x] * u[x] + across[x] * v[x]);
+            }
+        }
+    }
+    derive(&mut out);
+    out
+}
+
+/// The same for flow of any speed, from that of slow flow and the `mean` of the steps.
+///
+/// With the mean step `d`, a thing comes from `x + c - d(x)` and goes to `x + c + d(x)`, its half
+/// acceleration `c` the middle of the two less `x`. One who starts at either end goes the same way, a step
+/// later or earlier, so that what the steps there differ by, taken backwards ahead and forwards behind, is
+/// twice `c`: `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`. Half of this equation's
+/// error is taken off in each round.
+pub(super) fn refine_acceleration<T: SimdReal>(
+    space: &PlanePool<T>,
+    mean: &Planes<T>,
+    mut acceleration: Planes<T>,
+) -> Planes<T> {
+    for _ in 0..MAX_ROUNDS {
+        let better = round(space, mean, &acceleration);
+        let change = distance(&better, &acceleration);
+        space.keep(std::mem::replace(&mut acceleration, better));
+        if change <= ROUND_TOLERANCE {
+            break;
+        }
+    }
+    acceleration
+}
+
+/// One round of [`settled`]. Things that were or will be outside the frame keep what they have.
+fn round<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
+    let far = [mean.width, mean.height].map(|sites| PITCH * sites as f64 - 1.0);
+    let is_inside = |p: [f64; 2]| (0..2).all(|k| (-1.0..=far[k]).contains(&p[k]));
+    let mut out = at_sites(space, mean, |x, y| {
+        let c = [0, 1].map(|k| acceleration.at(k, x, y).to_f64());
+        let middle = [PITCH * x as f64 + c[0], PITCH * y as f64 + c[1]];
+        let d = flow_at(mean, middle);
+        let ends = [1.0, -1.0].map(|way| [middle[0] + way * d[0], middle[1] + way * d[1]]);
+        if !ends.into_iter().all(is_inside) {
+            return c;
+        }
+        let [(ahead, c_ahead), (behind, c_behind)] = ends.map(|p| {
+            let c = flow_at(acceleration, p);
+            (flow_at(mean, [p[0] + c[0], p[1] + c[1]]), c)
+        });
+        std::array::from_fn(|k| 0.5 * c[k] + 0.25 * (ahead[k] - behind[k] - c_ahead[k] - c_behind[k]))
+    });
+    derive(&mut out);
+    out
+}
+
+/// The step to the next frame where the mean of both steps is `mean` and half the acceleration is
+/// `acceleration`.
+///
+/// Frames warped by `+m` and `-m` meet in the middle of where a thing was and will be: what is at `x` in the
+/// middle frame goes from `x + c - m` to `x + c + m` and is told at `x + c`. So the next step is `c(x) + m(x
+/// + c(x))`, and its Jacobian follows by the chain rule.
+pub(super) fn next_step<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
+    at_sites(space, mean, |x, y| {
+        let [u, v, u_x, v_x, u_y, v_y]: [f64; MOTION] = std::array::from_fn(|k| acceleration.at(k, x, y).to_f64());
+        let m = motion_at(mean, PITCH, PITCH * x as f64 + u, PITCH * y as f64 + v);
+        [
+            u + m[0],
+            v + m[1],
+            u_x + m[2] * (1.0 + u_x) + m[4] * v_x,
+            v_x + m[3] * (1.0 + u_x) + m[5] * v_x,
+            u_y + m[2] * u_y + m[4] * (1.0 + v_y),
+            v_y + m[3] * u_y + m[5] * (1.0 + v_y),
+        ]
+    })
+}
+
+/// The first planes of a motion, computed site by site.
+fn at_sites<T: SimdReal, const N: usize>(
+    space: &PlanePool<T>,
+    like: &Planes<T>,
+    site: impl Fn(usize, usize) -> [f64; N] + Sync,
+) -> Planes<T> {
+    let width = like.width;
+    let mut out = space.planes(width, like.height, MOTION);
+    let (len, stride) = (out.row_len().max(1), out.stride());
+    for_each_band(out.data_mut(), len, |_, rows, out| {
+        for (y, out) in rows.zip(out.chunks_exact_mut(len)) {
+            for x in 0..width {
+                let values = site(x, y);
+                values.into_iter().enumerate().for_each(|(k, value)| out[k * stride + LEFT + x] = T::from_f64(value));
+            }
+        }
+    });
+    out
+}
+
+/// The first two planes at a place, px.
+fn flow_at<T: SimdReal>(planes: &Planes<T>, [x, y]: [f64; 2]) -> [f64; 2] {
+    let [u, v, ..] = motion_at(planes, PITCH, x, y);
+    [u, v]
+}
+
+/// Root-mean-square distance of two flows, px.
+fn distance<T: SimdReal>(a: &Planes<T>, b: &Planes<T>) -> f64 {
+    let rows = (0..a.height).flat_map(|y| (0..2).map(move |k| (k, y)));
+    let square: f64 = rows
+        .map(|(k, y)| a.line(k, y).iter().zip(b.line(k, y)).map(|(&a, &b)| (a - b).to_f64().powi(2)).sum::<f64>())
+        .sum();
+    (square / (a.width * a.height).max(1) as f64).sqrt()
+}
+
+/// The slopes of the flow, by differences of neighbouring sites.
+fn derive<T: SimdReal>(flow: &mut Planes<T>) {
+    let (width, height) = (flow.width, flow.height);
+    for y in 0..height {
+        let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+        for x in 0..width {
+            let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
+            for k in 0..2 {
+                let along = slope(flow.at(k, left, y), flow.at(k, right, y), right - left);
+                let across = slope(flow.at(k, x, above), flow.at(k, x, below), below - above);
+                flow.line_mut(2 + k, y)[x] = along;
+                flow.line_mut(4 + k, y)[x] = across;
+            }
+        }
+    }
+}
+
+/// Over so many sites.
+fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
+    T::from_f64((to.to_f64() - from.to_f64()) / (PITCH * sites.max(1) as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::coarse_to_fine::acceleration::tests::{filled, rotation};
+
+    /// Largest difference of two motions, but for the sites of the rim.
+    fn difference(a: &Planes<f64>, b: &Planes<f64>) -> f64 {
+        let sites = (1..a.height - 1).flat_map(|y| (1..a.width - 1).map(move |x| (x, y)));
+        sites.flat_map(|(x, y)| (0..MOTION).map(move |k| (a.at(k, x, y) - b.at(k, x, y)).abs())).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn slow_rotation_accelerates_towards_its_centre() {
+        let w = 0.03;
+        let got = half_acceleration(&PlanePool::default(), &rotation(w));
+        let want = filled(|k, x, y| -0.5 * w * w * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
+        assert!(difference(&got, &want) < 1e-15);
+    }
+
+    #[test]
+    fn fast_rotation_goes_on_in_its_circle() {
+        // Turning by `w` a frame, things meet their former and later selves nearer to the centre by cos w,
+        // and move by sin w.
+        let (w, space) = (0.3_f64, PlanePool::default());
+        let mean = rotation(w.tan());
+        let acceleration = refine_acceleration(&space, &mean, half_acceleration(&space, &mean));
+        let want = filled(|k, x, y| (w.cos() - 1.0) * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
+        // Near the centre, where nothing leaves the frame.
+        let (x, y) = (14, 10);
+        let error = |c: &Planes<f64>| (c.at(0, x, y) - want.at(0, x, y)).hypot(c.at(1, x, y) - want.at(1, x, y));
+        let slow = half_acceleration(&space, &mean);
+        assert!(error(&slow) > 0.03 && error(&acceleration) < 0.005, "{} {}", error(&slow), error(&acceleration));
+        let next = next_step(&space, &mean, &want);
+        let turned = filled(|k, x, y| {
+            let (x, y, c, s) = (x - 20.0, y - 15.0, w.cos() - 1.0, w.sin());
+            [c * x - s * y, s * x + c * y, c, s, -s, c][k]
+        });
+        assert!(difference(&next, &turned) < 1e-12);
+    }
+}

@@ -1,0 +1,82 @@
+//! The range that brightness is brought to.
+
+use crate::simd::SimdReal;
+use crate::types::{Frame, Mask};
+
+/// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is
+/// then the same for frames of every range.
+const TARGET_STD: f64 = 40.0;
+
+/// Samples that the range is taken from, about.
+const MAX_SAMPLES: usize = 20_000;
+/// Scaled brightness beyond which a sample is no brightness but a mark for missing data.
+const MAX_SCALED_BRIGHTNESS: f64 = 1e6;
+
+/// Least deviation over what nearly all samples range over: a tenth of that of an even distribution.
+const MIN_STD_OVER_EXTENT: f64 = 0.03;
+/// Shares of the samples that are left out at either end of that range.
+const TRIMMED_FRACTION_DIVISOR: usize = 200;
+/// Deviation over mean that is rounding.
+const MIN_STD_OVER_MEAN: f64 = 1e-12;
+
+/// What all but a few of the sorted `values` range over. Marks for missing data, which are the most extreme
+/// value and many times the same, are no values.
+fn trimmed_extent(values: &[f64]) -> f64 {
+    let (low, high) = (values[0], values[values.len() - 1]);
+    let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };
+    let end = if values.len() > 1 && values[values.len() - 2] == high {
+        values.partition_point(|v| *v < high)
+    } else {
+        values.len()
+    };
+    let inner = values.get(start..end).unwrap_or_default();
+    let cut = inner.len() / TRIMMED_FRACTION_DIVISOR;
+    if inner.is_empty() { 0.0 } else { inner[inner.len() - 1 - cut] - inner[cut] }
+}
+
+/// How brightness is brought to a common range: `(brightness - mean) gain`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BrightnessScale {
+    pub mean: f64,
+    /// A power of two, so that it rounds nothing; 1 for frames without contrast.
+    pub gain: f64,
+    /// Standard deviation of the brightness afterwards.
+    pub contrast: f64,
+}
+
+impl BrightnessScale {
+    /// That of the frames' finite samples that may be used: of the middle nine tenths of them, since a single
+    /// no-data value may be as large as 1e9; but no less than a share of what nearly all of them range over,
+    /// since pictures may be dark but for a few spots.
+    pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
+        let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
+        let mut values: Vec<f64> = Vec::new();
+        for frame in frames {
+            let stride = (frames.len() * frame.data().len() / MAX_SAMPLES).max(1);
+            let places = (0..frame.data().len()).step_by(stride).filter(|&at| allowed(at));
+            values.extend(places.map(|at| frame.data()[at].to_f64()).filter(|value| value.is_finite()));
+        }
+        if values.is_empty() {
+            return Self { mean: 0.0, gain: 1.0, contrast: 0.0 };
+        }
+        values.sort_unstable_by(f64::total_cmp);
+        let cut = values.len() / 20;
+        let middle = &values[cut..values.len() - cut];
+        let mean = middle.iter().sum::<f64>() / middle.len() as f64;
+        let deviation = |values: &[f64]| {
+            (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+        };
+        let robust = deviation(middle).max(MIN_STD_OVER_EXTENT * trimmed_extent(&values));
+        // A picture with next to nothing in it has nothing else. Rounding is no contrast.
+        let deviation = Some(robust).filter(|&d| d > 0.0).unwrap_or_else(|| deviation(&values));
+        let deviation = if deviation > MIN_STD_OVER_MEAN * mean.abs() { deviation } else { 0.0 };
+        let gain = (TARGET_STD / deviation).log2().round().exp2();
+        let gain = if gain.is_finite() && gain > 0.0 { gain } else { 1.0 };
+        Self { mean, gain, contrast: gain * deviation }
+    }
+
+    /// Whether a sample can be brightness at all.
+    pub fn holds(&self, value: f64) -> bool {
+        ((value - self.mean) * self.gain).abs() < MAX_SCALED_BRIGHTNESS
+    }
+}

@@ -1,0 +1,176 @@
+//! Where data lead the motion, and in which directions they do not.
+
+use super::noise::{ALL, NONE, Noise, UnconstrainedDirections};
+use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
+use crate::simd::SimdReal;
+use rayon::prelude::*;
+use std::f64::consts::SQRT_2;
+
+/// Share of the sites from which on they tell how exact coarse levels are.
+const MIN_CONSTRAINED_SHARE: f64 = 0.02;
+/// Usable share of a window from which on a site counts as seen.
+const MIN_USABLE_SHARE: f64 = 0.1;
+/// SamplingGrid whose information is told together reach so far from one.
+const INFORMATION_REACH: usize = 1;
+/// SamplingGrid that one thread looks at, at a time.
+const SITES_PER_TASK: usize = 4096;
+
+/// Where data lead the motion.
+pub(super) struct ConstrainedDirections {
+    width: usize,
+    /// How far every site is from the next where data lead all of the motion, px, row by row; 0 where nothing
+    /// is seen at all: that is another matter. Infinite where one direction is unknown and nearly nothing
+    /// else is there.
+    distances: Vec<f64>,
+    /// The sites that tell how exact coarser levels are, row by row: seen, and led.
+    reference_sites: Vec<bool>,
+    /// Means over the sites of every place that are not led, row by row.
+    directions: Vec<[f64; 3]>,
+}
+
+impl ConstrainedDirections {
+    /// As the `noise` says of the sites' data, for so many `places` along x and y.
+    pub fn new<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>, places: (usize, usize)) -> Self {
+        let (width, height) = (data.width, data.height);
+        let around_site =
+            |at: usize, len: usize| at.saturating_sub(INFORMATION_REACH)..(at + INFORMATION_REACH + 1).min(len);
+        let place = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
+        let directions = |n: usize| {
+            let (x, y) = (n % width, n / width);
+            let (columns, rows) = (around_site(x, width), around_site(y, height));
+            let count = (columns.len() * rows.len()) as f64;
+            let mean = |k| {
+                let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
+                rows.clone().map(row).sum::<f64>() / count
+            };
+            noise.unconstrained([UU, UV, VV].map(mean), place(x, width), place(y, height))
+        };
+        let sites: Vec<UnconstrainedDirections> =
+            (0..width * height).into_par_iter().with_min_len(SITES_PER_TASK).map(directions).collect();
+        let is_usable = |n: usize| data.at(SEEN, n % width, n / width).to_f64() >= MIN_USABLE_SHARE;
+        Self::with((width, &sites), places, is_usable)
+    }
+
+    /// For sites whose directions these are. Where nearly none is led in all of them, they do not tell; what
+    /// is known then is that motion along a texture of one direction is not.
+    pub fn with(
+        (width, sites): (usize, &[UnconstrainedDirections]),
+        places: (usize, usize),
+        is_usable: impl Fn(usize) -> bool,
+    ) -> Self {
+        let constrained: Vec<bool> = sites.iter().map(|directions| *directions == NONE).collect();
+        let count = constrained.iter().filter(|constrained| **constrained).count();
+        let mut distances = if (count as f64) < MIN_CONSTRAINED_SHARE * constrained.len() as f64 || count == 0 {
+            let unknown = |directions: &UnconstrainedDirections| {
+                if [NONE, ALL].contains(directions) { 0.0 } else { f64::INFINITY }
+            };
+            sites.iter().map(unknown).collect()
+        } else {
+            distances(width, &constrained)
+        };
+        (0..distances.len()).filter(|&n| !is_usable(n)).for_each(|n| distances[n] = 0.0);
+        let reference_sites = (0..constrained.len()).map(|n| constrained[n] && is_usable(n)).collect();
+        let mut out = Self { width, distances, reference_sites, directions: Vec::new() };
+        out.directions =
+            (0..places.0 * places.1).map(|n| out.mean_directions(sites, n % places.0, n / places.0)).collect();
+        out
+    }
+
+    /// Whether a site tells how exact coarser levels are.
+    pub fn is_reference(&self, x: usize, y: usize) -> bool {
+        self.reference_sites[y * self.width + x]
+    }
+
+    /// What is not led at a place, if anything is not.
+    pub fn directions(&self, place: usize) -> [f64; 3] {
+        self.directions[place]
+    }
+
+    /// The farthest of a place's sites.
+    pub fn distance(&self, x: usize, y: usize) -> f64 {
+        self.around(x, y).map(|n| self.distances[n]).fold(0.0, f64::max)
+    }
+
+    fn mean_directions(&self, sites: &[UnconstrainedDirections], x: usize, y: usize) -> [f64; 3] {
+        let (mut sum, mut count) = ([0.0; 3], 0.0f64);
+        for directions in self.around(x, y).map(|n| sites[n]).filter(|directions| *directions != NONE) {
+            sum = std::array::from_fn(|k| sum[k] + f64::from(directions[k]));
+            count += 1.0;
+        }
+        sum.map(|sum| sum / count.max(1.0))
+    }
+
+    /// The sites of a place.
+    fn around(&self, x: usize, y: usize) -> impl Iterator<Item = usize> + use<> {
+        let (width, height) = (self.width, self.distances.len() / self.width);
+        // The last places are at the last sites.
+        let around_site = |place: usize, len: usize| {
+            let middle = (SPACING * place).min(len - 1);
+            middle.saturating_sub(SPACING / 2)..(middle + SPACING / 2 + 1).min(len)
+        };
+        let columns = around_site(x, width);
+        around_site(y, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
+    }
+}
+
+/// From every site to the next of the `led` ones, px: the shortest way along rows, columns and diagonals.
+fn distances(width: usize, constrained: &[bool]) -> Vec<f64> {
+    let mut out: Vec<f64> =
+        constrained.iter().map(|constrained| if *constrained { 0.0 } else { f64::INFINITY }).collect();
+    let sites = out.len();
+    let (straight, diagonal) = (PITCH, PITCH * SQRT_2);
+    // Once from above and once, everything turned about, from below.
+    for _ in 0..2 {
+        for n in 0..sites {
+            let x = n % width;
+            let mut shortest = out[n];
+            if x > 0 {
+                shortest = shortest.min(out[n - 1] + straight);
+            }
+            if n >= width {
+                shortest = shortest.min(out[n - width] + straight);
+                if x > 0 {
+                    shortest = shortest.min(out[n - width - 1] + diagonal);
+                }
+                if x + 1 < width {
+                    shortest = shortest.min(out[n - width + 1] + diagonal);
+                }
+            }
+            out[n] = shortest;
+        }
+        out.reverse();
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_to_the_next_led_site() {
+        let constrained: Vec<bool> = (0..12).map(|n| n == 0 || n == 11).collect();
+        let want = [0.0, 1.0, 2.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, 2.0, 1.0, 0.0];
+        let got = distances(4, &constrained);
+        assert!(got.iter().zip(want).all(|(got, want)| (got - PITCH * want).abs() < 1e-12), "{got:?}");
+    }
+
+    #[test]
+    fn directions_are_those_of_the_sites_that_are_not_led() {
+        let (across, along) = ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let side = 9;
+        let sites: Vec<UnconstrainedDirections> =
+            (0..side * side).map(|n| if n % side < 7 { NONE } else { along }).collect();
+        let constrained = ConstrainedDirections::with((side, &sites), (3, 3), |_| true);
+        assert_eq!([0, 1, 2].map(|place| constrained.directions(place)), [[0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
+        assert_eq!([0, 1, 2].map(|place| constrained.distance(place, 0)), [0.0, 0.0, 2.0 * PITCH]);
+        // Nothing is led as a whole: what is known is that one direction is not.
+        let half: Vec<UnconstrainedDirections> =
+            (0..side * side).map(|n| if n % side < 4 { across } else { ALL }).collect();
+        let constrained = ConstrainedDirections::with((side, &half), (3, 3), |_| true);
+        assert_eq!([0, 2].map(|place| constrained.distance(place, 0)), [f64::INFINITY, 0.0]);
+        assert!((0..side).all(|x| !constrained.is_reference(x, 0)));
+    }
+}

@@ -1,0 +1,216 @@
+//! What smoothing takes away from bent flow.
+//!
+//! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow
+//! bends on the scale of windows this goes the way of the error that is in it already: in turbulence the two
+//! correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a
+//! place, is the covariance; a share of that of the slopes goes any way.
+//!
+//! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing
+//! that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so the motion loses
+//! `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
+
+use super::{Entries, binomial_mean};
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, TERMS, WindowStatistics};
+use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::simd::SimdReal;
+use rayon::prelude::*;
+use std::f64::consts::SQRT_2;
+
+/// Standard deviation of the first Gaussian, px: about twice that of the windows that bent flow is given.
+const FIXED_SIGMA: f64 = 6.0;
+/// Standard deviations of the others over those of the windows.
+const CHOSEN_SIGMA_FACTOR: f64 = 1.25;
+/// The narrowest window that has one of its own, px.
+const MIN_CHOSEN_SIGMA: f64 = 3.5;
+/// Share of the slopes' squared errors that goes any way, not that of what is lost: turbulence without
+/// divergence bends without it, yet its estimate diverges.
+const ISOTROPIC_SHARE: f64 = 0.2;
+/// Places that one thread smooths at a time.
+const NODES_PER_TASK: usize = 1024;
+/// Planes of the motion.
+const MOTION: usize = 6;
+/// The motion or what it loses, at one place.
+type Loss = [f64; MOTION];
+
+/// Errors over what is lost, in the flow and in the slopes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shares {
+    /// To the first Gaussian.
+    pub fixed: [f64; 2],
+    /// To those of the windows.
+    pub chosen: [f64; 2],
+}
+
+/// The covariance at the places of the evidence.
+pub(super) fn curvature_bias<T: SimdReal>(
+    motion: &Planes<T>,
+    statistics: &WindowStatistics<T>,
+    shares: Shares,
+) -> Vec<Entries> {
+    let size = statistics.size();
+    let mut products = vec![[0.0; ENTRIES]; size.0 * size.1];
+    for (losses, shares) in [(lost(motion, size), shares.fixed), (lost_to_windows(motion, statistics), shares.chosen)] {
+        for (out, loss) in products.iter_mut().zip(losses) {
+            add_loss(out, &loss, shares);
+        }
+    }
+    binomial_mean(&mut products, size);
+    products
+}
+
+/// Adds the errors that go with a loss.
+fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
+    let energy = shares[1].powi(2) * loss[2..].iter().map(|slope| slope * slope).sum::<f64>();
+    let kept = [1.0, (1.0 - ISOTROPIC_SHARE).sqrt()];
+    let scaled: Loss = std::array::from_fn(|k| loss[k] * shares[usize::from(k >= 2)] * kept[usize::from(k >= 2)]);
+    for i in 0..MOTION {
+        for j in i..MOTION {
+            out[upper(i, j)] += scaled[i] * scaled[j];
+        }
+    }
+    (2..MOTION).for_each(|k| out[upper(k, k)] += ISOTROPIC_SHARE * energy / 4.0);
+}
+
+/// The motion at a place.
+pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize)) -> Loss {
+    let (x, y) = ((SPACING * x).min(motion.width - 1), (SPACING * y).min(motion.height - 1));
+    std::array::from_fn(|k| motion.at(k, x, y).to_f64())
+}
+
+/// `(1 - G)^2` of the motion at the places, G being [`SIGMA`] px wide.
+fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
+    // G and G G.
+    let kernels = [FIXED_SIGMA / PITCH, FIXED_SIGMA / PITCH * SQRT_2];
+    let along = kernels.map(|s| gaussians(s, (width, SPACING), motion.width));
+    let across = kernels.map(|s| gaussians(s, (height, SPACING), motion.height));
+    let rows: Vec<Vec<Loss>> = (0..height)
+        .into_par_iter()
+        .map(|y| {
+            let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
+            let mut down = vec![T::from_f64(0.0); motion.width];
+            for k in 0..MOTION {
+                for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
+                    down.fill(T::from_f64(0.0));
+                    for &(site, weight) in &across[y] {
+                        let weight = T::from_f64(weight);
+                        down.iter_mut().zip(motion.line(k, site)).for_each(|(d, m)| *d += weight * *m);
+                    }
+                    for (lost, taps) in lost.iter_mut().zip(along) {
+                        let sum: f64 = taps.iter().map(|&(site, weight)| weight * down[site].to_f64()).sum();
+                        lost[k] += factor * sum;
+                    }
+                }
+            }
+            lost
+        })
+        .collect();
+    rows.concat()
+}
+
+/// The sum over the windows of weight times `(1 - G)^4` of the motion, G being [`WIDER`] than the window. The
+/// motion there is smooth enough to be smoothed from place to place.
+fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistics<T>) -> Vec<Loss> {
+    let (width, height) = statistics.size();
+    let places: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
+    let whole: Vec<Loss> = places.iter().map(|&at| motion_at(motion, at)).collect();
+    let mut lost = vec![[0.0; MOTION]; whole.len()];
+    for (l, sigma) in statistics.sigmas.iter().enumerate().filter(|(_, s)| **s >= MIN_CHOSEN_SIGMA) {
+        let weights: Vec<[f64; 2]> = places.iter().map(|&(x, y)| statistics.weights(l, x, y)).collect();
+        if weights.iter().flatten().all(|w| *w < 0.01) {
+            continue;
+        }
+        let mut left = whole.clone();
+        for _ in TERMS {
+            let smooth = smoothed(&left, (width, height), CHOSEN_SIGMA_FACTOR * sigma / (PITCH * SPACING as f64));
+            for (left, smooth) in left.iter_mut().zip(smooth) {
+                (0..MOTION).for_each(|k| left[k] -= smooth[k]);
+            }
+        }
+        for ((lost, weight), left) in lost.iter_mut().zip(weights).zip(left) {
+            (0..MOTION).for_each(|k| lost[k] += weight[usize::from(k >= 2)] * left[k]);
+        }
+    }
+    lost
+}
+
+/// Gaussian means of `sigma` places.
+fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec<Loss> {
+    let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
+    let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {
+        let mut sum = [0.0; MOTION];
+        for &(n, weight) in taps {
+            let value = &from[first + step * n];
+            (0..MOTION).for_each(|k| sum[k] += weight * value[k]);
+        }
+        sum
+    };
+    let nodes_in_parallel = || (0..values.len()).into_par_iter().with_min_len(NODES_PER_TASK);
+    let rows: Vec<Loss> = nodes_in_parallel().map(|n| mean(values, &along[n % width], n - n % width, 1)).collect();
+    nodes_in_parallel().map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
+}
+
+/// SamplingGrid and their weights.
+type Taps = Vec<(usize, f64)>;
+
+/// A Gaussian of `sigma` sites about each of some places, so many and so far apart; beyond the edges values
+/// go on by reflection at the point on the edge, so that affine motion is not bent.
+fn gaussians(sigma: f64, (places, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
+    let radius = (3.0 * sigma).ceil() as isize;
+    let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+    let total: f64 = raw.iter().sum();
+    let last = sites as isize - 1;
+    (0..places)
+        .map(|n| {
+            let centre = ((spacing * n) as isize).min(last);
+            let mut weights = vec![0.0; sites];
+            for (k, w) in (-radius..=radius).zip(&raw) {
+                let (at, w) = (centre + k, w / total);
+                let edge = at.clamp(0, last);
+                if at == edge {
+                    weights[at as usize] += w;
+                } else {
+                    weights[edge as usize] += 2.0 * w;
+                    weights[(2 * edge - at).clamp(0, last) as usize] -= w;
+                }
+            }
+            weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn affine_motion_loses_nothing_and_waves_lose_what_the_formula_says() {
+        let (width, height) = (150, 120);
+        let k = 0.3;
+        let mut motion = Planes::<f64>::new(width, height, MOTION);
+        for y in 0..height {
+            for x in 0..width {
+                let (px, py) = (PITCH * x as f64, PITCH * y as f64);
+                motion.line_mut(0, y)[x] = 3.0 + 0.02 * px - 0.01 * py;
+                motion.line_mut(1, y)[x] = (k * px).cos();
+            }
+        }
+        let size = (width.div_ceil(SPACING), height.div_ceil(SPACING));
+        let lost = lost(&motion, size);
+        assert!(lost.iter().all(|l| l[0].abs() < 1e-12));
+        let g = (-0.5 * (k * FIXED_SIGMA).powi(2)).exp();
+        for x in 8..size.0 - 8 {
+            let want = (1.0 - g).powi(2) * (k * PITCH * (SPACING * x) as f64).cos();
+            assert!((lost[15 * size.0 + x][1] - want).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn means_from_place_to_place_leave_affine_values_alone() {
+        let size = (20, 14);
+        let value = |n: usize| [1.0 + 0.1 * (n % 20) as f64 - 0.2 * (n / 20) as f64; MOTION];
+        let values: Vec<Loss> = (0..280).map(value).collect();
+        let got = smoothed(&values, size, 2.0);
+        assert!(got.iter().zip(&values).all(|(a, b)| (a[3] - b[3]).abs() < 1e-12));
+    }
+}

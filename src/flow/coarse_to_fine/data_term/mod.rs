@@ -1,0 +1,186 @@
+//! The data term of one linearisation on one level: the views warped by the present motion, rows 1-3 of the
+//! equations of affine flow at every pixel, and their windowed normal equations at every site.
+//!
+//! A site (X, Y) is the pixel (2X, 2Y). With `A` the mean and `R` the rate of the warped views and `m` the
+//! motion they were warped by, a pixel says
+//!
+//! ```text
+//! A_x u + A_y v = -R + A_x u_m + A_y v_m
+//! g (A_xx u + A_xy v) = g (-R_x + A_xx u_m + A_xy v_m)
+//! g (A_xy u + A_yy v) = g (-R_y + A_xy u_m + A_yy v_m)
+//! ```
+//!
+//! of the whole motion `u = u_0 + u_x x + u_y y` at its offset `(x, y)` from a site. These are rows 1 to 3 of
+//! `J(i)` (21) of WO2010/098160, transported to the site; how `A_x` changes the gradient along a deforming
+//! motion is already in the warped views. Warping is that of B. D. Lucas and T. Kanade, "An iterative image
+//! registration technique with an application to stereo vision", 1981, towards the middle of the views. The
+//! right side holds the whole motion and not only its increment, so that the smoothing by the window is
+//! applied once and not undone by the iterations.
+
+mod band;
+mod dense;
+mod moments;
+mod products;
+mod scratch;
+#[cfg(test)]
+mod tests;
+mod warp;
+
+#[cfg(test)]
+pub(super) use moments::SUMMARY;
+pub(super) use moments::{COUNT, ENERGY, ERROR, SEEN, UU, UV, VALID, VV, normal, right, summary};
+
+use super::planes::Planes;
+use crate::image::Spline;
+use crate::simd::{Level, SimdReal, dispatch};
+use crate::types::Mask;
+use band::{Band, Task};
+use moments::taps;
+use rayon::prelude::*;
+use scratch::Scratch;
+use std::sync::{Mutex, PoisonError};
+
+/// Most site rows of a band: the halo above and below costs a sixth of 32 rows, a tenth of 48; more would
+/// leave threads without work.
+const BAND: usize = 48;
+
+/// Rows of each band: all alike, and as many bands as two threads can share. The split depends on the size
+/// alone.
+fn band_rows(height: usize) -> usize {
+    let bands = height.div_ceil(BAND);
+    height.div_ceil(if bands > 1 { bands.next_multiple_of(2) } else { bands })
+}
+
+/// Planes of the motion that comes in: `u, v, u_x, v_x, u_y, v_y`.
+pub(super) const MOTION: usize = 6;
+
+/// One frame of a level, as the data term sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a, T> {
+    /// Brightness between the pixels.
+    pub spline: &'a Spline<T>,
+    /// Pixels that may be used; all where there is none.
+    pub usable: Option<&'a Mask>,
+    /// When, in frames from the time that the motion belongs to.
+    pub time: T,
+    /// Share in the mean `A`.
+    pub mean: T,
+    /// Share in the rate `R`.
+    pub rate: T,
+}
+
+impl<'a, T: SimdReal> View<'a, T> {
+    /// Two frames, half a frame before and after the motion's time.
+    pub fn pair(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
+        let parts = [(-0.5, 0.5, -1.0), (0.5, 0.5, 1.0)];
+        std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
+    }
+
+    /// Three frames about the middle one's time.
+    pub fn triple(splines: [&'a Spline<T>; 3], usable: [Option<&'a Mask>; 3]) -> [Self; 3] {
+        let parts = [(-1.0, 0.25, -0.5), (0.0, 0.5, 0.0), (1.0, 0.25, 0.5)];
+        std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
+    }
+
+    /// Two frames, at the first one's time: what differs from [`View::pair`] is whose pixels the motion
+    /// belongs to.
+    pub fn ahead(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
+        let parts = [(0.0, 0.5, -1.0), (1.0, 0.5, 1.0)];
+        std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
+    }
+
+    fn new(spline: &'a Spline<T>, usable: Option<&'a Mask>, (time, mean, rate): (f64, f64, f64)) -> Self {
+        let [time, mean, rate] = [time, mean, rate].map(T::from_f64);
+        Self { spline, usable, time, mean, rate }
+    }
+}
+
+/// How pixels are weighed and summed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DataOptions {
+    /// Weight `g` of the rows 2 and 3 against row 1, px.
+    pub gradient: f64,
+    /// Standard deviation of the Gaussian window, px; it is cut off at three of them.
+    pub sigma: f64,
+    /// Robust constant `c`: a pixel whose `R` is `c` scales weighs half.
+    pub robust: f64,
+}
+
+impl Default for DataOptions {
+    fn default() -> Self {
+        Self { gradient: 5.0, sigma: 1.2, robust: 3.0 }
+    }
+}
+
+/// The working memory of the threads that make data terms.
+#[derive(Debug, Default)]
+pub(super) struct Pool<T>(Mutex<Vec<Scratch<T>>>);
+
+/// Makes data terms.
+#[derive(Debug)]
+pub(super) struct DataTerm<'a, T> {
+    level: Level,
+    options: DataOptions,
+    taps: Vec<[T; 3]>,
+    pool: &'a Pool<T>,
+}
+
+impl<'a, T: SimdReal> DataTerm<'a, T> {
+    pub fn new(level: Level, options: DataOptions, pool: &'a Pool<T>) -> Self {
+        Self { level, options, taps: taps(options.sigma), pool }
+    }
+
+    /// The [`COUNT`] planes of moments of a level of `size` pixels, in `out`; and `|R|` at every fourth
+    /// usable pixel of every fourth row.
+    ///
+    /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
+    /// the standard deviation of `R` where brightness is constant; without it every usable pixel weighs 1.
+    /// Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on the
+    /// number of threads.
+    pub fn linearise(
+        &self,
+        size: (usize, usize),
+        views: &[View<'_, T>],
+        motion: &Planes<T>,
+        scale: Option<T>,
+        out: &mut Planes<T>,
+    ) -> Vec<T> {
+        let (width, height) = (size.0.div_ceil(2), size.1.div_ceil(2));
+        out.reshape(width, height, COUNT);
+        if width == 0 || height == 0 {
+            return Vec::new();
+        }
+        let task = Task {
+            size,
+            views,
+            motion,
+            taps: &self.taps,
+            gradient: T::from_f64(self.options.gradient * self.options.gradient),
+            // Squares of the inverse must not overflow.
+            inverse: scale
+                .map_or(T::from_f64(0.0), |s| T::from_f64(1.0 / (self.options.robust * s.to_f64()).max(1e-15))),
+            stride: out.stride(),
+        };
+        let rows = band_rows(height);
+        let len = out.row_len();
+        let residuals: Vec<Vec<T>> = out
+            .data_mut()
+            .par_chunks_mut(rows * len)
+            .enumerate()
+            .map(|(band, out)| {
+                let mut scratch = self.lock().pop().unwrap_or_default();
+                let sites = band * rows..(band * rows + out.len() / len);
+                let mut residuals = Vec::new();
+                let kernel = Band { task: &task, rows: sites, out, residuals: &mut residuals, scratch: &mut scratch };
+                dispatch(self.level, kernel);
+                self.lock().push(scratch);
+                residuals
+            })
+            .collect();
+        residuals.concat()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Scratch<T>>> {
+        self.pool.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

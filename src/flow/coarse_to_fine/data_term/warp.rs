@@ -1,0 +1,88 @@
+//! The views along the motion: their mean, their rate, and where all of them can be seen.
+
+use super::View;
+use super::scratch::Columns;
+use crate::simd::{Lanes, SimdReal};
+use crate::types::Mask;
+
+/// Most lanes of a vector.
+const MAX_LANES: usize = 16;
+
+/// Mean and rate of the views in row `y` of a level of `width x height` pixels, and 1 where every view is
+/// seen inside the rim on a usable pixel.
+///
+/// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are
+/// known.
+#[inline(always)]
+pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
+    views: &[View<'_, T>],
+    ((width, height), y): ((usize, usize), usize),
+    columns: &Columns,
+    frame: &[T],
+    image: &mut [T],
+) {
+    let row = V::constant(y as f64);
+    let (right, low) = (V::constant(width as f64 - 2.0), V::constant(height as f64 - 2.0));
+    for h in 0..2 {
+        let n = columns.count;
+        let (number, inside) = (&frame[columns.range(0, h)][..n], &frame[columns.range(1, h)][..n]);
+        let [mean, rate, u, v, valid] = planes(columns, h, image);
+        let mut at = 0;
+        while at + V::LANES <= n {
+            let (u, v, column) = (V::load(&u[at..]), V::load(&v[at..]), V::load(&number[at..]));
+            let mut seen = V::load(&inside[at..]);
+            let (mut a, mut r) = (V::zero(), V::zero());
+            for view in views {
+                let time = V::splat(view.time);
+                let (x, y) = (u.mul_add(time, column), v.mul_add(time, row));
+                seen = within(x, right, within(y, low, seen));
+                if let Some(mask) = view.usable {
+                    seen = hide(mask, x, y, seen);
+                }
+                let w = view.spline.sample_in(x, y);
+                a = w.mul_add(V::splat(view.mean), a);
+                r = w.mul_add(V::splat(view.rate), r);
+            }
+            a.store(&mut mean[at..]);
+            r.store(&mut rate[at..]);
+            seen.store(&mut valid[at..]);
+            at += V::LANES;
+        }
+    }
+}
+
+/// The samples of half `h` of the planes of an image row.
+#[inline(always)]
+fn planes<'a, T>(columns: &Columns, h: usize, image: &'a mut [T]) -> [&'a mut [T]; 5] {
+    let mut rest = image;
+    std::array::from_fn(|_| {
+        let (plane, after) = std::mem::take(&mut rest).split_at_mut(columns.row(1));
+        rest = after;
+        &mut plane[columns.range(0, h)][..columns.count]
+    })
+}
+
+/// `seen` where the position lies in `1..=last`, else 0.
+#[inline(always)]
+fn within<V: Lanes>(position: V, last: V, seen: V) -> V {
+    let inner = V::select(last.lt(position), V::zero(), seen);
+    V::select(position.lt(V::constant(1.0)), V::zero(), inner)
+}
+
+/// `seen` where the pixel nearest to the position may be used, else 0.
+#[inline(always)]
+fn hide<T: SimdReal, V: Lanes<Scalar = T>>(mask: &Mask, x: V, y: V, seen: V) -> V {
+    let mut buffers = [[T::from_f64(0.0); MAX_LANES]; 3];
+    let [xs, ys, kept] = &mut buffers;
+    x.store(xs);
+    y.store(ys);
+    seen.store(kept);
+    for l in 0..V::LANES {
+        let (column, row) = ((xs[l].to_f64() + 0.5) as usize, (ys[l].to_f64() + 0.5) as usize);
+        let usable = column < mask.width() && row < mask.height() && mask.get(column, row);
+        if !usable {
+            kept[l] = T::from_f64(0.0);
+        }
+    }
+    V::load(kept)
+}

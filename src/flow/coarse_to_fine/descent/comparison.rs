@@ -1,0 +1,149 @@
+//! Two motions between the same frames: each site takes the one that explains them better.
+
+use crate::flow::coarse_to_fine::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, Pool, VALID};
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
+use crate::simd::{Level, SimdReal};
+
+/// A motion must leave so many times less of the frames than the one that it replaces, what is usually left
+/// added to both: less is chance.
+const MIN_ENERGY_RATIO: f64 = 1.1;
+/// Where less of a window than this is seen, less than in a corner of the frame, what a motion leaves there
+/// tells nothing.
+const MIN_USABLE_SHARE: f64 = 0.1;
+
+/// What motions are compared by.
+pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
+    pub simd: Level,
+    /// The level whose sites the motions are on.
+    pub level: &'a PyramidLevel<T>,
+    /// Its frames that are compared.
+    pub compared: ComparedFrames,
+    /// Standard deviation of the residual.
+    pub residual_std: Option<T>,
+    pub pool: &'a Pool<T>,
+    pub space: &'a PlanePool<T>,
+}
+
+impl<T: SimdReal> Comparison<'_, T> {
+    /// Lets `other` replace the `motion` where it is further from it than `apart`, px of the level, and
+    /// explains the frames better; beside such sites both are blended. Whether there are such sites.
+    pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
+        let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
+        let typical = median(known.iter().copied().filter(|residual_energies| !residual_energies.is_nan()).collect());
+        let size = (motion.width, motion.height);
+        let distance = |n: usize| {
+            let [u, v] =
+                [0, 1].map(|k| (motion.at(k, n % size.0, n / size.0) - other.at(k, n % size.0, n / size.0)).to_f64());
+            u.hypot(v)
+        };
+        // Comparisons with what is not known are false.
+        let better =
+            |n: usize| MIN_ENERGY_RATIO * (found[n] + typical) < known[n] + typical && distance(n) > min_distance;
+        let wins: Vec<bool> = (0..known.len()).map(better).collect();
+        if !wins.contains(&true) {
+            return false;
+        }
+        for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
+            let share = share_around(&wins, size, (x, y));
+            if share > 0.0 {
+                for k in 0..MOTION {
+                    let value = &mut motion.line_mut(k, y)[x];
+                    *value += T::from_f64(share) * (other.at(k, x, y) - *value);
+                }
+            }
+        }
+        true
+    }
+
+    /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is
+    /// seen.
+    fn residual_energies(&self, motion: &Planes<T>) -> Vec<f64> {
+        let mut data = self.space.planes(motion.width, motion.height, COUNT);
+        let term = DataTerm::new(self.simd, DataOptions::default(), self.pool);
+        term.linearise(self.level.size, &self.level.views(self.compared), motion, self.residual_std, &mut data);
+        let energy = |(error, usable): (&T, &T)| {
+            let usable = usable.to_f64();
+            if usable >= MIN_USABLE_SHARE { error.to_f64() / usable } else { f64::NAN }
+        };
+        let rows = (0..data.height).flat_map(|y| data.line(ERROR, y).iter().zip(data.line(VALID, y)));
+        let residual_energies = rows.map(energy).collect();
+        self.space.keep_small(data);
+        residual_energies
+    }
+}
+
+/// The upper median; nothing of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    crate::math::median(&mut values).unwrap_or(0.0)
+}
+
+/// The share of sites around one that win, by their nearness: half the weight along each axis is its own.
+fn share_around(wins: &[bool], (width, height): (usize, usize), (x, y): (usize, usize)) -> f64 {
+    let near = |at: usize, len: usize| [(at.saturating_sub(1), 0.25), (at, 0.5), ((at + 1).min(len - 1), 0.25)];
+    let mut share = 0.0;
+    for (j, across) in near(y, height) {
+        for (i, along) in near(x, width) {
+            if wins[j * width + i] {
+                share += across * along;
+            }
+        }
+    }
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::coarse_to_fine::brightness_scale::BrightnessScale;
+    use crate::flow::coarse_to_fine::pyramid::Pyramid;
+    use crate::types::Frame;
+
+    #[test]
+    fn each_site_takes_what_explains_its_frames() {
+        // The right half moves by one px, the left stays.
+        let texture = |x: f32, y: f32| (0.7 * x + 0.2 * y).sin() + (0.3 * x - 0.6 * y).cos();
+        let [before, after] = [0.0, 1.0].map(|t| {
+            Frame::from_fn(64, 48, |x, y| {
+                let (x, y) = (x as f32, y as f32);
+                if x < 32.0 { texture(x, y) } else { texture(x - t, y) }
+            })
+        });
+        let mut pyramid = Pyramid::default();
+        let brightness = BrightnessScale { mean: 0.0, gain: 1.0, contrast: 1.0 };
+        pyramid.fill(Level::SCALAR, &[&before, &after], brightness, None, (Some(1), 0));
+        let (pool, space) = (Pool::default(), PlanePool::default());
+        let (level, compared) = (&pyramid.levels()[0], ComparedFrames::All);
+        let comparison =
+            Comparison { simd: Level::SCALAR, level, compared, residual_std: None, pool: &pool, space: &space };
+        let still = Planes::<f32>::new(32, 24, MOTION);
+        let mut moved = still.clone();
+        (0..24).for_each(|y| moved.line_mut(0, y).fill(1.0));
+        for (mut motion, other) in [(still.clone(), &moved), (moved.clone(), &still)] {
+            assert!(comparison.replace_where_better(&mut motion, other, 0.9));
+            for y in 0..24 {
+                let u = motion.line(0, y);
+                assert!(u[2..12].iter().all(|u| *u == 0.0) && u[20..].iter().all(|u| *u == 1.0), "{y}: {u:?}");
+            }
+        }
+        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better
+        // than itself, or than what is as near as that.
+        for (other, min_distance) in [(&moved, 0.0), (&still, 1.0)] {
+            let mut same = moved.clone();
+            assert!(!comparison.replace_where_better(&mut same, other, min_distance));
+            assert_eq!(same.data(), moved.data());
+        }
+    }
+
+    #[test]
+    fn shares_count_neighbours_once() {
+        let mut wins = vec![false; 12];
+        wins[5] = true;
+        let share = |x, y| share_around(&wins, (4, 3), (x, y));
+        assert_eq!([share(1, 1), share(0, 1), share(2, 2), share(3, 1)], [0.25, 0.125, 0.0625, 0.0]);
+        assert_eq!(share_around(&[true], (1, 1), (0, 0)), 1.0);
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(Vec::new()), 0.0);
+    }
+}

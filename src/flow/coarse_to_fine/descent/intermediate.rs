@@ -1,0 +1,88 @@
+//! What a level found, refined before the next finer one begins with it.
+
+use crate::flow::coarse_to_fine::data_term::{MOTION, summary};
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::flow::coarse_to_fine::refine::{RefineOptions, WindowStatistics, refine};
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use std::ops::Range;
+
+/// Refinement that moves a site this far, px of the level, counts half: it takes noise away, while what it
+/// would move by more is a small object's own motion.
+const HALF_WEIGHT_DISTANCE: f64 = 0.35;
+
+/// Refines the `motion` of a level, given the `data` it was coupled with, for a finer one to begin with.
+///
+/// Each site goes the share `1 / (1 + (d / c)^4)` of the way `d` to its refined motion, `c` = 0.35 px.
+pub(super) fn refine_intermediate<T: SimdReal>(
+    simd: Level,
+    space: &PlanePool<T>,
+    motion: &mut Planes<T>,
+    data: &Planes<T>,
+) {
+    let data = summary(space, data);
+    let (refined, statistics) = refine(simd, space, &RefineOptions::intermediate(), motion, &data);
+    blend_towards(simd, motion, &refined);
+    statistics
+        .into_iter()
+        .flat_map(WindowStatistics::into_planes)
+        .chain([data, refined])
+        .for_each(|planes| space.keep(planes));
+}
+
+/// Moves `motion` towards what is `refined`, the less the further that is.
+fn blend_towards<T: SimdReal>(simd: Level, motion: &mut Planes<T>, refined: &Planes<T>) {
+    let (len, stride) = (motion.row_len(), motion.stride());
+    for_each_band(motion.data_mut(), len, |_, rows, out| dispatch(simd, Blend { refined, rows, out, stride }));
+}
+
+/// Some rows of [`draw_near`].
+struct Blend<'a, T> {
+    refined: &'a Planes<T>,
+    rows: Range<usize>,
+    out: &'a mut [T],
+    stride: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Blend<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { refined, rows, out, stride } = self;
+        let (one, scale) = (V::constant(1.0), V::constant(HALF_WEIGHT_DISTANCE.powi(-2)));
+        for (y, own) in rows.zip(out.chunks_exact_mut(MOTION * stride)) {
+            let goal = refined.row(y);
+            for i in (LEFT..stride - LEFT).step_by(V::LANES) {
+                let difference =
+                    |own: &[T], k: usize| V::load(&goal[k * stride + i..]) - V::load(&own[k * stride + i..]);
+                let (u, v) = (difference(own, 0), difference(own, 1));
+                let ratio = u.mul_add(u, v * v) * scale;
+                let share = one / ratio.mul_add(ratio, one);
+                for k in 0..MOTION {
+                    let value = difference(own, k).mul_add(share, V::load(&own[k * stride + i..]));
+                    value.store(&mut own[k * stride + i..]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sites_go_to_near_motion_and_stay_before_far_one() {
+        let (mut motion, mut refined) = (Planes::<f64>::new(3, 2, MOTION), Planes::<f64>::new(3, 2, MOTION + 2));
+        for (x, u) in [0.01, HALF_WEIGHT_DISTANCE, 3.0].into_iter().enumerate() {
+            refined.line_mut(0, 1)[x] = u;
+            refined.line_mut(5, 1)[x] = 1.0;
+        }
+        blend_towards(Level::detect(), &mut motion, &refined);
+        let [near, half, far] = [0, 1, 2].map(|x| motion.at(5, x, 1));
+        assert!(near > 0.999_99 && (half - 0.5).abs() < 1e-12 && far < 2e-4, "{near} {half} {far}");
+        assert_eq!(motion.at(0, 1, 1), half * HALF_WEIGHT_DISTANCE);
+        assert!((0..3).all(|x| motion.at(0, x, 0) == 0.0));
+    }
+}

@@ -1,0 +1,181 @@
+//! One iteration: a linearisation, and the motion that follows from it.
+
+use super::DescentPlan;
+use super::comparison::Comparison;
+use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
+use crate::flow::coarse_to_fine::regularize::{RegularizeScratch, Smoothness, regularize};
+use crate::flow::coarse_to_fine::resample::rederive;
+use crate::simd::SimdReal;
+use std::ops::Range;
+
+/// Noise is taken for at least this share of the brightness' standard deviation.
+const MIN_NOISE_SHARE: f64 = 1e-3;
+/// The scale of the robust weights is at least this share of the brightness' standard deviation.
+const MIN_RESIDUAL_SHARE: f64 = 4e-3;
+
+/// A site that an iteration moves further than this is on its way, px of the level.
+const MIN_MOVING_DISTANCE: f64 = 0.1;
+/// So many of those may be an object that is too small to be felt in the mean over the frame.
+const MIN_OBJECT_SITES: usize = 4;
+/// SamplingGrid along the edge that do not count, at least and at most: what leaves the frame there may drift for
+/// ever, and leads the further the more sites there are.
+const BORDER_SITES: (usize, usize) = (2, 4);
+/// A sixteenth of the sites, within those bounds.
+const BORDER_DIVISOR: usize = 16;
+
+/// Iterations with loose bonds, and these: each site follows its own data. A small object that moves before a
+/// still ground is held back by the usual ones, but the ground could not be told as well.
+const TRIAL: (usize, Smoothness) =
+    (3, Smoothness { flow: 1.0, jacobian: 100.0, break_strain: 0.1, sweeps: 4, reweight_every: 2 });
+/// What they find is another motion when it is further away than this, px of the level; nearer, it is the
+/// same with more noise.
+const MIN_MOTION_DIFFERENCE: f64 = 0.5;
+/// Where the first of them moves no site by this much, none is on its way to another motion, px of the level.
+const MIN_TRIAL_CHANGE: f64 = 0.25;
+/// Iterations that join both motions.
+const JOINT_ITERATIONS: usize = 2;
+
+/// One linearisation, and the motion that follows from it.
+pub(super) struct Iteration<'a, T> {
+    pub plan: &'a DescentPlan,
+    pub compared: ComparedFrames,
+    pub term: DataTerm<'a, T>,
+    pub data: &'a mut Planes<T>,
+    pub scratch: &'a mut RegularizeScratch<T>,
+    /// Standard deviation of what brightness changes by along the motion, from the iteration before.
+    pub residual_std: Option<T>,
+}
+
+impl<T: SimdReal> Iteration<'_, T> {
+    /// Iterates once; the motion before is the `old` one afterwards.
+    pub fn advance(
+        &mut self,
+        level: &PyramidLevel<T>,
+        smoothness: &Smoothness,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+    ) -> f64 {
+        std::mem::swap(motion, old);
+        rederive(old, motion);
+        self.iterate(level, smoothness, motion)
+    }
+
+    /// Iterates so many times.
+    fn repeat(
+        &mut self,
+        count: usize,
+        level: &PyramidLevel<T>,
+        smoothness: &Smoothness,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+    ) {
+        for _ in 0..count {
+            self.advance(level, smoothness, (motion, old));
+        }
+    }
+
+    /// Tries sites without their neighbours, and gives the `motion` what explains the frames better: small
+    /// objects come free.
+    pub fn try_unregularized(
+        &mut self,
+        level: &PyramidLevel<T>,
+        smoothness: &Smoothness,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+        (pool, space): (&Pool<T>, &PlanePool<T>),
+    ) {
+        let mut trial = copy(space, motion);
+        self.advance(level, &TRIAL.1, (&mut trial, old));
+        if moving((motion, &trial), MIN_TRIAL_CHANGE, (0..motion.width, 0..motion.height)) > 0 {
+            self.repeat(TRIAL.0 - 1, level, &TRIAL.1, (&mut trial, old));
+            let DescentPlan { simd, .. } = *self.plan;
+            let comparison =
+                Comparison { simd, level, compared: self.compared, residual_std: self.residual_std, pool, space };
+            if comparison.replace_where_better(motion, &trial, MIN_MOTION_DIFFERENCE) {
+                self.repeat(JOINT_ITERATIONS, level, smoothness, (motion, old));
+            }
+        }
+        space.keep(trial);
+    }
+
+    /// Linearises about `motion` and moves it; by how much, px (root mean square).
+    fn iterate(&mut self, level: &PyramidLevel<T>, smoothness: &Smoothness, motion: &mut Planes<T>) -> f64 {
+        let views = level.views(self.compared);
+        let residuals = self.term.linearise(level.size, &views, motion, self.residual_std, self.data);
+        self.residual_std = self.residual_std(residuals);
+        let contrast = self.plan.brightness.contrast;
+        let floor = T::from_f64((MIN_NOISE_SHARE * contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
+        regularize(self.plan.simd, self.data, motion, smoothness, floor, self.scratch)
+    }
+
+    /// Robust standard deviation of residuals whose magnitudes these are.
+    fn residual_std(&self, mut residuals: Vec<T>) -> Option<T> {
+        if residuals.is_empty() {
+            return None;
+        }
+        let middle = residuals.len() / 2;
+        residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
+        let floor = (MIN_RESIDUAL_SHARE * self.plan.brightness.contrast).max(f64::from(f32::MIN_POSITIVE));
+        Some(T::from_f64(1.4826 * residuals[middle].to_f64() + floor))
+    }
+}
+
+/// Whether no object is on its way any more, after an iteration `from` a motion `to` another. SamplingGrid of the
+/// rim do not count.
+pub(super) fn has_settled<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> bool {
+    moving_inside(from, to) < MIN_OBJECT_SITES
+}
+
+/// How many sites, but for those of the rim, are on their way.
+fn moving_inside<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> usize {
+    let without_border = |len: usize| {
+        let border = (len / BORDER_DIVISOR).clamp(BORDER_SITES.0, BORDER_SITES.1).min(len);
+        border..len.saturating_sub(border).max(border)
+    };
+    moving((from, to), MIN_MOVING_DISTANCE, (without_border(to.width), without_border(to.height)))
+}
+
+/// How many of the sites in some columns and rows are further than `far` px from where they were.
+fn moving<T: SimdReal>(
+    (from, to): (&Planes<T>, &Planes<T>),
+    distance: f64,
+    (columns, rows): (Range<usize>, Range<usize>),
+) -> usize {
+    let distance = T::from_f64(distance * distance);
+    let in_row = |y: usize| {
+        let [u, v, u0, v0] = [to.line(0, y), to.line(1, y), from.line(0, y), from.line(1, y)];
+        let is_far = |&x: &usize| (u[x] - u0[x]) * (u[x] - u0[x]) + (v[x] - v0[x]) * (v[x] - v0[x]) > distance;
+        columns.clone().filter(is_far).count()
+    };
+    rows.map(in_row).sum()
+}
+
+/// The motion in planes of its own; there may be more planes in what it comes from.
+pub(super) fn copy<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>) -> Planes<T> {
+    let mut out = space.planes(motion.width, motion.height, MOTION);
+    for (k, y) in (0..MOTION).flat_map(|k| (0..motion.height).map(move |y| (k, y))) {
+        out.line_mut(k, y).copy_from_slice(motion.line(k, y));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_sites_on_their_way_are_seen_but_not_along_the_edge() {
+        let (from, mut to) = (Planes::<f32>::new(9, 7, MOTION), Planes::<f32>::new(9, 7, MOTION));
+        to.data_mut().fill(0.09);
+        assert_eq!(moving_inside(&from, &to), 5 * 3, "the diagonal is distance: 0.127 px");
+        to.data_mut().fill(0.07);
+        assert_eq!(moving_inside(&from, &to), 0);
+        for (x, y, u) in [(4, 3, 2.0), (5, 3, -0.2), (1, 3, 2.0), (4, 0, 2.0)] {
+            to.line_mut(0, y)[x] = u;
+        }
+        assert_eq!(moving_inside(&from, &to), 2);
+        assert_eq!(moving((&from, &to), 0.15, (0..9, 0..7)), 4);
+        let tiny = Planes::<f32>::new(3, 1, MOTION);
+        assert_eq!(moving_inside(&tiny, &tiny), 0);
+    }
+}

@@ -1,0 +1,173 @@
+//! From level to level: the iterations.
+
+pub(super) mod comparison;
+mod intermediate;
+mod iteration;
+
+use super::brightness_scale::BrightnessScale;
+use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
+use super::planes::Planes;
+use super::pyramid::ComparedFrames;
+use super::resample::{coarser, finer};
+use super::schedule::{LevelSchedule, Schedule};
+use super::workspace::Workspace;
+use crate::simd::{Level, SimdReal};
+use comparison::Comparison;
+use intermediate::refine_intermediate;
+use iteration::{Iteration, copy, has_settled};
+use std::ops::RangeInclusive;
+
+/// What all iterations have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DescentPlan {
+    pub simd: Level,
+    pub schedule: Schedule,
+    /// How brightness was scaled.
+    pub brightness: BrightnessScale,
+    /// The finest level there is to work on.
+    pub finest: usize,
+    /// Whether [`Plan::all`] keeps what it finds on the way.
+    pub keeps_levels: bool,
+}
+
+/// What there is on the finest level.
+#[derive(Debug)]
+pub(super) struct DescentResult<T> {
+    /// The coupled motion.
+    pub motion: Planes<T>,
+    /// The summary of the last data term.
+    pub data: Planes<T>,
+    /// Standard deviation of the residual.
+    pub residual_std: Option<T>,
+    /// The coupled motion on each coarser level, the finest of them first, where it was to be kept.
+    pub coarser_motions: Vec<Planes<T>>,
+}
+
+impl DescentPlan {
+    /// The way down from the coarsest level of the filled pyramid, where nothing is known.
+    pub fn from_coarsest<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
+        let levels = workspace.pyramid.levels();
+        let coarsest = levels.len() - 1;
+        let site_counts = site_counts(levels[coarsest].size);
+        let schedules: Vec<_> =
+            (0..levels.len()).map(|k| self.schedule.on_level(k, levels[k].size, k == coarsest)).collect();
+        let mut motion = workspace.space.planes(site_counts.0, site_counts.1, MOTION);
+        motion.data_mut().fill(T::from_f64(0.0));
+        self.descend(workspace, ComparedFrames::All, motion, (&schedules, self.finest))
+    }
+
+    /// Once more about a better `motion`, on the finest level.
+    pub fn relinearise<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> DescentResult<T> {
+        let start = copy(&workspace.space, motion);
+        self.descend(
+            workspace,
+            ComparedFrames::All,
+            start,
+            (&vec![self.schedule.up_to(self.finest, 1); self.finest + 1], self.finest),
+        )
+    }
+
+    /// The way for the step to the next frame alone, from two levels above the finest down. It begins with
+    /// what is known of all frames together, the `motion`, but for what the next frame alone tells better on
+    /// the levels above: things may turn back.
+    pub fn next_step<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> DescentResult<T> {
+        let coarsest = workspace.pyramid.levels().len() - 1;
+        let first = coarsest.min(self.finest + self.schedule.next_frame_iterations.len() - 1);
+        let mut start = coarsened(workspace, motion, self.finest..=first);
+        if first < coarsest {
+            self.replace_from_next_frame(workspace, first, &mut start);
+        }
+        let most = |k: usize| self.schedule.next_frame_iterations[k.saturating_sub(self.finest)];
+        let schedules: Vec<_> = (0..=first).map(|k| self.schedule.up_to(k, most(k))).collect();
+        self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, self.finest))
+    }
+
+    /// The same, but that nothing is kept on the way.
+    fn without_levels(&self) -> Self {
+        Self { keeps_levels: false, ..*self }
+    }
+
+    /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one
+    /// above, tells better.
+    fn replace_from_next_frame<T: SimdReal>(&self, workspace: &mut Workspace<T>, level: usize, motion: &mut Planes<T>) {
+        let levels = workspace.pyramid.levels();
+        let coarsest = levels.len() - 1;
+        let schedules: Vec<_> =
+            (0..=coarsest).map(|k| self.schedule.on_level(k, levels[k].size, k == coarsest)).collect();
+        let start = coarsened(workspace, motion, level..=coarsest);
+        let DescentResult { motion: coarser_motions, data, residual_std, .. } =
+            self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, level + 1));
+        let Workspace { pyramid, pool, space, .. } = workspace;
+        let level = &pyramid.levels()[level];
+        let mut own = space.planes(0, 0, MOTION);
+        finer(self.simd, &coarser_motions, level.size, &mut own);
+        let comparison =
+            Comparison { simd: self.simd, level, compared: ComparedFrames::Ahead, residual_std, pool, space };
+        comparison.replace_where_better(motion, &own, 0.0);
+        for planes in [coarser_motions, data, own] {
+            space.keep(planes);
+        }
+    }
+
+    /// From the coarsest of the levels that `limits` names, on which `motion` is, down to the level `to`.
+    fn descend<T: SimdReal>(
+        &self,
+        workspace: &mut Workspace<T>,
+        compared: ComparedFrames,
+        mut motion: Planes<T>,
+        (schedules, to): (&[LevelSchedule], usize),
+    ) -> DescentResult<T> {
+        let Workspace { pyramid, pool, scratch, space } = workspace;
+        let (width, height) = site_counts(pyramid.levels()[to].size);
+        let mut data = space.planes(width, height, COUNT);
+        let term = DataTerm::new(self.simd, DataOptions::default(), pool);
+        let mut step = Iteration { plan: self, compared, term, data: &mut data, scratch, residual_std: None };
+        let mut old = space.planes(0, 0, MOTION);
+        let mut coarser_motions = Vec::new();
+        for (k, (level, schedule)) in pyramid.levels().iter().zip(schedules).enumerate().skip(to).rev() {
+            if k + 1 < schedules.len() {
+                std::mem::swap(&mut motion, &mut old);
+                finer(self.simd, &old, level.size, &mut motion);
+            }
+            for _ in 0..schedule.max_iterations {
+                let change = step.advance(level, &schedule.smoothness, (&mut motion, &mut old));
+                // On the finest level what is left to do is for the coarser ones to have done.
+                let is_calm = || k == self.finest || has_settled(&old, &motion);
+                if change <= schedule.tolerance && is_calm() {
+                    break;
+                }
+            }
+            if schedule.runs_trial {
+                step.try_unregularized(level, &schedule.smoothness, (&mut motion, &mut old), (pool, space));
+            }
+            if schedule.refines {
+                refine_intermediate(self.simd, space, &mut motion, step.data);
+            }
+            if self.keeps_levels && k > to {
+                coarser_motions.insert(0, copy(space, &motion));
+            }
+        }
+        space.keep(old);
+        let residual_std = step.residual_std;
+        let summary = summary(space, &data);
+        space.keep_small(data);
+        DescentResult { motion, data: summary, residual_std, coarser_motions }
+    }
+}
+
+/// The motion on the last of some levels from that on the first.
+fn coarsened<T: SimdReal>(workspace: &Workspace<T>, motion: &Planes<T>, levels: RangeInclusive<usize>) -> Planes<T> {
+    let space = &workspace.space;
+    let mut out = copy(space, motion);
+    for level in levels.skip(1) {
+        let mut next = space.planes(0, 0, MOTION);
+        coarser(&out, site_counts(workspace.pyramid.levels()[level].size), &mut next);
+        space.keep(std::mem::replace(&mut out, next));
+    }
+    out
+}
+
+/// SamplingGrid along x and y of a level of `size` pixels.
+fn site_counts(size: (usize, usize)) -> (usize, usize) {
+    (size.0.div_ceil(2), size.1.div_ceil(2))
+}

@@ -1,0 +1,269 @@
+//! From the sites' motion to the field that was asked for.
+
+mod consistency;
+
+use super::covariance::{CovarianceMap, CovarianceMaps, Energy, covariance};
+use super::data_term::{DataOptions, ENERGY, MOTION, UU, UV, VV};
+use super::estimate::Estimate;
+use super::plane_pool::PlanePool;
+use super::planes::Planes;
+use super::refine::{SPACING, WindowStatistics};
+use super::resample::{finer, motion_at};
+use crate::flow::coarse_to_fine::resample::first_frame::at_first_frame;
+use crate::flow::coarse_to_fine::resample::rows::RowReader;
+use crate::flow::options::EstimatorOptions;
+use crate::flow::site::{FieldBand, bands};
+use crate::flow::windowed::run::are_rounded;
+use crate::image::{halved_noise, halved_size};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
+use consistency::Consistency;
+use rayon::prelude::*;
+
+/// Pixels between sites.
+const SITE_SPACING: f64 = 2.0;
+
+/// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
+fn rows() -> f64 {
+    1.0 + 2.0 * DataOptions::default().gradient.powi(2)
+}
+
+/// The covariance of the estimate, wherever it may be asked for.
+pub(super) fn covariance_of<T: SimdReal>(
+    estimate: &Estimate<T>,
+    frames: &[&Frame<T>],
+    common: &EstimatorOptions,
+) -> CovarianceMaps<T> {
+    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth
+    // in a triple's.
+    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
+    let halving_gain = halved_noise().powi(estimate.level as i32);
+    let energy_of = |variance: f64| share * rows() * halving_gain * variance * estimate.brightness.gain.powi(2);
+    let noise = match common.noise {
+        Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
+        // Rounding is the least noise that whole numbers can have.
+        None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
+    };
+    covariance(estimate, noise, frames.len() == 2, common.systematic)
+}
+
+/// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to
+/// the first frame.
+pub(super) fn fill<T: SimdReal>(
+    (estimate, spreads): (&Estimate<T>, Option<CovarianceMaps<T>>),
+    space: &PlanePool<T>,
+    frames: &[&Frame<T>],
+    common: &EstimatorOptions,
+    field: &mut FlowField<T>,
+) {
+    let simd = common.level();
+    let moved = (frames.len() == 2).then(|| at_first_frame(simd, space, &estimate.motion));
+    let found = moved.as_ref().unwrap_or(&estimate.motion);
+    let full = at_full_resolution(simd, space, (estimate.level, found), frames[0].size());
+    let writer = Writer {
+        simd,
+        pitch: 2 << estimate.level,
+        data: &estimate.data,
+        per_row: 1.0 / (rows().sqrt() * estimate.brightness.gain),
+        motion: full.as_ref().unwrap_or(found),
+        reference: frames[frames.len() - 2],
+        mask: common.mask.as_ref(),
+        observable: is_observable(estimate),
+        consistency: Consistency::of(estimate),
+        spreads,
+        statistics: estimate.statistics.as_ref(),
+    };
+    let (sites, width) = (field.layout.sites.clone(), field.width);
+    bands(field).into_par_iter().for_each(|mut band| match &sites {
+        SamplingGrid::Points(points) => writer.points(points, &mut band),
+        SamplingGrid::Grid { .. } => {
+            dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band })
+        }
+    });
+    moved.into_iter().chain(full).for_each(|planes| space.keep(planes));
+}
+
+/// The motion on the sites of the frame, where it was found on a coarser level.
+fn at_full_resolution<T: SimdReal>(
+    simd: Level,
+    space: &PlanePool<T>,
+    (level, found): (usize, &Planes<T>),
+    size: (usize, usize),
+) -> Option<Planes<T>> {
+    let mut motion: Option<Planes<T>> = None;
+    for level in (0..level).rev() {
+        let size = (0..level).fold(size, |size, _| halved_size(size));
+        let mut next = space.planes(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
+        finer(simd, motion.as_ref().unwrap_or(found), size, &mut next);
+        motion.replace(next).into_iter().for_each(|planes| space.keep(planes));
+    }
+    motion
+}
+
+/// Whether anything at all was seen: a constant image says nothing about motion.
+fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
+    let (data, threshold) = (&estimate.data, 1e-9 * estimate.brightness.contrast.powi(2));
+    (0..data.height).any(|y| data.line(UU, y).iter().chain(data.line(VV, y)).any(|v| v.to_f64() > threshold))
+}
+
+/// What the sites of the field are filled from.
+struct Writer<'a, T: Clone> {
+    simd: Level,
+    /// Pixels between the sites of the data.
+    pitch: usize,
+    data: &'a Planes<T>,
+    /// From the root of the residual energy to grey levels.
+    per_row: f64,
+    motion: &'a Planes<T>,
+    reference: &'a Frame<T>,
+    mask: Option<&'a Mask>,
+    observable: bool,
+    consistency: Consistency,
+    spreads: Option<CovarianceMaps<T>>,
+    statistics: Option<&'a WindowStatistics<T>>,
+}
+
+impl<T: SimdReal> Writer<'_, T> {
+    fn points(&self, points: &[(usize, usize)], band: &mut FieldBand<'_, T>) {
+        for (at, &(x, y)) in points[band.sites.clone()].iter().enumerate() {
+            let motion = motion_at(self.motion, SITE_SPACING, x as f64, y as f64);
+            for k in 0..MOTION {
+                band.motion[k][at] = T::from_f64(motion[k]);
+            }
+            for (spread, planes) in self.spreads(band) {
+                for (k, plane) in planes.iter_mut().enumerate() {
+                    plane[at] = spread.at(k, (x, y));
+                }
+            }
+            self.finish_site(band, at, (x, y));
+        }
+    }
+
+    /// The covariance and its systematic part, as far as they are wanted, with the planes they go to.
+    fn spreads<'s, 'p, 'b>(
+        &'s self,
+        band: &'p mut FieldBand<'b, T>,
+    ) -> impl Iterator<Item = (&'s CovarianceMap<T>, &'p mut Vec<&'b mut [T]>)> {
+        let whole = self.spreads.as_ref().map(|spreads| &spreads.whole);
+        let systematic = self.spreads.as_ref().and_then(|spreads| spreads.systematic.as_ref());
+        whole.zip(Some(&mut band.covariance)).into_iter().chain(systematic.zip(Some(&mut band.systematic)))
+    }
+
+    /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken
+    /// back.
+    fn finish_site(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
+        let status = self.status(pixel);
+        band.status[at] = status;
+        if !status.is_valid() {
+            let planes = band.motion.iter_mut().chain(&mut band.covariance).chain(&mut band.systematic);
+            planes.for_each(|plane| plane[at] = T::nan());
+        }
+        self.diagnose(band, at, pixel, status.is_valid());
+    }
+
+    /// Whether every pixel of row `y` has an estimate and nothing but that is wanted.
+    fn is_plain(&self, y: usize, band: &FieldBand<'_, T>) -> bool {
+        let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none() && band.window.is_none();
+        // Without a short circuit, so that the compiler may use lanes.
+        let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
+        let agrees = !self.consistency.has_contradiction(y / self.pitch);
+        bare && agrees && self.observable && self.mask.is_none() && finite()
+    }
+
+    /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest
+    /// site.
+    fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
+        let (x, y) = (x / self.pitch, y / self.pitch);
+        if let Some(window) = &mut band.window {
+            window[at] =
+                self.statistics.filter(|_| known).map_or(T::nan(), |statistics| self.window_at(statistics, (x, y)));
+        }
+        if let Some(residual) = &mut band.residual {
+            let energy = self.data.at(ENERGY, x, y).to_f64().max(0.0);
+            residual[at] = T::from_f64(if known { self.per_row * energy.sqrt() } else { f64::NAN });
+        }
+        if let Some(rank) = &mut band.rank {
+            rank[at] = if known { MOTION as u8 } else { 0 };
+        }
+        if let Some(condition) = &mut band.condition {
+            let [uu, uv, vv] = [UU, UV, VV].map(|k| self.data.at(k, x, y).to_f64());
+            let (middle, radius) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
+            condition[at] =
+                T::from_f64(if known { ((middle + radius) / (middle - radius).max(0.0)).sqrt() } else { f64::NAN });
+        }
+    }
+
+    /// The window of the slopes around a site, px of the frame: that of the nearest place where windows were
+    /// chosen.
+    fn window_at(&self, statistics: &WindowStatistics<T>, (x, y): (usize, usize)) -> T {
+        let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
+        let (columns, rows) = statistics.size();
+        let [_, slopes] = statistics.mean_sigmas(nearest(x, columns), nearest(y, rows));
+        T::from_f64(slopes * self.pitch as f64 / SITE_SPACING)
+    }
+
+    /// What can be said of a pixel before looking at its motion.
+    fn status(&self, (x, y): (usize, usize)) -> Status {
+        if self.mask.is_some_and(|mask| !mask.get(x, y)) {
+            Status::Masked
+        } else if !self.reference.get(x, y).finite() {
+            Status::NonFinite
+        } else if !self.observable {
+            Status::Unobservable
+        } else if self.consistency.is_contradicted(x / self.pitch, y / self.pitch) {
+            Status::Inconsistent
+        } else {
+            Status::Ok
+        }
+    }
+}
+
+/// The sites of a band of whole rows.
+struct Rows<'a, 'b, T: Clone> {
+    writer: &'a Writer<'a, T>,
+    sites: &'a SamplingGrid,
+    width: usize,
+    band: &'a mut FieldBand<'b, T>,
+}
+
+impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { writer, sites, width, band } = self;
+        let mut reader = RowReader::new(writer.reference.width());
+        let (mut entries, mut line) = (Vec::new(), vec![T::from_f64(0.0); writer.reference.width()]);
+        let start = band.sites.start;
+        for first in band.sites.clone().step_by(width) {
+            let row = first / width;
+            let ((from, y), (next, _)) = (sites.pixel(0, row), sites.pixel(1, row));
+            let columns = (from, next - from);
+            let places = first - start..first - start + width;
+            reader.read_motion(writer.motion, y);
+            for (k, plane) in band.motion.iter_mut().enumerate() {
+                copy(reader.plane(k), columns, &mut plane[places.clone()]);
+            }
+            for (spread, planes) in writer.spreads(band) {
+                for (k, plane) in planes.iter_mut().enumerate() {
+                    spread.row(k, y, &mut entries, &mut line);
+                    copy(&line, columns, &mut plane[places.clone()]);
+                }
+            }
+            if writer.is_plain(y, band) {
+                band.status[places].fill(Status::Ok);
+            } else {
+                places.enumerate().for_each(|(column, at)| writer.finish_site(band, at, sites.pixel(column, row)));
+            }
+        }
+    }
+}
+
+/// Every `step`-th value from `first` on.
+#[inline(always)]
+fn copy<T: Copy>(from: &[T], (first, step): (usize, usize), to: &mut [T]) {
+    if step == 1 {
+        to.copy_from_slice(&from[first..first + to.len()]);
+    } else {
+        to.iter_mut().zip(from[first..].iter().step_by(step)).for_each(|(to, from)| *to = *from);
+    }
+}

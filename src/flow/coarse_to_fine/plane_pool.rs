@@ -1,0 +1,57 @@
+//! Planes that are used again: fresh memory costs about as much time as the work done in it.
+
+use super::planes::Planes;
+use crate::simd::SimdReal;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Largest workspace that outlives its estimator, bytes: that of a frame of some 800,000 px.
+pub(super) const MAX_KEPT_BYTES: usize = 64 << 20;
+
+/// Planes that are free at the moment.
+#[derive(Debug, Default)]
+pub(super) struct PlanePool<T> {
+    free: Mutex<Vec<Planes<T>>>,
+}
+
+impl<T: SimdReal> PlanePool<T> {
+    /// Planes with any finite content: the smallest free ones with room enough, else the largest, which grow.
+    pub fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
+        let len = Planes::<T>::len(width, height, count);
+        let mut free = lock(&self.free);
+        let fit =
+            |planes: &Planes<T>| if planes.room() < len { (1, usize::MAX - planes.room()) } else { (0, planes.room()) };
+        let best = (0..free.len()).min_by_key(|&at| fit(&free[at]));
+        let mut planes = best.map(|at| free.swap_remove(at)).unwrap_or_default();
+        planes.reshape(width, height, count);
+        planes
+    }
+
+    /// Takes planes back.
+    pub fn keep(&self, planes: Planes<T>) {
+        if planes.room() > 0 {
+            lock(&self.free).push(planes);
+        }
+    }
+
+    /// Takes planes back that are most of an estimate's memory: of large frames they are let go of, since
+    /// what comes next needs the memory.
+    pub fn keep_small(&self, planes: Planes<T>) {
+        if planes.room() * size_of::<T>() <= MAX_KEPT_BYTES / 4 {
+            self.keep(planes);
+        }
+    }
+
+    /// Lets go of all free planes.
+    pub fn clear(&self) {
+        lock(&self.free).clear();
+    }
+
+    /// Samples that are free.
+    pub fn room(&self) -> usize {
+        lock(&self.free).iter().map(Planes::room).sum()
+    }
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

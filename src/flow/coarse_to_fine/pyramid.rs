@@ -1,0 +1,225 @@
+//! The frames on every level of the pyramid, ready to be warped.
+
+use super::brightness_scale::BrightnessScale;
+use super::data_term::View;
+use super::options::MIN_LEVEL_SIDE;
+use crate::image::{Spline, fill_holes, halve_into, halve_mask};
+use crate::simd::{Level, SimdReal};
+use crate::types::{Frame, Mask};
+use rayon::prelude::*;
+
+/// Samples of a task.
+const CHUNK: usize = 1 << 16;
+
+/// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of
+/// the stencils.
+const HOLE_REACH: usize = 3;
+/// So many of the 49 pixels within that reach are usable where one is used: all but what a straight edge at
+/// that distance takes, or scattered dead pixels.
+const MIN_USABLE_OF_49: usize = 40;
+/// So many of nine; on levels that motion is only handed down from that is all, else small areas between
+/// holes would not be seen there.
+const MIN_USABLE_OF_9: usize = 6;
+
+/// Which frames are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ComparedFrames {
+    /// All of them, warped towards the middle of their times.
+    All,
+    /// A triple's middle frame with the next.
+    Ahead,
+}
+
+/// The frames of one level.
+#[derive(Debug, Default)]
+pub(super) struct PyramidLevel<T> {
+    pub size: (usize, usize),
+    /// One a frame; on levels that are not worked on they are of no frame at all, or of an earlier one.
+    pub splines: Vec<Spline<T>>,
+    /// Pixels whose neighbourhood is usable, one a frame; `None`: all.
+    pub usable: Vec<Option<Mask>>,
+    /// One of the frames, which its next level is made of.
+    picture: Frame<T>,
+}
+
+impl<T: SimdReal> PyramidLevel<T> {
+    /// The two or three frames as the data term sees them.
+    pub fn views(&self, compared: ComparedFrames) -> Vec<View<'_, T>> {
+        let usable = |k: usize| self.usable[k].as_ref();
+        match (self.splines.as_slice(), compared) {
+            ([_, b, c, ..], ComparedFrames::Ahead) => View::ahead([b, c], [usable(1), usable(2)]).to_vec(),
+            ([a, b], _) => View::pair([a, b], [usable(0), usable(1)]).to_vec(),
+            ([a, b, c, ..], _) => View::triple([a, b, c], [usable(0), usable(1), usable(2)]).to_vec(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// The levels of some frames, the finest first; keeps its memory from one filling to the next.
+#[derive(Debug, Default)]
+pub(super) struct Pyramid<T> {
+    levels: Vec<PyramidLevel<T>>,
+    /// Levels in use.
+    count: usize,
+}
+
+impl<T: SimdReal> Pyramid<T> {
+    /// The levels, the finest first.
+    pub fn levels(&self) -> &[PyramidLevel<T>] {
+        &self.levels[..self.count]
+    }
+
+    /// Samples that there is memory for, about.
+    pub fn samples(&self) -> usize {
+        self.levels.iter().map(|level| (1 + level.splines.len()) * level.size.0 * level.size.1).sum()
+    }
+
+    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below
+    /// [`LEAST_SIDE`] px. Returns which is the finest that can be warped: `last`, if there are so many.
+    pub fn fill(
+        &mut self,
+        simd: Level,
+        frames: &[&Frame<T>],
+        brightness: BrightnessScale,
+        mask: Option<&Mask>,
+        (max_levels, finest): (Option<usize>, usize),
+    ) -> usize {
+        let size = frames.first().map_or((0, 0), |frame| frame.size());
+        self.count = count(size, max_levels);
+        let finest = finest.min(self.count - 1);
+        self.levels.resize_with(self.levels.len().max(self.count), PyramidLevel::default);
+        for level in &mut self.levels {
+            level.splines.resize_with(frames.len(), Spline::default);
+            level.usable.clear();
+        }
+        // One frame after the other, so that there is one picture of each level at a time.
+        for (n, frame) in frames.iter().enumerate() {
+            let mut mask = holes(frame, brightness, mask);
+            for k in 0..self.count {
+                let (before, rest) = self.levels.split_at_mut(k);
+                let level = &mut rest[0];
+                if let Some(finer) = before.last() {
+                    halve_into(simd, &finer.picture, &mut level.picture);
+                    mask = mask.as_ref().map(halve_mask);
+                } else {
+                    scale(frame, brightness, &mut level.picture);
+                    if mask.is_some() {
+                        level.picture = fill_holes(&level.picture, mask.as_ref()).into_owned();
+                    }
+                }
+                level.size = level.picture.size();
+                level.usable.push(mask.as_ref().map(|mask| usable_around(mask, k > finest)));
+                if k >= finest {
+                    level.splines[n].refill(simd, &level.picture);
+                }
+            }
+        }
+        // The largest is a whole plane, and of no more use.
+        if let Some(finest) = self.levels.first_mut() {
+            finest.picture = Frame::default();
+        }
+        finest
+    }
+}
+
+/// Number of levels of frames of `size`.
+fn count(size: (usize, usize), max_levels: Option<usize>) -> usize {
+    let (mut side, mut count) = (size.0.min(size.1), 1);
+    while max_levels.is_none_or(|max_levels| count < max_levels) && side.div_ceil(2) >= MIN_LEVEL_SIDE {
+        (side, count) = (side.div_ceil(2), count + 1);
+    }
+    count
+}
+
+/// Brightness brought to the common range.
+fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Frame<T>) {
+    if to.size() != from.size() {
+        *to = Frame::filled(from.width(), from.height(), T::from_f64(0.0));
+    }
+    let (mean, gain) = (T::from_f64(brightness.mean), T::from_f64(brightness.gain));
+    let bands = to.data_mut().par_chunks_mut(CHUNK).zip(from.data().par_chunks(CHUNK));
+    bands.for_each(|(to, from)| {
+        for (to, &value) in to.iter_mut().zip(from) {
+            *to = (value - mean) * gain;
+        }
+    });
+}
+
+/// The usable pixels, if some are not.
+fn holes<T: SimdReal>(frame: &Frame<T>, brightness: BrightnessScale, mask: Option<&Mask>) -> Option<Mask> {
+    // Without a short circuit within a task, so that the compiler may use lanes.
+    let all_hold = |part: &[T]| part.iter().fold(true, |so_far, value| so_far & brightness.holds(value.to_f64()));
+    if mask.is_none() && frame.data().par_chunks(CHUNK).all(all_hold) {
+        return None;
+    }
+    let usable = Frame::from_fn(frame.width(), frame.height(), |x, y| {
+        brightness.holds(frame.get(x, y).to_f64()) && mask.is_none_or(|mask| mask.get(x, y))
+    });
+    usable.data().contains(&false).then_some(usable)
+}
+
+/// The pixels that so much around them is usable of that what holes were filled with counts little: most of
+/// the three by three and, unless motion is only looked for roughly, most of what the splines and stencils
+/// read.
+fn usable_around(mask: &Mask, is_coarse: bool) -> Mask {
+    let near = usable_counts(mask, 1);
+    if is_coarse {
+        return near.map(|&count| count >= MIN_USABLE_OF_9);
+    }
+    let wide = usable_counts(mask, HOLE_REACH);
+    Frame::from_fn(mask.width(), mask.height(), |x, y| {
+        near.get(x, y) >= MIN_USABLE_OF_9 && wide.get(x, y) >= MIN_USABLE_OF_49
+    })
+}
+
+/// How many pixels of the square that reaches `reach` px from each are usable, the border replicated.
+fn usable_counts(mask: &Mask, reach: usize) -> Frame<usize> {
+    let (width, height) = mask.size();
+    let around = |at: usize, len: usize| (0..=2 * reach).map(move |k| (at + k).saturating_sub(reach).min(len - 1));
+    let along = Frame::from_fn(width, height, |x, y| around(x, width).filter(|&x| mask.get(x, y)).count());
+    Frame::from_fn(width, height, |x, y| around(y, height).map(|y| along.get(x, y)).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pyramid(frames: &[&Frame<f32>], max_levels: Option<usize>) -> Pyramid<f32> {
+        let mut pyramid = Pyramid::default();
+        pyramid.fill(
+            Level::SCALAR,
+            frames,
+            BrightnessScale { mean: 0.0, gain: 1.0, contrast: 1.0 },
+            None,
+            (max_levels, 0),
+        );
+        pyramid
+    }
+
+    #[test]
+    fn levels_halve_down_to_the_least_side() {
+        let frame = Frame::<f32>::from_fn(100, 50, |x, y| ((x * y) as f32).sin());
+        let sizes =
+            |max_levels| pyramid(&[&frame, &frame], max_levels).levels().iter().map(|l| l.size).collect::<Vec<_>>();
+        assert_eq!(sizes(None), [(100, 50), (50, 25), (25, 13)]);
+        assert_eq!(sizes(Some(2)), [(100, 50), (50, 25)]);
+        let tiny = Frame::<f32>::filled(3, 3, 1.0);
+        assert_eq!(pyramid(&[&tiny, &tiny], None).levels().len(), 1);
+    }
+
+    #[test]
+    fn holes_reach_as_far_as_the_stencils() {
+        let mut frame = Frame::<f32>::filled(20, 16, 1.0);
+        frame.row_mut(8)[10] = f32::NAN;
+        let pyramid = |frame: &Frame<f32>| pyramid(&[frame], Some(1));
+        let filled = pyramid(&frame);
+        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
+        // A single pixel is filled well enough.
+        assert!(usable.data().iter().all(|usable| *usable));
+        (0..16).for_each(|y| frame.row_mut(y)[..6].fill(f32::NAN));
+        let filled = pyramid(&frame);
+        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
+        assert!(!usable.get(7, 3) && usable.get(8, 3));
+        assert!(pyramid(&Frame::filled(9, 9, 1.0)).levels()[0].usable[0].is_none());
+    }
+}

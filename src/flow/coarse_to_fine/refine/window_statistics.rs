@@ -1,0 +1,82 @@
+//! What the choice of windows rested on, kept for the covariance.
+
+use super::choose::{Choice, Order, Use};
+use super::ladder::{MAX_OCTAVE, difference_variance};
+use super::regional_means::Layout;
+use crate::flow::coarse_to_fine::planes::Planes;
+use crate::simd::SimdReal;
+
+/// SamplingGrid from one place of the evidence to the next.
+pub(in crate::flow::coarse_to_fine) const SPACING: usize = 1 << MAX_OCTAVE;
+
+/// Regional means and weights of windows, at every fourth site.
+#[derive(Debug)]
+pub(in crate::flow::coarse_to_fine) struct WindowStatistics<T> {
+    means: Planes<T>,
+    choice: Planes<T>,
+    order: Order,
+    /// SamplingGrid of the motion along x and y.
+    sites: (usize, usize),
+    /// Standard deviations of the windows, px.
+    pub sigmas: &'static [f64],
+}
+
+impl<T: SimdReal> WindowStatistics<T> {
+    pub(super) fn new(means: Planes<T>, choice: Choice<T>, (sites, sigmas): ((usize, usize), &'static [f64])) -> Self {
+        Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
+    }
+
+    /// What the memory is.
+    pub fn planes_mut(&mut self) -> [&mut Planes<T>; 2] {
+        [&mut self.means, &mut self.choice]
+    }
+
+    /// The memory.
+    pub fn into_planes(self) -> [Planes<T>; 2] {
+        [self.means, self.choice]
+    }
+
+    /// Places along x and y, [`SPACING`] sites apart; the last ones are those of the last sites, however near
+    /// to the ones before.
+    pub fn size(&self) -> (usize, usize) {
+        (places(self.sites.0), places(self.sites.1))
+    }
+
+    /// Regional information `P_uu, P_uv, P_vv`, grey^2/px^2.
+    pub fn information(&self, x: usize, y: usize) -> [f64; 3] {
+        [0, 1, 2].map(|k| at(&self.means, k, x, y))
+    }
+
+    /// Regional residual energy, grey^2.
+    pub fn energy(&self, x: usize, y: usize) -> f64 {
+        at(&self.means, Layout::ENERGY, x, y).powi(4)
+    }
+
+    /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field
+    /// vanishes.
+    pub fn weights(&self, l: usize, x: usize, y: usize) -> [f64; 2] {
+        [Use::Flow, Use::Slopes].map(|of| at(&self.choice, self.order.weight(of, l), x, y))
+    }
+
+    /// Mean standard deviations of the windows of the flow and of the slopes, px.
+    pub fn mean_sigmas(&self, x: usize, y: usize) -> [f64; 2] {
+        let weights = self.sigmas.iter().enumerate().map(|(l, sigma)| self.weights(l, x, y).map(|w| w * sigma));
+        weights.fold([0.0; 2], |sum, w| [sum[0] + w[0], sum[1] + w[1]])
+    }
+
+    /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit
+    /// density: a density, px^4.
+    pub fn change(&self, l: usize, x: usize, y: usize) -> f64 {
+        at(&self.means, Layout::change(l), x, y).powi(4) / difference_variance(self.sigmas[l], self.sigmas[l + 1])
+    }
+}
+
+/// How many places there are along so many sites.
+pub(in crate::flow::coarse_to_fine) fn places(sites: usize) -> usize {
+    (sites - 1).div_ceil(SPACING) + 1
+}
+
+/// At a place; what the grid of regional means does not reach goes on as it ends.
+fn at<T: SimdReal>(planes: &Planes<T>, k: usize, x: usize, y: usize) -> f64 {
+    planes.at(k, x.min(planes.width - 1), y.min(planes.height - 1)).to_f64()
+}

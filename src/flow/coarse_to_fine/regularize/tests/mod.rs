@@ -1,0 +1,209 @@
+mod reference;
+
+use super::*;
+use crate::parallel::Threads;
+use reference::{affine, energy, filled, made, motion_at, naive, rough};
+
+const ROBUST: Smoothness = Smoothness { flow: 20.0, jacobian: 2000.0, break_strain: 0.1, sweeps: 6, reweight_every: 2 };
+const QUADRATIC: Smoothness = Smoothness { break_strain: f64::INFINITY, ..ROBUST };
+/// Couples, and gives the noise that it was done with.
+fn run<T: SimdReal>(level: Level, data: &Planes<T>, motion: &mut Planes<T>, c: &Smoothness) -> f64 {
+    let floor = T::from_f64(0.05);
+    let before = motion.clone();
+    let change = regularize(level, data, motion, c, floor, &mut RegularizeScratch::default());
+    if change < MAX_FLOW_CHANGE / 10.0 {
+        let squares = (0..2).flat_map(|k| (0..motion.height).map(move |y| (k, y))).map(|(k, y)| {
+            let pairs = motion.line(k, y).iter().zip(before.line(k, y));
+            pairs.map(|(now, before)| (now.to_f64() - before.to_f64()).powi(2)).sum::<f64>()
+        });
+        let want = (squares.sum::<f64>() / (motion.width * motion.height) as f64).sqrt();
+        assert!((change - want).abs() <= 1e-4 * want + 1e-6, "{change} {want}");
+    }
+    typical_energy(data, floor, &mut Vec::new()).to_f64()
+}
+
+fn worst<T: SimdReal>(motion: &Planes<T>, want: impl Fn(usize, usize) -> [f64; 6]) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (x, y) in (0..motion.height).flat_map(|y| (0..motion.width).map(move |x| (x, y))) {
+        let (m, want) = (motion_at(motion, x, y), want(x, y));
+        assert!(m.iter().all(|v| v.is_finite()));
+        worst = (0..6).map(|k| (m[k] - want[k]).abs()).fold(worst, f64::max);
+    }
+    worst
+}
+
+fn agrees<T: SimdReal>(tolerance: f64) {
+    let some = |x, y| ((x * 7 + y * 3) % 5 != 0).then(|| rough(x, y));
+    for (w, h) in [(1, 1), (2, 1), (1, 2), (5, 3), (33, 17), (150, 7)] {
+        for c in [
+            ROBUST,
+            QUADRATIC,
+            Smoothness { sweeps: 1, ..ROBUST },
+            Smoothness { sweeps: 5, reweight_every: 3, flow: 5.0, ..ROBUST },
+        ] {
+            let data = made::<T>(w, h, some);
+            let start = filled::<T>(w, h, |x, y| rough(x + 300, y));
+            for level in Level::available() {
+                let mut motion = start.clone();
+                let noise = run(level, &data, &mut motion, &c);
+                let want = naive(&data, &start, &c, noise);
+                let off = worst(&motion, |x, y| want[y * w + x]);
+                assert!(off < tolerance, "{w} x {h}, {level:?}, {c:?}: {off}");
+            }
+        }
+    }
+}
+
+#[test]
+fn visits_do_what_the_definition_says() {
+    agrees::<f64>(1e-9);
+}
+
+#[test]
+fn visits_in_single_precision_do_so_roughly() {
+    agrees::<f32>(2e-3);
+}
+
+#[test]
+fn noise_is_the_median_energy_of_the_sites_with_data() {
+    let mut data = made::<f64>(5, 3, |x, y| Some(affine(x, y)));
+    for (i, value) in [3.0, 9.0, 1.0, 4.0, 2.0].into_iter().enumerate() {
+        (0..3).for_each(|y| data.line_mut(ERROR, y)[i] = value);
+    }
+    (0..3).for_each(|y| data.line_mut(VALID, y)[1] = 0.0);
+    let noise = |data: &Planes<f64>, floor| typical_energy(data, floor, &mut Vec::new());
+    assert_eq!((noise(&data, 0.5), noise(&data, 7.0)), (3.0, 7.0));
+    data.data_mut().fill(0.0);
+    assert_eq!(noise(&data, 0.5), 0.5);
+}
+
+#[test]
+fn exact_data_of_an_affine_motion_leave_it_as_it_is() {
+    let data = made::<f64>(33, 17, |x, y| Some(affine(x, y)));
+    for level in Level::available() {
+        let mut motion = filled(33, 17, affine);
+        run(level, &data, &mut motion, &ROBUST);
+        assert!(worst(&motion, affine) < 1e-12);
+    }
+}
+
+#[test]
+fn sites_without_data_take_the_motion_around_them() {
+    let hole = |x: usize, y: usize| (9..12).contains(&x) && y == 8;
+    let data = made::<f64>(33, 17, |x, y| (!hole(x, y)).then(|| affine(x, y)));
+    let mut motion = filled(33, 17, |x, y| if hole(x, y) { [0.0; 6] } else { affine(x, y) });
+    run(Level::detect(), &data, &mut motion, &Smoothness { sweeps: 800, ..QUADRATIC });
+    let off = worst(&motion, affine);
+    assert!(off < 1e-9, "{off}");
+    let alone = |x: usize, y: usize| x == 9 && y == 8;
+    let mut motion = filled(33, 17, |x, y| if alone(x, y) { [0.0; 6] } else { affine(x, y) });
+    let data = made::<f64>(33, 17, |_, _| None);
+    run(Level::detect(), &data, &mut motion, &Smoothness { sweeps: 1, ..QUADRATIC });
+    assert!((0..6).all(|k| (motion_at(&motion, 9, 8)[k] - affine(9, 8)[k]).abs() < 1e-12));
+}
+
+#[test]
+fn what_nothing_binds_stays() {
+    let loose = Smoothness { flow: 0.0, jacobian: 0.0, ..ROBUST };
+    let data = made::<f32>(33, 17, |_, _| None);
+    for c in [loose, ROBUST] {
+        let (w, h) = if c == ROBUST { (1, 1) } else { (33, 17) };
+        let data = if c == ROBUST { made(w, h, |_, _| None) } else { data.clone() };
+        let mut motion = filled(w, h, rough);
+        run(Level::detect(), &data, &mut motion, &c);
+        assert!(worst(&motion, rough) < 1e-6);
+    }
+    assert_eq!(
+        regularize(
+            Level::detect(),
+            &Planes::new(0, 3, 26),
+            &mut Planes::new(0, 3, 6),
+            &ROBUST,
+            1f32,
+            &mut RegularizeScratch::default()
+        ),
+        0.0
+    );
+}
+
+#[test]
+fn quadratic_energy_falls_with_every_sweep() {
+    let data = made::<f64>(33, 17, |x, y| ((x + y) % 3 != 0).then(|| affine(x, y)));
+    // Within the limit of the flow's change, which is no part of the descent.
+    let near = |x, y| std::array::from_fn(|k| affine(x, y)[k] + 0.2 * rough(x, y)[k]);
+    let mut last = f64::INFINITY;
+    for sweeps in 0..12 {
+        let mut motion = filled(33, 17, near);
+        let c = Smoothness { sweeps, ..QUADRATIC };
+        let noise = run(Level::detect(), &data, &mut motion, &c);
+        let now = energy(&data, &motion, &c, noise);
+        assert!(now < last, "{sweeps}: {now} after {last}");
+        last = now;
+    }
+}
+
+#[test]
+fn motions_that_meet_at_an_edge_stay_apart() {
+    let sides = |x: usize, _| [if x < 16 { 1.0 } else { -1.0 }, 0.0, 0.0, 0.0, 0.0, 0.0];
+    // One direction of the texture only, and weak: the bonds decide.
+    let mut data = made::<f64>(33, 17, |x, y| Some(sides(x, y)));
+    data.data_mut().iter_mut().for_each(|v| *v *= 0.05);
+    let blur = |c: &Smoothness| {
+        let mut motion = filled(33, 17, sides);
+        run(Level::detect(), &data, &mut motion, c);
+        worst(&motion, sides)
+    };
+    let (robust, quadratic) = (blur(&ROBUST), blur(&QUADRATIC));
+    assert!(robust < 0.05 && quadratic > 0.3, "{robust} {quadratic}");
+}
+
+#[test]
+fn flow_changes_by_no_more_than_its_limit() {
+    let data = made::<f64>(33, 17, |_, _| Some([3.0, -4.0, 0.0, 0.0, 0.0, 0.0]));
+    let mut motion = filled(33, 17, |_, _| [0.0; 6]);
+    run(Level::detect(), &data, &mut motion, &ROBUST);
+    let lengths = (0..33 * 17).map(|i| motion.at(0, i % 33, i / 33).hypot(motion.at(1, i % 33, i / 33)));
+    let (least, most) = lengths.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), x| (a.min(x), b.max(x)));
+    assert!(most < MAX_FLOW_CHANGE + 1e-12 && least > 0.99 * MAX_FLOW_CHANGE, "{least} to {most}");
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let data = made::<f32>(70, 100, |x, y| ((x * 7 + y * 3) % 5 != 0).then(|| rough(x, y)));
+    for c in [ROBUST, Smoothness { sweeps: 1, ..ROBUST }, Smoothness { sweeps: 9, ..ROBUST }] {
+        let of = |threads: usize| {
+            let mut motion = filled::<f32>(70, 100, rough);
+            Threads::new(Some(threads)).unwrap().install(|| run(Level::detect(), &data, &mut motion, &c));
+            (0..100)
+                .flat_map(|y| (0..6).flat_map(|k| motion.line(k, y).to_vec()).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        };
+        let one = of(1);
+        assert!([2, 3, 4].iter().all(|&threads| of(threads) == one));
+    }
+}
+
+/// `cargo test --release --lib couple::tests::speed -- --ignored --nocapture`
+#[test]
+#[ignore = "measures"]
+#[allow(clippy::print_stdout)]
+fn speed() {
+    for (w, h) in [(320, 240), (960, 540)] {
+        let data = made::<f32>(w, h, |x, y| Some(rough(x, y)));
+        let start = filled::<f32>(w, h, |x, y| rough(x + 300, y));
+        for (level, threads) in Level::available().into_iter().map(|l| (l, 1)).chain([(Level::detect(), 2)]) {
+            let mut scratch = RegularizeScratch::default();
+            let mut times = Vec::new();
+            Threads::new(Some(threads)).unwrap().install(|| {
+                for _ in 0..if level == Level::SCALAR { 3 } else { 20 } {
+                    let mut motion = start.clone();
+                    let begin = std::time::Instant::now();
+                    regularize(level, &data, &mut motion, &ROBUST, 0.05, &mut scratch);
+                    times.push(begin.elapsed().as_secs_f64());
+                }
+            });
+            let best = times.into_iter().fold(f64::INFINITY, f64::min) * 1e9 / (w * h * ROBUST.sweeps) as f64;
+            println!("{w} x {h}, {}, {threads} thread(s): {best:.2} ns a site and sweep", level.name());
+        }
+    }
+}

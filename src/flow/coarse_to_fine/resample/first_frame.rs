@@ -1,0 +1,229 @@
+//! A pair's motion, found midway between the frames, told at the pixels of the first.
+
+use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::plane_pool::PlanePool;
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::math::Real;
+use crate::parallel::for_each_band;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use std::ops::Range;
+
+/// Distance of the sites, px.
+const SITE_SPACING: f64 = 2.0;
+/// Most lanes of a vector.
+const MAX_LANES: usize = 16;
+/// Least determinant of `I - M / 2`: below it, the motion folds the image.
+const MIN_DETERMINANT: f64 = 0.1;
+
+/// The motion of the pixels of the first frame, from that of the places half way to the second.
+///
+/// The pixel `p` goes by `u_1(p) = u(p + u_1(p) / 2)`: its match lies half its own way off. The implicit
+/// equation is started from the affine model about `p` and iterated once; its derivative is `M_1 = (I - M /
+/// 2)^-1 M`, `M` at the place midway.
+pub(in crate::flow::coarse_to_fine) fn at_first_frame<T: SimdReal>(
+    simd: Level,
+    space: &PlanePool<T>,
+    motion: &Planes<T>,
+) -> Planes<T> {
+    let mut out = space.planes(motion.width, motion.height, MOTION);
+    if motion.width == 0 || motion.height == 0 {
+        return out;
+    }
+    let (stride, len) = (out.stride(), out.row_len());
+    let columns: Vec<T> = (0..motion.padded()).map(|x| T::from_f64(SITE_SPACING * x as f64)).collect();
+    for_each_band(out.data_mut(), len, |_, rows, out| {
+        dispatch(simd, ToFirstFrame { motion, columns: &columns, rows, out, stride });
+    });
+    out
+}
+
+/// Some rows of it.
+struct ToFirstFrame<'a, T> {
+    motion: &'a Planes<T>,
+    /// Columns of the sites, px.
+    columns: &'a [T],
+    rows: Range<usize>,
+    out: &'a mut [T],
+    stride: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for ToFirstFrame<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { motion, columns, rows, out, stride } = self;
+        for (y, out) in rows.zip(out.chunks_exact_mut(MOTION * stride)) {
+            let row = motion.row(y);
+            for i in (0..columns.len()).step_by(V::LANES) {
+                let mut m = [V::zero(); MOTION];
+                for (k, m) in m.iter_mut().enumerate() {
+                    *m = V::load(&row[k * stride + LEFT + i..]);
+                }
+                let [du, dv] = solve(&m, [m[0], m[1]]);
+                let half = V::constant(0.5);
+                let x = du.mul_add(half, V::load(&columns[i..]));
+                let y = dv.mul_add(half, V::constant(SITE_SPACING * y as f64));
+                let m = blend(motion, x, y);
+                let ([u_x, v_x], [u_y, v_y]) = (solve(&m, [m[2], m[3]]), solve(&m, [m[4], m[5]]));
+                for (k, value) in [m[0], m[1], u_x, v_x, u_y, v_y].into_iter().enumerate() {
+                    value.store(&mut out[k * stride + LEFT + i..]);
+                }
+            }
+        }
+    }
+}
+
+/// `(I - M / 2)^-1 b`, unless the motion folds the image.
+#[inline(always)]
+fn solve<V: Lanes>(motion: &[V; MOTION], [a, b]: [V; 2]) -> [V; 2] {
+    let [_, _, u_x, v_x, u_y, v_y] = *motion;
+    let (half, one) = (V::constant(0.5), V::constant(1.0));
+    let (p, q) = (u_x.neg_mul_add(half, one), -(u_y * half));
+    let (r, s) = (-(v_x * half), v_y.neg_mul_add(half, one));
+    let determinant = q.neg_mul_add(r, p * s);
+    let open = V::constant(MIN_DETERMINANT).lt(determinant);
+    let inverse = one / determinant;
+    let x = q.neg_mul_add(b, s * a) * inverse;
+    let y = r.neg_mul_add(a, p * b) * inverse;
+    [V::select(open, x, a), V::select(open, y, b)]
+}
+
+/// Where a coordinate lies among `count` sites: the site before it, the lever of that site's slope (px), and
+/// the next site's share. Beyond the last site its own model goes on.
+#[inline(always)]
+fn split<V: Lanes>(at: V, count: usize) -> (V, V, V) {
+    let site = (at * V::constant(1.0 / SITE_SPACING)).max(V::zero()).min(V::constant(count as f64 - 1.0));
+    let first = site.floor().min(V::constant(count.saturating_sub(2) as f64));
+    let (share, beyond) = (site - first, site.neg_mul_add(V::constant(SITE_SPACING), at));
+    (first, share.mul_add(V::constant(0.5 * SITE_SPACING), beyond), share)
+}
+
+/// As [`motion_at`](super::motion_at), a place a lane.
+#[inline(always)]
+fn blend<V: Lanes>(motion: &Planes<V::Scalar>, x: V, y: V) -> [V; MOTION] {
+    let (column, dx, share_x) = split(x, motion.width);
+    let (row, dy, share_y) = split(y, motion.height);
+    let (stride, len) = (motion.stride(), motion.row_len());
+    let starts = starts(column, row, len);
+    // A single row or column has no other; its share is zero.
+    let below = if motion.height > 1 { len } else { 0 };
+    let (one, half) = (V::constant(1.0), V::constant(0.5 * SITE_SPACING));
+    let mut sum = [V::zero(); MOTION];
+    for corner in 0..4 {
+        let (right, down) = (corner % 2, corner / 2);
+        let mut m = [V::zero(); MOTION];
+        for (k, m) in m.iter_mut().enumerate() {
+            *m = gather(motion.data(), &starts, k * stride + LEFT + right + down * below);
+        }
+        let (dx, weight_x) = if right == 0 { (dx, one - share_x) } else { (dx - half, share_x) };
+        let (dy, weight_y) = if down == 0 { (dy, one - share_y) } else { (dy - half, share_y) };
+        let weight = weight_x * weight_y;
+        m[0] = m[2].mul_add(dx, m[4].mul_add(dy, m[0]));
+        m[1] = m[3].mul_add(dx, m[5].mul_add(dy, m[1]));
+        for k in 0..MOTION {
+            sum[k] = m[k].mul_add(weight, sum[k]);
+        }
+    }
+    sum
+}
+
+/// Index of the first sample of each lane's site.
+#[inline(always)]
+fn starts<V: Lanes>(column: V, row: V, len: usize) -> [usize; MAX_LANES] {
+    let zero = V::Scalar::from_f64(0.0);
+    let (mut columns, mut rows) = ([zero; MAX_LANES], [zero; MAX_LANES]);
+    column.store(&mut columns);
+    row.store(&mut rows);
+    let mut starts = [0; MAX_LANES];
+    for l in 0..V::LANES {
+        starts[l] = rows[l].to_f64() as usize * len + columns[l].to_f64() as usize;
+    }
+    starts
+}
+
+/// The samples `offset` after each lane's start.
+#[inline(always)]
+fn gather<V: Lanes>(data: &[V::Scalar], starts: &[usize; MAX_LANES], offset: usize) -> V {
+    let mut values = [V::Scalar::from_f64(0.0); MAX_LANES];
+    for l in 0..V::LANES {
+        values[l] = data[starts[l] + offset];
+    }
+    V::load(&values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::coarse_to_fine::resample::motion_at;
+
+    /// The rest of `(I - M / 2)^-1 b`, in single places.
+    fn solved(m: &[f64; MOTION], b: [f64; 2]) -> [f64; 2] {
+        solve::<f64>(m, b)
+    }
+
+    #[test]
+    fn affine_motion_of_the_first_frame_is_exact() {
+        // x_2 = x_1 + d + D x_1; midway x = x_1 + (d + D x_1) / 2 moves by the same d + D x_1.
+        let (d, jacobian) = ([0.8, -0.5], [[0.04, -0.02], [0.03, 0.01]]);
+        let inverse = |x: f64, y: f64| {
+            // x_1 from the place midway.
+            let (p, q) = (1.0 + 0.5 * jacobian[0][0], 0.5 * jacobian[0][1]);
+            let (r, s) = (0.5 * jacobian[1][0], 1.0 + 0.5 * jacobian[1][1]);
+            let (a, b) = (x - 0.5 * d[0], y - 0.5 * d[1]);
+            let det = p * s - q * r;
+            ((s * a - q * b) / det, (p * b - r * a) / det)
+        };
+        let flow = |x: f64, y: f64| {
+            let (x, y) = inverse(x, y);
+            (d[0] + jacobian[0][0] * x + jacobian[0][1] * y, d[1] + jacobian[1][0] * x + jacobian[1][1] * y)
+        };
+        let mut motion = Planes::<f64>::new(12, 9, MOTION);
+        for y in 0..9 {
+            for x in 0..12 {
+                let (px, py) = (2.0 * x as f64, 2.0 * y as f64);
+                let (here, right, below) = (flow(px, py), flow(px + 1.0, py), flow(px, py + 1.0));
+                let m = [here.0, here.1, right.0 - here.0, right.1 - here.1, below.0 - here.0, below.1 - here.1];
+                (0..MOTION).for_each(|k| motion.line_mut(k, y)[x] = m[k]);
+            }
+        }
+        let got = at_first_frame(Level::detect(), &PlanePool::default(), &motion);
+        for y in 0..9 {
+            for x in 0..12 {
+                let (px, py) = (2.0 * x as f64, 2.0 * y as f64);
+                let u = d[0] + jacobian[0][0] * px + jacobian[0][1] * py;
+                let v = d[1] + jacobian[1][0] * px + jacobian[1][1] * py;
+                let want = [u, v, jacobian[0][0], jacobian[1][0], jacobian[0][1], jacobian[1][1]];
+                (0..MOTION).for_each(|k| assert!((got.at(k, x, y) - want[k]).abs() < 1e-12, "{k} {x} {y}"));
+            }
+        }
+    }
+
+    #[test]
+    fn any_motion_is_read_where_its_pixel_is_midway() {
+        for (width, height) in [(1, 1), (1, 4), (5, 1), (21, 13)] {
+            let mut motion = Planes::<f64>::new(width, height, MOTION);
+            for k in 0..MOTION {
+                for y in 0..height {
+                    for x in 0..width {
+                        let wave = (1.3 * k as f64 + 0.4 * x as f64 - 0.7 * y as f64).sin();
+                        motion.line_mut(k, y)[x] = if k < 2 { 7.0 * wave } else { 0.1 * wave };
+                    }
+                }
+            }
+            for level in Level::available() {
+                let got = at_first_frame(level, &PlanePool::default(), &motion);
+                for y in 0..height {
+                    for x in 0..width {
+                        let (px, py) = (2.0 * x as f64, 2.0 * y as f64);
+                        let start: [f64; MOTION] = std::array::from_fn(|k| motion.at(k, x, y));
+                        let [u, v] = solved(&start, [start[0], start[1]]);
+                        let m = motion_at(&motion, 2.0, px + 0.5 * u, py + 0.5 * v);
+                        let ([a, b], [c, d]) = (solved(&m, [m[2], m[3]]), solved(&m, [m[4], m[5]]));
+                        let want = [m[0], m[1], a, b, c, d];
+                        (0..MOTION).for_each(|k| assert!((got.at(k, x, y) - want[k]).abs() < 1e-11, "{k} {x} {y}"));
+                    }
+                }
+            }
+        }
+    }
+}

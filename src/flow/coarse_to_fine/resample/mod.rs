@@ -1,0 +1,230 @@
+//! Motion between the sites, and on the sites of the next finer level.
+
+pub(super) mod first_frame;
+pub(super) mod rows;
+
+use super::data_term::MOTION;
+use super::planes::{LEFT, Planes};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use rayon::prelude::*;
+use rows::RowReader;
+
+/// Rows of one task.
+const ROWS: usize = 32;
+
+/// The affine motions of the sites around a place, each carried there with half its lever, blended by their
+/// distance: exact where slopes turn evenly.
+///
+/// `(x, y)`: in px of the level whose sites are `step` px apart; beyond the last site its own model goes on.
+pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
+    let split = |at: f64, count: usize| {
+        let site = (at / step).clamp(0.0, (count - 1) as f64);
+        let first = (site as usize).min(count.saturating_sub(2));
+        let share = site - first as f64;
+        (first, share, 0.5 * share * step + (at - site * step))
+    };
+    let ((i, fx, lever_x), (j, fy, lever_y)) = (split(x, motion.width), split(y, motion.height));
+    let stride = motion.stride();
+    let mut blend = [0.0; MOTION];
+    for (row, weight_y, dy) in [(j, 1.0 - fy, lever_y), (j + 1, fy, lever_y - 0.5 * step)] {
+        if weight_y == 0.0 {
+            continue;
+        }
+        let values = &motion.row(row)[LEFT..];
+        for (column, weight_x, dx) in [(i, 1.0 - fx, lever_x), (i + 1, fx, lever_x - 0.5 * step)] {
+            let m: [f64; MOTION] = std::array::from_fn(|k| values[k * stride + column].to_f64());
+            let weight = weight_x * weight_y;
+            blend[0] += weight * (m[0] + m[2] * dx + m[4] * dy);
+            blend[1] += weight * (m[1] + m[3] * dx + m[5] * dy);
+            for k in 2..MOTION {
+                blend[k] += weight * m[k];
+            }
+        }
+    }
+    blend
+}
+
+/// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles,
+/// the Jacobian stays.
+///
+/// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
+pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
+    fine.reshape(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
+    let (width, stride, len) = (fine.width, fine.stride(), fine.row_len().max(1));
+    fine.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, out)| {
+        dispatch(simd, Finer { coarse, first: task * ROWS, out, len, stride, width });
+    });
+}
+
+/// Some rows of [`finer`].
+struct Finer<'a, T> {
+    coarse: &'a Planes<T>,
+    first: usize,
+    out: &'a mut [T],
+    len: usize,
+    stride: usize,
+    width: usize,
+}
+
+impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { coarse, first, out, len, stride, width } = self;
+        let two = T::from_f64(2.0);
+        let mut reader = RowReader::new(width);
+        for (y, row) in (first..).zip(out.chunks_mut(len)) {
+            reader.read_motion(coarse, y);
+            for k in 0..MOTION {
+                let target = &mut row[k * stride + LEFT..][..width];
+                target.copy_from_slice(reader.plane(k));
+                if k < 2 {
+                    for value in target {
+                        *value *= two;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The motion on the `size` sites of the level half as fine: that of every second site, flow halved. The
+/// inverse of [`finer`].
+pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coarse: &mut Planes<T>) {
+    coarse.reshape(size.0, size.1, MOTION);
+    for (k, y) in (0..MOTION).flat_map(|k| (0..size.1).map(move |y| (k, y))) {
+        let factor = T::from_f64(if k < 2 { 0.5 } else { 1.0 });
+        let sites = fine.line(k, 2 * y).iter().step_by(2);
+        coarse.line_mut(k, y).iter_mut().zip(sites).for_each(|(to, from)| *to = factor * *from);
+    }
+}
+
+/// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference
+/// over two pixels of the blend of the sites' affine models. SamplingGrid of the rim keep theirs across it.
+///
+/// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the
+/// Jacobian catch up.
+pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
+    out.reshape(old.width, old.height, old.count);
+    let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
+    out.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
+        for (y, row) in (task * ROWS..).zip(rows.chunks_mut(len)) {
+            row[..2 * stride].copy_from_slice(&old.row(y)[..2 * stride]);
+            for k in 0..2 {
+                let along_x = &mut row[(2 + k) * stride + LEFT..][..width];
+                slopes_along(old.line(k, y), old.line(2 + k, y), along_x);
+                let along_y = &mut row[(4 + k) * stride + LEFT..][..width];
+                if y > 0 && y + 1 < old.height {
+                    slopes_across([y - 1, y, y + 1].map(|y| (old.line(k, y), old.line(4 + k, y))), along_y);
+                } else {
+                    along_y.copy_from_slice(old.line(4 + k, y));
+                }
+            }
+        }
+    });
+}
+
+/// Slopes between the sites of a row, of which the first and the last keep what they have.
+fn slopes_along<T: SimdReal>(flow: &[T], slope: &[T], out: &mut [T]) {
+    for end in [0, out.len() - 1] {
+        out[end] = slope[end];
+    }
+    let inner = out.len().saturating_sub(2);
+    let (before, here, after) = (&slope[..inner], &slope[1.min(slope.len())..], &slope[2.min(slope.len())..]);
+    let quarter = T::from_f64(0.25);
+    for (x, out) in out.iter_mut().skip(1).take(inner).enumerate() {
+        *out = quarter * ((flow[x + 2] - flow[x]) + (here[x] - before[x]) + (here[x] - after[x]));
+    }
+}
+
+/// Slopes at the sites of a row from the flow and the slopes of the rows above, here and below.
+fn slopes_across<T: SimdReal>([above, here, below]: [(&[T], &[T]); 3], out: &mut [T]) {
+    let quarter = T::from_f64(0.25);
+    for (x, out) in out.iter_mut().enumerate() {
+        *out = quarter * ((below.0[x] - above.0[x]) + (here.1[x] - above.1[x]) + (here.1[x] - below.1[x]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An affine motion on the sites of a level `scale` times coarser than the finest.
+    fn affine(width: usize, height: usize, scale: f64) -> Planes<f64> {
+        let m = [1.5, -2.0, 0.02, -0.01, 0.03, 0.015];
+        let mut planes = Planes::new(width, height, MOTION);
+        for y in 0..height {
+            for x in 0..width {
+                let (px, py) = (2.0 * x as f64 * scale, 2.0 * y as f64 * scale);
+                let here = [
+                    (m[0] + m[2] * px + m[4] * py) / scale,
+                    (m[1] + m[3] * px + m[5] * py) / scale,
+                    m[2],
+                    m[3],
+                    m[4],
+                    m[5],
+                ];
+                for (k, value) in here.into_iter().enumerate() {
+                    planes.line_mut(k, y)[x] = value;
+                }
+            }
+        }
+        planes
+    }
+
+    #[test]
+    fn affine_motion_survives_refinement_and_reading() {
+        let (coarse, want) = (affine(7, 5, 2.0), affine(13, 9, 1.0));
+        let mut fine = Planes::default();
+        finer(Level::detect(), &coarse, (26, 18), &mut fine);
+        assert_eq!((fine.width, fine.height), (13, 9));
+        for k in 0..MOTION {
+            for y in 0..9 {
+                for x in 0..13 {
+                    assert!((fine.at(k, x, y) - want.at(k, x, y)).abs() < 1e-12);
+                }
+            }
+        }
+        let mut back = Planes::default();
+        coarser(&fine, (7, 5), &mut back);
+        assert!((0..MOTION).all(|k| (0..5).all(|y| back.line(k, y) == coarse.line(k, y))));
+        let m = motion_at(&want, 2.0, 26.5, 3.25);
+        assert!((m[0] - (1.5 + 0.02 * 26.5 + 0.03 * 3.25)).abs() < 1e-12 && (m[3] + 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_flow_between_sites() {
+        let mut motion = affine(9, 7, 1.0);
+        let want = motion.clone();
+        for y in 0..7 {
+            for x in 0..9 {
+                // A Jacobian that lags behind by the same amount everywhere leaves no trace.
+                for k in 2..MOTION {
+                    motion.line_mut(k, y)[x] += 0.5;
+                }
+            }
+        }
+        let mut out = Planes::default();
+        rederive(&motion, &mut out);
+        for k in 0..MOTION {
+            for y in 1..6 {
+                for x in 1..8 {
+                    assert!((out.at(k, x, y) - want.at(k, x, y)).abs() < 1e-12, "plane {k} at ({x}, {y})");
+                }
+            }
+        }
+        assert_eq!(out.at(2, 0, 3), motion.at(2, 0, 3));
+        let one = affine(1, 1, 1.0);
+        rederive(&one, &mut out);
+        assert_eq!(out.at(3, 0, 0), one.at(3, 0, 0));
+    }
+
+    #[test]
+    fn a_single_site_speaks_for_everything() {
+        let one = affine(1, 1, 1.0);
+        assert!((motion_at(&one, 2.0, 1.0, 1.0)[0] - 1.55).abs() < 1e-12);
+        let mut fine = Planes::default();
+        finer(Level::detect(), &one, (2, 1), &mut fine);
+        assert_eq!(fine.width, 1);
+    }
+}
