@@ -129,7 +129,7 @@ impl Lattice {
         Some(sum)
     }
 
-    /// The slope of bilinear flow in a cell; along an axis with one site only, zero. SamplingGrid without a
+    /// The slope of bilinear flow in a cell; along an axis with one site only, zero. Sites without a
     /// weight for the flow itself count only where they are valid.
     fn slope<T: Real>(
         &self,

@@ -7,7 +7,7 @@ use crate::jet::Reach;
 use crate::simd::SimdReal;
 use crate::types::Status;
 
-/// SamplingGrid that have a filter, and their states: per block of [`BLOCK`] sites, `PLANES` rows of `BLOCK`
+/// Sites that have a filter, and their states: per block of [`BLOCK`] sites, `PLANES` rows of `BLOCK`
 /// numbers. Border and masked sites have none.
 #[derive(Debug, Clone)]
 pub(super) struct Store<T> {

@@ -1,26 +1,25 @@
-//! The range that brightness is brought to.
+//! Scaling of brightness, so that constants hold for 8-bit, 16-bit and floating-point frames alike.
 
 use crate::simd::SimdReal;
 use crate::types::{Frame, Mask};
 
-/// Standard deviation that brightness is scaled to, about that of 8-bit pictures: what is small or large is
-/// then the same for frames of every range.
+/// Standard deviation that brightness is scaled to, grey levels: about that of 8-bit pictures.
 const TARGET_STD: f64 = 40.0;
 
-/// Samples that the range is taken from, about.
+/// Approximate maximum number of samples used.
 const MAX_SAMPLES: usize = 20_000;
-/// Scaled brightness beyond which a sample is no brightness but a mark for missing data.
+/// Maximum scaled brightness; beyond it a sample marks missing data.
 const MAX_SCALED_BRIGHTNESS: f64 = 1e6;
 
-/// Least deviation over what nearly all samples range over: a tenth of that of an even distribution.
+/// Minimum standard deviation over the trimmed extent: a tenth of that of a uniform distribution.
 const MIN_STD_OVER_EXTENT: f64 = 0.03;
-/// Shares of the samples that are left out at either end of that range.
+/// One in so many samples is trimmed at either end of the extent.
 const TRIMMED_FRACTION_DIVISOR: usize = 200;
-/// Deviation over mean that is rounding.
+/// Minimum standard deviation over the mean; less is rounding.
 const MIN_STD_OVER_MEAN: f64 = 1e-12;
 
-/// What all but a few of the sorted `values` range over. Marks for missing data, which are the most extreme
-/// value and many times the same, are no values.
+/// Extent of the sorted `values` without the outermost ones. Repeated extreme values mark missing data and do
+/// not count.
 fn trimmed_extent(values: &[f64]) -> f64 {
     let (low, high) = (values[0], values[values.len() - 1]);
     let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };
@@ -34,20 +33,20 @@ fn trimmed_extent(values: &[f64]) -> f64 {
     if inner.is_empty() { 0.0 } else { inner[inner.len() - 1 - cut] - inner[cut] }
 }
 
-/// How brightness is brought to a common range: `(brightness - mean) gain`.
+/// Scaling of brightness: `(brightness - mean) gain`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BrightnessScale {
     pub mean: f64,
-    /// A power of two, so that it rounds nothing; 1 for frames without contrast.
+    /// A power of two, so that scaling does not round; 1 for frames without contrast.
     pub gain: f64,
-    /// Standard deviation of the brightness afterwards.
+    /// Standard deviation of the scaled brightness.
     pub contrast: f64,
 }
 
 impl BrightnessScale {
-    /// That of the frames' finite samples that may be used: of the middle nine tenths of them, since a single
-    /// no-data value may be as large as 1e9; but no less than a share of what nearly all of them range over,
-    /// since pictures may be dark but for a few spots.
+    /// From the finite, unmasked samples of the frames: their middle nine tenths, since a single no-data
+    /// value may be 1e9, but at least a share of the trimmed extent, since pictures may be dark but for a few
+    /// spots.
     pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
         let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
         let mut values: Vec<f64> = Vec::new();
@@ -67,7 +66,7 @@ impl BrightnessScale {
             (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
         };
         let robust = deviation(middle).max(MIN_STD_OVER_EXTENT * trimmed_extent(&values));
-        // A picture with next to nothing in it has nothing else. Rounding is no contrast.
+        // A picture with a single small spot has no other contrast.
         let deviation = Some(robust).filter(|&d| d > 0.0).unwrap_or_else(|| deviation(&values));
         let deviation = if deviation > MIN_STD_OVER_MEAN * mean.abs() { deviation } else { 0.0 };
         let gain = (TARGET_STD / deviation).log2().round().exp2();
@@ -75,7 +74,7 @@ impl BrightnessScale {
         Self { mean, gain, contrast: gain * deviation }
     }
 
-    /// Whether a sample can be brightness at all.
+    /// Whether a sample is brightness and not a mark for missing data.
     pub fn holds(&self, value: f64) -> bool {
         ((value - self.mean) * self.gain).abs() < MAX_SCALED_BRIGHTNESS
     }

@@ -7,37 +7,37 @@ use super::refine::WindowStatistics;
 use super::workspace::Workspace;
 use crate::simd::SimdReal;
 
-/// The motion on the sites of the finest level worked on, and what it rests on.
+/// Motion on the sites of the finest estimated level, and the data behind it.
 #[derive(Debug)]
 pub(super) struct Estimate<T> {
-    /// The level of the pyramid that all lengths are in pixels of.
+    /// Level of the pyramid whose pixels are the unit of all lengths.
     pub level: usize,
     /// `u, v, u_x, v_x, u_y, v_y` on every second pixel: of a pair midway in time, of a triple at the middle
     /// frame.
     pub motion: Planes<T>,
-    /// The summary of the last data term.
+    /// Summary of the last data term.
     pub data: Planes<T>,
-    /// How brightness was scaled.
+    /// Scaling of the brightness.
     pub brightness: BrightnessScale,
-    /// What the windows were chosen by; `None` without sites.
+    /// Statistics by which windows were chosen; `None` without sites.
     pub statistics: Option<WindowStatistics<T>>,
-    /// The same for a triple's change from step to step.
+    /// The same for the difference of a triple's next step from its mean step.
     pub acceleration: Option<WindowStatistics<T>>,
-    /// How the motion was drawn before it was corrected.
+    /// Peak locking before it was removed.
     pub locking: PeakLocking,
-    /// The motion as it was on each coarser level, the finest of them first; none without covariance.
+    /// Motion on each coarser level, the finest first; empty without covariance.
     pub coarser_motions: Vec<Planes<T>>,
 }
 
 impl<T: SimdReal> Estimate<T> {
-    /// All its planes.
+    /// All planes.
     pub fn planes_mut(&mut self) -> impl Iterator<Item = &mut Planes<T>> {
         let statistics =
             self.statistics.iter_mut().chain(&mut self.acceleration).flat_map(WindowStatistics::planes_mut);
         statistics.chain(&mut self.coarser_motions).chain([&mut self.motion, &mut self.data])
     }
 
-    /// Gives back what only covariance and diagnostics rest on.
+    /// Returns the planes that only covariance and diagnostics need.
     pub fn release_statistics(&mut self, workspace: &Workspace<T>) {
         let statistics = self.statistics.take().into_iter().chain(self.acceleration.take());
         let coarser_motions = std::mem::take(&mut self.coarser_motions);
@@ -47,7 +47,7 @@ impl<T: SimdReal> Estimate<T> {
             .for_each(|planes| workspace.space.keep(planes));
     }
 
-    /// Gives its memory back.
+    /// Returns all planes.
     pub fn recycle(mut self, workspace: &Workspace<T>) {
         self.release_statistics(workspace);
         for planes in [self.motion, self.data] {

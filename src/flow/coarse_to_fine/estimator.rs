@@ -1,4 +1,4 @@
-//! From frames to a filled field: the pyramid, the iterations, the results.
+//! Entry point: runs the stages from frames to a filled field.
 
 use super::acceleration::to_middle_frame;
 use super::brightness_scale::BrightnessScale;
@@ -18,7 +18,7 @@ use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
 
-/// The estimator behind the options.
+/// The estimator for checked options.
 #[derive(Debug)]
 pub(in crate::flow) struct CoarseToFine {
     options: CoarseToFineOptions,
@@ -42,7 +42,7 @@ impl CoarseToFine {
         self.options.frames - 2
     }
 
-    /// Fills `field`, in px and frames. `frames`: as many as needed, of one size, oldest first.
+    /// Fills `field`, in px and frames, from `frames_needed` frames of one size, oldest first.
     pub fn estimate_into<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
@@ -66,8 +66,8 @@ impl CoarseToFine {
     }
 }
 
-/// The covariance, if it is wanted. It takes so many planes that of large frames whatever else there is goes
-/// back to the system, before and after.
+/// The covariance, if requested. It needs so many planes that for large frames all other memory is returned
+/// to the system before and after.
 fn covariance_of<T: SimdReal>(
     estimate: &mut Estimate<T>,
     workspace: &mut Workspace<T>,
@@ -90,7 +90,7 @@ fn covariance_of<T: SimdReal>(
     Some(covariance_of)
 }
 
-/// From the filled pyramid to the motion of two frames or three.
+/// Motion of two or three frames from the filled pyramid.
 fn estimate<T: SimdReal>(
     plan: &DescentPlan,
     is_triple: bool,
@@ -102,10 +102,10 @@ fn estimate<T: SimdReal>(
     let (mut motion, mut statistics) =
         refine(simd, &workspace.space, &RefineOptions::default(), &found.motion, &found.data);
     if is_triple {
-        // About the refined motion the residual is noise; about the coupled one it is also what the windows
-        // of the data smooth away.
+        // Linearised about the refined motion, the residual is noise; about the regularised motion it also
+        // contains what the windows of the data term smooth away.
         statistics.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| workspace.space.keep(planes));
-        // The data term and what refinement leaves would be the most memory there ever is.
+        // The data term and the refinement together would be the peak of memory.
         workspace.release_to_system_if_large();
         let mut better = plan.relinearise(workspace, &motion);
         better.coarser_motions = found.coarser_motions;

@@ -1,16 +1,16 @@
-//! What the coarse-to-fine estimator may be told.
+//! Options of the coarse-to-fine estimator.
 
 use crate::error::{Error, Result};
 
-/// How much work an estimate may cost. Errors and times of each are measured by `benchmarks/compare.py`.
+/// Cost against error. `benchmarks` measures errors and times of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Preset {
-    /// The motion at half the resolution, where few iterations cost little; detail of a few px is lost.
+    /// Motion at half the resolution, where few iterations cost little; details of a few px are lost.
     Fast,
-    /// Every level until it settles, three linearisations at most on the finest.
+    /// Every level until it converges, at most three linearisations on the finest.
     #[default]
     Balanced,
-    /// More of everything, for offline work.
+    /// More iterations and smaller tolerances, for offline work.
     Accurate,
 }
 
@@ -44,14 +44,15 @@ impl Preset {
 pub struct CoarseToFineOptions {
     /// Cost against error. Default [`Preset::Balanced`].
     pub preset: Preset,
-    /// Frames of one estimate: 3 (default) or 2. The field tells where the pixels of the middle frame (of the
-    /// first of two) are in the next; a frame before helps as far as motion goes on as it was.
+    /// Frames of one estimate: 3 (default) or 2. The field says where the pixels of the middle frame (of the
+    /// first of two) are in the next frame. A frame before helps if the motion is nearly the same in both
+    /// steps.
     pub frames: usize,
-    /// Whether three frames tell the mean of both steps instead, `(-1, 1) / 2`: the velocity at the middle
-    /// frame, to second order in time where it accelerates. Default: no.
+    /// Whether three frames give the mean of both steps instead, `(-1, 1) / 2`: the velocity at the middle
+    /// frame, to second order in time under acceleration. Default: no.
     pub central: bool,
-    /// Pyramid levels, each half the size of the one before; the motion may be as large as about `2^levels`
-    /// px. `None` (default): as many as the frame allows, down to [`LEAST_SIDE`] px.
+    /// Pyramid levels, each half the size of the one before. Motion may be up to about `2^levels` px. `None`
+    /// (default): all levels of at least [`MIN_LEVEL_SIDE`] px.
     pub levels: Option<usize>,
 }
 
@@ -61,9 +62,9 @@ impl Default for CoarseToFineOptions {
     }
 }
 
-/// Smallest width and height of a pyramid level, px.
+/// Minimum width and height of a pyramid level, px: a smaller one has too few sites to regularise.
 pub const MIN_LEVEL_SIDE: usize = 8;
-/// Most pyramid levels.
+/// Maximum number of pyramid levels: enough for frames of 30,000 px.
 const MAX_LEVELS: usize = 12;
 
 impl CoarseToFineOptions {
@@ -72,11 +73,9 @@ impl CoarseToFineOptions {
         Self { frames: 2, ..Self::default() }
     }
 
-    /// Tells three frames' motion as the time scheme called `name` has it: `forward` to the next frame or
-    /// `central`.
+    /// Sets what three frames estimate: `forward` (the step to the next frame) or `central` (the mean step).
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming `scheme` for another word.
+    /// # Errors [`Error::Argument`] naming `scheme` for another word.
     pub fn set_scheme(&mut self, name: &str) -> Result<()> {
         self.central = match name {
             "forward" => false,
@@ -86,10 +85,9 @@ impl CoarseToFineOptions {
         Ok(())
     }
 
-    /// Refuses values that mean nothing.
+    /// Checks ranges.
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option.
+    /// # Errors [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
         if !(2..=3).contains(&self.frames) {
             return Err(Error::argument("frames", "2 or 3 for a coarse-to-fine estimate", self.frames));

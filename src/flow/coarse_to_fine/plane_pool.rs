@@ -1,20 +1,21 @@
-//! Planes that are used again: fresh memory costs about as much time as the work done in it.
+//! Pool of planes: fresh memory costs about as much time as the work done in it.
 
 use super::planes::Planes;
 use crate::simd::SimdReal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Largest workspace that outlives its estimator, bytes: that of a frame of some 800,000 px.
+/// Maximum size, bytes, of a workspace that is kept after its estimator: that of a frame of 800,000 px.
 pub(super) const MAX_KEPT_BYTES: usize = 64 << 20;
 
-/// Planes that are free at the moment.
+/// Free planes.
 #[derive(Debug, Default)]
 pub(super) struct PlanePool<T> {
     free: Mutex<Vec<Planes<T>>>,
 }
 
 impl<T: SimdReal> PlanePool<T> {
-    /// Planes with any finite content: the smallest free ones with room enough, else the largest, which grow.
+    /// Planes with any finite content: the smallest free ones that are large enough, or the largest,
+    /// enlarged.
     pub fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
         let len = Planes::<T>::len(width, height, count);
         let mut free = lock(&self.free);
@@ -26,27 +27,27 @@ impl<T: SimdReal> PlanePool<T> {
         planes
     }
 
-    /// Takes planes back.
+    /// Returns planes to the pool.
     pub fn keep(&self, planes: Planes<T>) {
         if planes.room() > 0 {
             lock(&self.free).push(planes);
         }
     }
 
-    /// Takes planes back that are most of an estimate's memory: of large frames they are let go of, since
-    /// what comes next needs the memory.
+    /// Returns planes, but frees those of large frames: they are most of an estimate's memory, and later
+    /// stages need it.
     pub fn keep_small(&self, planes: Planes<T>) {
         if planes.room() * size_of::<T>() <= MAX_KEPT_BYTES / 4 {
             self.keep(planes);
         }
     }
 
-    /// Lets go of all free planes.
+    /// Frees all planes of the pool.
     pub fn clear(&self) {
         lock(&self.free).clear();
     }
 
-    /// Samples that are free.
+    /// Free samples.
     pub fn room(&self) -> usize {
         lock(&self.free).iter().map(Planes::room).sum()
     }

@@ -1,16 +1,16 @@
-//! Planes of values on the sites of one pyramid level.
+//! Planes of values on the sites (every second pixel) of one pyramid level.
 
 use crate::simd::SimdReal;
 
-/// Free samples before each row, so that a kernel may read the left neighbour of its first site.
+/// Unused samples before each row, so that a kernel may read the left neighbour of its first site.
 pub(super) const LEFT: usize = 16;
-/// Rows are as long as a multiple of this many samples (plus [`LEFT`]), so that no kernel needs a tail.
+/// Row lengths are multiples of this many samples (plus [`LEFT`]), so that no kernel needs a tail.
 pub(super) const CHUNK: usize = 32;
 
-/// Some planes of `width x height` values. The planes of one row lie together, row after row: kernels walk
-/// along rows and need all planes of a site.
+/// `count` planes of `width x height` values. The planes of one row lie together, row after row, since
+/// kernels walk along rows and need all planes of a site.
 ///
-/// What lies beside the sites of a row ([`LEFT`] before, at least one after) may hold anything finite.
+/// Samples beside the sites of a row ([`LEFT`] before, at least one after) may hold any finite value.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Planes<T> {
     pub width: usize,
@@ -28,35 +28,35 @@ impl<T: SimdReal> Planes<T> {
         planes
     }
 
-    /// Becomes planes of another size, in the same memory if that is large enough. Content: anything finite,
-    /// for whoever writes all sites.
+    /// Changes the size, in the same memory if large enough. The content is any finite value: callers write
+    /// all sites.
     pub fn reshape(&mut self, width: usize, height: usize, count: usize) {
         (self.width, self.height, self.count) = (width, height, count);
         let len = self.row_len() * height;
         if len > self.data.len() {
-            // A new vector instead of a longer one: the content need not be copied.
+            // A new vector instead of a longer one: the content is not copied.
             self.data.clear();
             self.data.resize(len, T::from_f64(0.0));
         }
     }
 
-    /// Lets go of memory beyond the content.
+    /// Frees memory beyond the content.
     pub fn shrink(&mut self) {
         self.data.truncate(self.row_len() * self.height);
         self.data.shrink_to_fit();
     }
 
-    /// Samples that there is memory for.
+    /// Capacity, samples.
     pub fn room(&self) -> usize {
         self.data.len()
     }
 
-    /// SamplingGrid that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
+    /// Sites that a kernel may compute in a row: the width, rounded up to [`CHUNK`].
     pub fn padded(&self) -> usize {
         self.width.div_ceil(CHUNK) * CHUNK
     }
 
-    /// Samples of so many planes together.
+    /// Samples of `count` planes.
     pub fn len(width: usize, height: usize, count: usize) -> usize {
         (width.div_ceil(CHUNK) * CHUNK + 2 * LEFT) * count * height
     }
@@ -82,12 +82,12 @@ impl<T: SimdReal> Planes<T> {
         &mut self.data[y * len..(y + 1) * len]
     }
 
-    /// Everything, row after row.
+    /// All samples, row after row.
     pub fn data(&self) -> &[T] {
         &self.data[..self.row_len() * self.height]
     }
 
-    /// Everything, to be cut into rows of [`Planes::row_len`].
+    /// All samples, to be cut into rows of [`Planes::row_len`].
     pub fn data_mut(&mut self) -> &mut [T] {
         let len = self.row_len() * self.height;
         &mut self.data[..len]

@@ -1,4 +1,4 @@
-//! The frames on every level of the pyramid, ready to be warped.
+//! Frames on every level of the pyramid, ready to be warped.
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::View;
@@ -8,42 +8,42 @@ use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
 use rayon::prelude::*;
 
-/// Samples of a task.
+/// Samples of a parallel task.
 const CHUNK: usize = 1 << 16;
 
-/// How far an unusable sample reaches into the jets of warped frames, px: half the taps of the spline and of
-/// the stencils.
+/// Distance, px, over which an unusable sample affects the jets of warped frames: half the taps of the spline
+/// and of the stencils.
 const HOLE_REACH: usize = 3;
-/// So many of the 49 pixels within that reach are usable where one is used: all but what a straight edge at
-/// that distance takes, or scattered dead pixels.
+/// Minimum usable pixels of the 49 within [`HOLE_REACH`]: a straight edge at that distance, or scattered dead
+/// pixels, are allowed.
 const MIN_USABLE_OF_49: usize = 40;
-/// So many of nine; on levels that motion is only handed down from that is all, else small areas between
-/// holes would not be seen there.
+/// Minimum usable pixels of nine. Levels that only hand motion down have no other condition, since small
+/// areas between holes would be lost there.
 const MIN_USABLE_OF_9: usize = 6;
 
 /// Which frames are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ComparedFrames {
-    /// All of them, warped towards the middle of their times.
+    /// All, warped towards the middle of their times.
     All,
-    /// A triple's middle frame with the next.
+    /// The middle frame of a triple and the next.
     Ahead,
 }
 
-/// The frames of one level.
+/// The frames on one level.
 #[derive(Debug, Default)]
 pub(super) struct PyramidLevel<T> {
     pub size: (usize, usize),
-    /// One a frame; on levels that are not worked on they are of no frame at all, or of an earlier one.
+    /// One a frame; unspecified on levels finer than the finest estimated one.
     pub splines: Vec<Spline<T>>,
-    /// Pixels whose neighbourhood is usable, one a frame; `None`: all.
+    /// Pixels with usable neighbourhoods, one mask a frame; `None`: all.
     pub usable: Vec<Option<Mask>>,
-    /// One of the frames, which its next level is made of.
+    /// The frame from which the next level is made.
     picture: Frame<T>,
 }
 
 impl<T: SimdReal> PyramidLevel<T> {
-    /// The two or three frames as the data term sees them.
+    /// Two or three frames as input of the data term.
     pub fn views(&self, compared: ComparedFrames) -> Vec<View<'_, T>> {
         let usable = |k: usize| self.usable[k].as_ref();
         match (self.splines.as_slice(), compared) {
@@ -55,7 +55,7 @@ impl<T: SimdReal> PyramidLevel<T> {
     }
 }
 
-/// The levels of some frames, the finest first; keeps its memory from one filling to the next.
+/// Levels of the frames, the finest first. Keeps its memory between calls.
 #[derive(Debug, Default)]
 pub(super) struct Pyramid<T> {
     levels: Vec<PyramidLevel<T>>,
@@ -69,13 +69,14 @@ impl<T: SimdReal> Pyramid<T> {
         &self.levels[..self.count]
     }
 
-    /// Samples that there is memory for, about.
+    /// Approximate capacity, samples.
     pub fn samples(&self) -> usize {
         self.levels.iter().map(|level| (1 + level.splines.len()) * level.size.0 * level.size.1).sum()
     }
 
-    /// Takes `frames` (of one size), brought to a common `range`: at most `most` levels, none below
-    /// [`LEAST_SIDE`] px. Returns which is the finest that can be warped: `last`, if there are so many.
+    /// Builds the levels of `frames` (of one size): at most `max_levels`, none below
+    /// [`MIN_LEVEL_SIDE`](super::MIN_LEVEL_SIDE) px. Returns the finest level that can be warped: `finest`,
+    /// or the coarsest there is.
     pub fn fill(
         &mut self,
         simd: Level,
@@ -92,7 +93,7 @@ impl<T: SimdReal> Pyramid<T> {
             level.splines.resize_with(frames.len(), Spline::default);
             level.usable.clear();
         }
-        // One frame after the other, so that there is one picture of each level at a time.
+        // One frame after the other, so that each level holds one picture at a time.
         for (n, frame) in frames.iter().enumerate() {
             let mut mask = holes(frame, brightness, mask);
             for k in 0..self.count {
@@ -114,7 +115,7 @@ impl<T: SimdReal> Pyramid<T> {
                 }
             }
         }
-        // The largest is a whole plane, and of no more use.
+        // The largest picture is a whole plane and no longer needed.
         if let Some(finest) = self.levels.first_mut() {
             finest.picture = Frame::default();
         }
@@ -131,7 +132,7 @@ fn count(size: (usize, usize), max_levels: Option<usize>) -> usize {
     count
 }
 
-/// Brightness brought to the common range.
+/// Scales the brightness.
 fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Frame<T>) {
     if to.size() != from.size() {
         *to = Frame::filled(from.width(), from.height(), T::from_f64(0.0));
@@ -147,7 +148,7 @@ fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Fra
 
 /// The usable pixels, if some are not.
 fn holes<T: SimdReal>(frame: &Frame<T>, brightness: BrightnessScale, mask: Option<&Mask>) -> Option<Mask> {
-    // Without a short circuit within a task, so that the compiler may use lanes.
+    // Without a short circuit within a task, so that the compiler uses lanes.
     let all_hold = |part: &[T]| part.iter().fold(true, |so_far, value| so_far & brightness.holds(value.to_f64()));
     if mask.is_none() && frame.data().par_chunks(CHUNK).all(all_hold) {
         return None;
@@ -158,9 +159,8 @@ fn holes<T: SimdReal>(frame: &Frame<T>, brightness: BrightnessScale, mask: Optio
     usable.data().contains(&false).then_some(usable)
 }
 
-/// The pixels that so much around them is usable of that what holes were filled with counts little: most of
-/// the three by three and, unless motion is only looked for roughly, most of what the splines and stencils
-/// read.
+/// Pixels with enough usable ones around them that the filling of holes counts little: most of the 3 x 3 and,
+/// unless the level is coarse, most of the pixels that splines and stencils read.
 fn usable_around(mask: &Mask, is_coarse: bool) -> Mask {
     let near = usable_counts(mask, 1);
     if is_coarse {
@@ -172,7 +172,7 @@ fn usable_around(mask: &Mask, is_coarse: bool) -> Mask {
     })
 }
 
-/// How many pixels of the square that reaches `reach` px from each are usable, the border replicated.
+/// Number of usable pixels in the square of `reach` px around each, the border replicated.
 fn usable_counts(mask: &Mask, reach: usize) -> Frame<usize> {
     let (width, height) = mask.size();
     let around = |at: usize, len: usize| (0..=2 * reach).map(move |k| (at + k).saturating_sub(reach).min(len - 1));

@@ -3,63 +3,61 @@
 use super::options::Preset;
 use super::regularize::Smoothness;
 
-/// How much is done: linearisations, each followed by coupling.
+/// Iterations, sweeps and tolerances of all levels. One iteration is a linearisation and its regularisation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Schedule {
-    /// The finest level that is worked on, 0 being the frame itself.
+    /// Finest level that is estimated; 0 is the frame itself.
     pub finest_level: usize,
-    /// Most iterations on that level, the next and every coarser one.
+    /// Maximum number of iterations on that level, the next coarser one and every other.
     pub iterations: [usize; 3],
-    /// The same for what a triple's next frame alone says, which begins on the third of these levels.
+    /// The same for the middle and next frame of a triple alone, which begin on the third of these levels.
     pub next_frame_iterations: [usize; 3],
-    /// A level is done when an iteration has changed the flow by no more than this, px of the level (root
-    /// mean square): that level, and every coarser one.
+    /// A level has converged when an iteration changes the flow by at most this, px of the level (root mean
+    /// square): on the finest level, and on the others.
     pub tolerance: [f64; 2],
-    /// After each iteration.
+    /// Smoothness terms and sweeps after each linearisation.
     pub smoothness: Smoothness,
-    /// Sweeps of the coupling on the finest level: they cost a fraction of what a linearisation does, and
-    /// most of what is left after one is theirs to do.
+    /// Relaxation sweeps on the finest level: they cost a fraction of a linearisation and remove most of the
+    /// error that is left after one.
     pub finest_sweeps: usize,
-    /// From so many levels above that one on, bonds are loosened at the end, for small objects to come free;
-    /// `None`: nowhere.
+    /// Number of levels above the finest from which on the unregularised trial is run, so that small objects
+    /// are found; `None`: never.
     pub trial_from: Option<usize>,
-    /// Whether the motion of the level above the finest is refined before it is taken further: what it begins
-    /// with has less noise then, and slopes that wider windows tell. Half the resolution does without: the
-    /// level above it sees too little for windows to be chosen well.
+    /// Whether the motion one level above the finest is refined before it is carried down: it then has less
+    /// noise, and slopes from wider windows. Not at half resolution, where that level has too few sites to
+    /// choose windows.
     pub refines_intermediate: bool,
 }
 
-/// Pixels of a level on which work costs next to nothing.
+/// Maximum size, pixels, of a level whose cost is negligible.
 const SMALL_LEVEL_PIXELS: usize = 2500;
-/// Most iterations there: what coarse levels miss is lost.
+/// Maximum number of iterations on such a level: motion that it misses is not found later.
 const COARSE_ITERATIONS: usize = 20;
-/// Sweeps there.
+/// Relaxation sweeps on such a level.
 const COARSE_SWEEPS: usize = 10;
-/// Bonds there break at this strain, if not at less: neighbours are far from each other, and under a fast
-/// rotation move differently.
+/// Maximum break strain on such a level: neighbours are far apart, and under fast rotation move differently.
 const COARSE_BREAK_STRAIN: f64 = 0.07;
 
-/// When a level is done.
+/// Iterations and tolerance of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LevelSchedule {
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub max_iterations: usize,
-    /// An iteration that changes the flow by no more than this was the last, px of the level (root mean
-    /// square).
+    /// Root-mean-square change of the flow, px of the level, at which iterations end.
     pub tolerance: f64,
-    /// After each iteration.
+    /// Smoothness terms and sweeps after each linearisation.
     pub smoothness: Smoothness,
-    /// Whether sites are tried without their neighbours then.
+    /// Whether the unregularised trial follows.
     pub runs_trial: bool,
-    /// Whether what has been found is refined at last.
+    /// Whether the result is refined before the next finer level.
     pub refines: bool,
 }
 
 impl Schedule {
-    /// What it means for so many frames.
+    /// The schedule of a preset for two or three frames.
     pub fn new(preset: Preset, frames: usize) -> Self {
         let smoothness = Smoothness::default();
-        // Three frames are more exact than two: they are worth another linearisation.
+        // Three frames have less noise than two: another linearisation pays.
         let (finest_tolerance, finest_sweeps) = if frames == 2 { (0.035, 6) } else { (0.023, 4) };
         match preset {
             Preset::Fast => Self {
@@ -95,8 +93,8 @@ impl Schedule {
         }
     }
 
-    /// What is done on level `k` (0 being the frame itself) of `size` pixels; on the coarsest nothing is
-    /// known yet.
+    /// The schedule of level `k` (0: the frame itself) of `size` pixels; on the coarsest nothing is known
+    /// yet.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> LevelSchedule {
         let runs_trial = self.trial_from.is_some_and(|above| k >= self.finest_level + above);
         let refines = self.refines_intermediate && k == self.finest_level + 1;
@@ -119,7 +117,7 @@ impl Schedule {
         LevelSchedule { runs_trial, refines, ..self.up_to(k, max_iterations) }
     }
 
-    /// So many iterations at most on level `k`.
+    /// Level `k` with at most `max_iterations` iterations, without trial and refinement.
     pub fn up_to(&self, k: usize, max_iterations: usize) -> LevelSchedule {
         let [finest, others] = self.tolerance;
         let (tolerance, sweeps) =

@@ -1,5 +1,4 @@
-//! Memory that one estimate leaves for the next: fresh memory costs about as much time as the work done in
-//! it.
+//! Memory that one estimate leaves for the next.
 
 use super::data_term::Pool;
 use super::plane_pool::{MAX_KEPT_BYTES, PlanePool, lock};
@@ -11,7 +10,7 @@ use crate::simd::SimdReal;
 use std::any::Any;
 use std::sync::Mutex;
 
-/// All the memory of one estimate.
+/// All memory of one estimate.
 #[derive(Debug, Default)]
 pub(super) struct Workspace<T> {
     pub pyramid: Pyramid<T>,
@@ -21,25 +20,25 @@ pub(super) struct Workspace<T> {
 }
 
 impl<T: SimdReal> Workspace<T> {
-    /// Whether there is so much memory that results should not need theirs besides.
+    /// Whether there is so much memory that results should not need theirs in addition.
     pub fn is_large(&self) -> bool {
         self.bytes() > MAX_KEPT_BYTES
     }
 
-    /// Lets go of what is free if there is so much memory that it matters more than the time to get it again.
+    /// Frees unused planes of a large workspace.
     pub fn clear_if_large(&self) {
         if self.is_large() {
             self.clear();
         }
     }
 
-    /// Lets go of what is free.
+    /// Frees unused planes.
     pub fn clear(&self) {
         self.space.clear();
     }
 
-    /// Gives what is free back to the system if there is so much memory that it matters more than the time to
-    /// get it again: blocks of other sizes would not fit into it.
+    /// Returns unused planes of a large workspace to the system: later blocks have other sizes and would not
+    /// fit.
     pub fn release_to_system_if_large(&self) {
         if self.is_large() {
             self.clear();
@@ -47,8 +46,8 @@ impl<T: SimdReal> Workspace<T> {
         }
     }
 
-    /// Gives all but what is `needed` back to the system. That takes time, since the next estimate has to ask
-    /// for it again.
+    /// Returns everything but the `needed` planes to the system. The next estimate allocates anew, which
+    /// takes time.
     pub fn release_to_system<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
         *self = Self::default();
         needed.for_each(Planes::shrink);
@@ -60,8 +59,8 @@ impl<T: SimdReal> Workspace<T> {
     }
 }
 
-/// Hands freed memory back to the system. The GNU allocator keeps blocks of up to 32 MiB for later, among
-/// them most of ours, while results are too large to fit in.
+/// Returns freed memory to the system. The GNU allocator keeps blocks of up to 32 MiB, which is most of ours,
+/// while results are too large to fit in them.
 fn release_to_system() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: takes no pointer, and may be called at any time from any thread.
@@ -70,24 +69,24 @@ fn release_to_system() {
     }
 }
 
-/// The workspace of the estimator that was dropped last.
+/// The workspace of the last estimator that was dropped.
 static LAST: PerProcess<Mutex<Option<Box<dyn Any + Send>>>> = PerProcess::new();
 
-/// An estimator's workspaces: as many as it has had calls at a time.
+/// Workspaces of an estimator, one for each concurrent call so far.
 #[derive(Debug, Default)]
 pub(super) struct WorkspaceStore {
     free: Mutex<Vec<Box<dyn Any + Send>>>,
 }
 
 impl WorkspaceStore {
-    /// A workspace, used before if possible.
+    /// A workspace, reused if possible.
     pub fn take<T: SimdReal>(&self) -> Box<Workspace<T>> {
         let own = lock(&self.free).pop();
         let any = own.or_else(|| lock(LAST.get()).take());
         any.and_then(|any| any.downcast().ok()).unwrap_or_default()
     }
 
-    /// Keeps a workspace for later.
+    /// Keeps a workspace for the next call.
     pub fn put_back<T: SimdReal>(&self, workspace: Box<Workspace<T>>) {
         lock(&self.free).push(workspace);
     }

@@ -26,7 +26,7 @@ pub struct Mean {
     /// ([`sharing`](super::sharing())): at least what their scatter shows, and with
     /// [`Aggregate::InverseVariance`] what they claim and do not scatter, which they must have in common.
     pub std: f64,
-    /// SamplingGrid that took part.
+    /// Sites that took part.
     pub count: usize,
 }
 

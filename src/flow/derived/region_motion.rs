@@ -18,7 +18,7 @@ pub struct RegionMotion {
     pub covariance: [[f64; 6]; 6],
     /// The centre in pixels.
     pub centre: (f64, f64),
-    /// SamplingGrid that took part.
+    /// Sites that took part.
     pub count: usize,
     /// SamplingGrid in the region.
     pub sites: usize,

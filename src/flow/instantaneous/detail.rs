@@ -62,7 +62,7 @@ impl<T: SimdReal> RatesRow<&[T]> {
     }
 }
 
-/// SamplingGrid whose covariance is collected before it goes to its planes: these are often a multiple of 4 KiB
+/// Sites whose covariance is collected before it goes to its planes: these are often a multiple of 4 KiB
 /// apart, and a vector written to each in turn would drive the one before it out of the first-level cache.
 const BLOCK: usize = 64;
 /// Values from one entry of the covariance to the next, for the same reason not a power of two.

@@ -18,7 +18,7 @@ use crate::simd::{SimdReal, dispatch};
 use crate::types::{Frame, Mask, Rect, Status};
 use std::ops::Range;
 
-/// SamplingGrid that are looked at together before each on its own.
+/// Sites that are looked at together before each on its own.
 const GROUP: usize = 64;
 
 /// How a grid is walked row by row.

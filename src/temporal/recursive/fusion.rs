@@ -108,7 +108,7 @@ impl<T: SimdReal> RecursiveFusion<T> {
         Ok(())
     }
 
-    /// Takes in the next field and puts the fused motion and covariance in its place. SamplingGrid without an
+    /// Takes in the next field and puts the fused motion and covariance in its place. Sites without an
     /// estimate get the prediction, once there is one.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use crate::flow::windowed::solve::{ENTRIES, factor, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
-/// SamplingGrid of a block.
+/// Sites of a block.
 pub(super) const BLOCK: usize = 16;
 
 /// Normalised innovations squared beyond this start a pixel anew: chi-square with six degrees of freedom, one

@@ -1,9 +1,9 @@
-//! What a triple's step to the next frame differs by from the mean of its two steps.
+//! Acceleration of three frames: from the mean of both steps to the step after the middle frame.
 //!
-//! Half the acceleration. Where the flow is steady, as in most fluids and for a camera that moves through a
-//! scene, that follows from the flow alone ([`steady`]); where things go on as they are, as objects do, it is
-//! nothing. Which of the two the frames show is seen in the frames: one share for all of them. What is left
-//! is measured like motion itself and believed as far as noise does not explain it.
+//! Both steps differ by the acceleration. In steady flow, as in most fluids and for a camera moving through a
+//! scene, it follows from the flow alone ([`steady`]); objects in uniform motion have none. One share for the
+//! whole frame is fitted to the difference of the next step from the mean step. The remaining difference is
+//! refined like motion and accepted where noise does not explain it.
 
 mod steady;
 
@@ -18,19 +18,19 @@ use super::workspace::Workspace;
 use crate::flow::coarse_to_fine::descent::comparison::Comparison;
 use crate::simd::SimdReal;
 
-/// Rounds of reweighing.
+/// Rounds of iterative reweighting.
 const REWEIGHTING_ROUNDS: usize = 4;
 
-/// A flow whose change is steady to this share is steady, and one that lacks this share of it is not steady
-/// at all: the rest is what estimates smooth away.
+/// Share from which on the flow counts as steady; below one minus it, as not steady at all. Estimates smooth
+/// the rest away.
 const STEADY_SHARE: f64 = 0.9;
 
-/// Brings the `motion` of a triple to the pixels of the middle frame; `coupled` is what it was before it was
-/// refined. It becomes the mean of the two steps (`central`) or the step to the next frame, whether or not
-/// things go on as they came. Returns what the windows of the change were chosen by.
+/// Moves the `motion` of a triple to the pixels of the middle frame; `regularized` is the motion before
+/// refinement. The result is the mean of both steps (`central`) or the step to the next frame, also under
+/// acceleration. Returns the statistics by which the windows of the difference were chosen.
 ///
-/// Frames that are warped by equal and opposite motions meet between where things were and will be, which is
-/// where the middle frame has them only if they do not accelerate.
+/// Frames warped by equal and opposite motions meet between the earlier and the later position, which is the
+/// position in the middle frame only without acceleration.
 pub(super) fn to_middle_frame<T: SimdReal>(
     plan: &DescentPlan,
     workspace: &mut Workspace<T>,
@@ -72,8 +72,8 @@ pub(super) fn to_middle_frame<T: SimdReal>(
             space.keep(planes);
         }
         statistics = chosen;
-        // Beside an object that moves, three frames see twice what two see covered; and what stops, starts or
-        // turns back does not go on as it came.
+        // Beside a moving object three frames have twice the occlusions of two; and objects that stop, start
+        // or turn back do not continue their motion.
         workspace.release_to_system_if_large();
         let (own, chosen) = refine(simd, space, &RefineOptions::default(), &next_step_motion, &data);
         chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
@@ -89,7 +89,7 @@ pub(super) fn to_middle_frame<T: SimdReal>(
     statistics
 }
 
-/// What the step `ahead` differs by from the step that is `known`.
+/// Difference of the step `ahead` from the `known` step, extrapolated where windows are incomplete.
 fn difference<T: SimdReal>(
     space: &PlanePool<T>,
     next_step_motion: &Planes<T>,
@@ -103,8 +103,8 @@ fn difference<T: SimdReal>(
     out
 }
 
-/// Half the acceleration of that part of the `motion` which is steady, if the `change` from its mean step to
-/// the next shows any.
+/// Half the acceleration of the steady share of the `motion`, if the `change` from its mean step to the next
+/// contains any.
 fn acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>, change: &Planes<T>) -> Option<Planes<T>> {
     let slow = steady::half_acceleration(space, motion);
     let mut whole = steady::next_step(space, motion, &slow);
@@ -131,12 +131,12 @@ fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     }
 }
 
-/// Where a window lacks more of its pixels than this, at the frame's edge or beside a hole, the difference of
-/// two estimates is one of extrapolations.
+/// Minimum usable share of a window: below it, at the frame's edge or beside a hole, both estimates are
+/// extrapolated, and so is their difference.
 const MIN_WINDOW_SHARE: f64 = 0.95;
 
-/// Gives the sites whose windows are not whole the flow of the nearest in their row and in their column whose
-/// are, by their nearness; in corners without such that of the nearest in the nearest row.
+/// Gives sites with incomplete windows the flow of the nearest complete ones in their row and column,
+/// weighted by nearness; in corners without any, that of the nearest in the nearest row.
 fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
     let (width, height) = (data.width, data.height);
     let is_complete = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= MIN_WINDOW_SHARE;
@@ -162,15 +162,15 @@ fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
     }
 }
 
-/// The nearest of some numbers that ascend.
+/// The nearest of some ascending numbers.
 fn nearest(numbers: &[usize], to: usize) -> usize {
     let after = numbers.partition_point(|&n| n < to).min(numbers.len() - 1);
     let (before, after) = (numbers[after.saturating_sub(1)], numbers[after]);
     if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
 }
 
-/// How much of the `steady` change is in the `change`, 0 to 1: a line through nothing, fitted with weights
-/// that fall where the rest is larger than usual (Cauchy's).
+/// Share of the `steady` change in the `change`, 0 to 1: a line through the origin, fitted with Cauchy's
+/// weights.
 fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     let (mut share, mut typical) = (0.0, f64::INFINITY);
     for _ in 0..REWEIGHTING_ROUNDS {

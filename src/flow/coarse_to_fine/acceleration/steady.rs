@@ -1,4 +1,4 @@
-//! Steady flow: how things accelerate that pass through a field of velocities which stays as it is.
+//! Acceleration in steady flow, whose velocity field is constant in time.
 
 use super::PITCH;
 use crate::flow::coarse_to_fine::data_term::MOTION;
@@ -8,9 +8,9 @@ use crate::flow::coarse_to_fine::resample::motion_at;
 use crate::parallel::for_each_band;
 use crate::simd::SimdReal;
 
-/// Most rounds of [`settled`]; each leaves a small part of the error of the one before.
+/// Maximum rounds of [`refine_acceleration`]; each leaves a small part of the error before.
 const MAX_ROUNDS: usize = 3;
-/// Root-mean-square change of a round that was the last, px.
+/// Root-mean-square change, px, at which rounds end.
 const ROUND_TOLERANCE: f64 = 0.004;
 
 /// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with its derivatives by differences of
@@ -31,13 +31,12 @@ pub(super) fn half_acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Plan
     out
 }
 
-/// The same for flow of any speed, from that of slow flow and the `mean` of the steps.
+/// Half the acceleration for flow of any speed, from that of slow flow and the `mean` of the steps.
 ///
-/// With the mean step `d`, a thing comes from `x + c - d(x)` and goes to `x + c + d(x)`, its half
-/// acceleration `c` the middle of the two less `x`. One who starts at either end goes the same way, a step
-/// later or earlier, so that what the steps there differ by, taken backwards ahead and forwards behind, is
-/// twice `c`: `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`. Half of this equation's
-/// error is taken off in each round.
+/// With the mean step `d` and half acceleration `c`, a particle moves from `x + c - d(x)` over `x` to `x + c
+/// + d(x)`. A particle that starts at either end follows the same path one step later or earlier, so the
+/// difference of the steps there gives `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`.
+/// Each round removes half of this equation's error.
 pub(super) fn refine_acceleration<T: SimdReal>(
     space: &PlanePool<T>,
     mean: &Planes<T>,
@@ -54,7 +53,7 @@ pub(super) fn refine_acceleration<T: SimdReal>(
     acceleration
 }
 
-/// One round of [`settled`]. Things that were or will be outside the frame keep what they have.
+/// One round of [`refine_acceleration`]. Particles that were or will be outside the frame keep their value.
 fn round<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
     let far = [mean.width, mean.height].map(|sites| PITCH * sites as f64 - 1.0);
     let is_inside = |p: [f64; 2]| (0..2).all(|k| (-1.0..=far[k]).contains(&p[k]));
@@ -76,12 +75,11 @@ fn round<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Pla
     out
 }
 
-/// The step to the next frame where the mean of both steps is `mean` and half the acceleration is
-/// `acceleration`.
+/// The step to the next frame, from the `mean` of both steps and half the acceleration.
 ///
-/// Frames warped by `+m` and `-m` meet in the middle of where a thing was and will be: what is at `x` in the
-/// middle frame goes from `x + c - m` to `x + c + m` and is told at `x + c`. So the next step is `c(x) + m(x
-/// + c(x))`, and its Jacobian follows by the chain rule.
+/// Frames warped by `+m` and `-m` meet midway between the earlier and the later position: a particle at `x`
+/// in the middle frame moves from `x + c - m` to `x + c + m` and is estimated at `x + c`. So the next step is
+/// `c(x) + m(x + c(x))`; its Jacobian follows by the chain rule.
 pub(super) fn next_step<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
     at_sites(space, mean, |x, y| {
         let [u, v, u_x, v_x, u_y, v_y]: [f64; MOTION] = std::array::from_fn(|k| acceleration.at(k, x, y).to_f64());
@@ -117,7 +115,7 @@ fn at_sites<T: SimdReal, const N: usize>(
     out
 }
 
-/// The first two planes at a place, px.
+/// The first two planes at a position, px.
 fn flow_at<T: SimdReal>(planes: &Planes<T>, [x, y]: [f64; 2]) -> [f64; 2] {
     let [u, v, ..] = motion_at(planes, PITCH, x, y);
     [u, v]
@@ -149,7 +147,7 @@ fn derive<T: SimdReal>(flow: &mut Planes<T>) {
     }
 }
 
-/// Over so many sites.
+/// Slope over so many sites.
 fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
     T::from_f64((to.to_f64() - from.to_f64()) / (PITCH * sites.max(1) as f64))
 }
@@ -159,7 +157,7 @@ mod tests {
     use super::*;
     use crate::flow::coarse_to_fine::acceleration::tests::{filled, rotation};
 
-    /// Largest difference of two motions, but for the sites of the rim.
+    /// Largest difference of two motions, without the border.
     fn difference(a: &Planes<f64>, b: &Planes<f64>) -> f64 {
         let sites = (1..a.height - 1).flat_map(|y| (1..a.width - 1).map(move |x| (x, y)));
         sites.flat_map(|(x, y)| (0..MOTION).map(move |k| (a.at(k, x, y) - b.at(k, x, y)).abs())).fold(0.0, f64::max)
@@ -175,8 +173,8 @@ mod tests {
 
     #[test]
     fn fast_rotation_goes_on_in_its_circle() {
-        // Turning by `w` a frame, things meet their former and later selves nearer to the centre by cos w,
-        // and move by sin w.
+        // Rotating by `w` a frame, a particle's earlier and later positions meet nearer to the centre by cos
+        // w, and the mean step is sin w.
         let (w, space) = (0.3_f64, PlanePool::default());
         let mean = rotation(w.tan());
         let acceleration = refine_acceleration(&space, &mean, half_acceleration(&space, &mean));

@@ -1,4 +1,4 @@
-//! Where data lead the motion, and in which directions they do not.
+//! Constrained directions: where the data determine the motion, and in which directions.
 
 use super::noise::{ALL, NONE, Noise, UnconstrainedDirections};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
@@ -8,35 +8,35 @@ use crate::simd::SimdReal;
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
-/// Share of the sites from which on they tell how exact coarse levels are.
+/// Minimum share of constrained sites from which the errors of coarse levels are measured.
 const MIN_CONSTRAINED_SHARE: f64 = 0.02;
-/// Usable share of a window from which on a site counts as seen.
+/// Minimum usable share of a window.
 const MIN_USABLE_SHARE: f64 = 0.1;
-/// SamplingGrid whose information is told together reach so far from one.
+/// Reach, sites, of the mean of the information.
 const INFORMATION_REACH: usize = 1;
-/// SamplingGrid that one thread looks at, at a time.
+/// Sites of a parallel task.
 const SITES_PER_TASK: usize = 4096;
 
-/// Where data lead the motion.
+/// Where and in which directions data constrain the motion.
 pub(super) struct ConstrainedDirections {
     width: usize,
-    /// How far every site is from the next where data lead all of the motion, px, row by row; 0 where nothing
-    /// is seen at all: that is another matter. Infinite where one direction is unknown and nearly nothing
-    /// else is there.
+    /// Distance of every site from the nearest fully constrained one, px, row by row; 0 where nothing is
+    /// usable, which is treated elsewhere. Infinite where one direction is unconstrained and nearly no site
+    /// is constrained.
     distances: Vec<f64>,
-    /// The sites that tell how exact coarser levels are, row by row: seen, and led.
+    /// Reference sites for the errors of coarser levels, row by row: usable and constrained.
     reference_sites: Vec<bool>,
-    /// Means over the sites of every place that are not led, row by row.
+    /// Means over the unconstrained sites of every node, row by row.
     directions: Vec<[f64; 3]>,
 }
 
 impl ConstrainedDirections {
-    /// As the `noise` says of the sites' data, for so many `places` along x and y.
-    pub fn new<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>, places: (usize, usize)) -> Self {
+    /// From the data of the sites and their `noise`, for so many `nodes` along x and y.
+    pub fn new<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>, nodes: (usize, usize)) -> Self {
         let (width, height) = (data.width, data.height);
         let around_site =
             |at: usize, len: usize| at.saturating_sub(INFORMATION_REACH)..(at + INFORMATION_REACH + 1).min(len);
-        let place = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
+        let node = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
         let directions = |n: usize| {
             let (x, y) = (n % width, n / width);
             let (columns, rows) = (around_site(x, width), around_site(y, height));
@@ -45,19 +45,19 @@ impl ConstrainedDirections {
                 let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
                 rows.clone().map(row).sum::<f64>() / count
             };
-            noise.unconstrained([UU, UV, VV].map(mean), place(x, width), place(y, height))
+            noise.unconstrained([UU, UV, VV].map(mean), node(x, width), node(y, height))
         };
         let sites: Vec<UnconstrainedDirections> =
             (0..width * height).into_par_iter().with_min_len(SITES_PER_TASK).map(directions).collect();
         let is_usable = |n: usize| data.at(SEEN, n % width, n / width).to_f64() >= MIN_USABLE_SHARE;
-        Self::with((width, &sites), places, is_usable)
+        Self::with((width, &sites), nodes, is_usable)
     }
 
-    /// For sites whose directions these are. Where nearly none is led in all of them, they do not tell; what
-    /// is known then is that motion along a texture of one direction is not.
+    /// From the directions of all sites. If nearly none is constrained in both directions there is no
+    /// reference; then only motion along texture of one direction is known to be unconstrained.
     pub fn with(
         (width, sites): (usize, &[UnconstrainedDirections]),
-        places: (usize, usize),
+        nodes: (usize, usize),
         is_usable: impl Fn(usize) -> bool,
     ) -> Self {
         let constrained: Vec<bool> = sites.iter().map(|directions| *directions == NONE).collect();
@@ -73,22 +73,21 @@ impl ConstrainedDirections {
         (0..distances.len()).filter(|&n| !is_usable(n)).for_each(|n| distances[n] = 0.0);
         let reference_sites = (0..constrained.len()).map(|n| constrained[n] && is_usable(n)).collect();
         let mut out = Self { width, distances, reference_sites, directions: Vec::new() };
-        out.directions =
-            (0..places.0 * places.1).map(|n| out.mean_directions(sites, n % places.0, n / places.0)).collect();
+        out.directions = (0..nodes.0 * nodes.1).map(|n| out.mean_directions(sites, n % nodes.0, n / nodes.0)).collect();
         out
     }
 
-    /// Whether a site tells how exact coarser levels are.
+    /// Whether a site is a reference for the errors of coarser levels.
     pub fn is_reference(&self, x: usize, y: usize) -> bool {
         self.reference_sites[y * self.width + x]
     }
 
-    /// What is not led at a place, if anything is not.
-    pub fn directions(&self, place: usize) -> [f64; 3] {
-        self.directions[place]
+    /// Unconstrained directions of a node; 0 if there are none.
+    pub fn directions(&self, node: usize) -> [f64; 3] {
+        self.directions[node]
     }
 
-    /// The farthest of a place's sites.
+    /// Largest distance of a node's sites.
     pub fn distance(&self, x: usize, y: usize) -> f64 {
         self.around(x, y).map(|n| self.distances[n]).fold(0.0, f64::max)
     }
@@ -102,12 +101,12 @@ impl ConstrainedDirections {
         sum.map(|sum| sum / count.max(1.0))
     }
 
-    /// The sites of a place.
+    /// The sites of a node.
     fn around(&self, x: usize, y: usize) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.width, self.distances.len() / self.width);
-        // The last places are at the last sites.
-        let around_site = |place: usize, len: usize| {
-            let middle = (SPACING * place).min(len - 1);
+        // The last nodes are at the last sites.
+        let around_site = |node: usize, len: usize| {
+            let middle = (SPACING * node).min(len - 1);
             middle.saturating_sub(SPACING / 2)..(middle + SPACING / 2 + 1).min(len)
         };
         let columns = around_site(x, width);
@@ -115,13 +114,13 @@ impl ConstrainedDirections {
     }
 }
 
-/// From every site to the next of the `led` ones, px: the shortest way along rows, columns and diagonals.
+/// From every site to the nearest `constrained` one, px: the shortest path along rows, columns and diagonals.
 fn distances(width: usize, constrained: &[bool]) -> Vec<f64> {
     let mut out: Vec<f64> =
         constrained.iter().map(|constrained| if *constrained { 0.0 } else { f64::INFINITY }).collect();
     let sites = out.len();
     let (straight, diagonal) = (PITCH, PITCH * SQRT_2);
-    // Once from above and once, everything turned about, from below.
+    // Once from above, and once reversed from below.
     for _ in 0..2 {
         for n in 0..sites {
             let x = n % width;
@@ -164,13 +163,13 @@ mod tests {
         let sites: Vec<UnconstrainedDirections> =
             (0..side * side).map(|n| if n % side < 7 { NONE } else { along }).collect();
         let constrained = ConstrainedDirections::with((side, &sites), (3, 3), |_| true);
-        assert_eq!([0, 1, 2].map(|place| constrained.directions(place)), [[0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
-        assert_eq!([0, 1, 2].map(|place| constrained.distance(place, 0)), [0.0, 0.0, 2.0 * PITCH]);
-        // Nothing is led as a whole: what is known is that one direction is not.
+        assert_eq!([0, 1, 2].map(|node| constrained.directions(node)), [[0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
+        assert_eq!([0, 1, 2].map(|node| constrained.distance(node, 0)), [0.0, 0.0, 2.0 * PITCH]);
+        // No site is fully constrained; one direction is known to be unconstrained.
         let half: Vec<UnconstrainedDirections> =
             (0..side * side).map(|n| if n % side < 4 { across } else { ALL }).collect();
         let constrained = ConstrainedDirections::with((side, &half), (3, 3), |_| true);
-        assert_eq!([0, 2].map(|place| constrained.distance(place, 0)), [f64::INFINITY, 0.0]);
+        assert_eq!([0, 2].map(|node| constrained.distance(node, 0)), [f64::INFINITY, 0.0]);
         assert!((0..side).all(|x| !constrained.is_reference(x, 0)));
     }
 }

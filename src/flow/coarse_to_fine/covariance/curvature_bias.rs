@@ -1,13 +1,13 @@
-//! What smoothing takes away from bent flow.
+//! Curvature bias: loss of curved flow by smoothing.
 //!
-//! Motion that is smoothed once more, by a Gaussian G and twice over, loses `(1 - G)^2` of itself. Where flow
-//! bends on the scale of windows this goes the way of the error that is in it already: in turbulence the two
-//! correlate by .7 to .85, flow and derivatives alike. The outer product of what is lost, averaged around a
-//! place, is the covariance; a share of that of the slopes goes any way.
+//! Motion smoothed once more, twice over, by a Gaussian G loses `(1 - G)^2` of itself. Where flow is curved
+//! on the scale of the windows, this loss points along the error already present: in turbulence both
+//! correlate by .7 to .85, flow and derivatives alike. The outer product of the loss, averaged around a node,
+//! is the covariance; a share of that of the slopes is isotropic.
 //!
-//! Two kinds. The windows of the data term and of the coupling are the same everywhere, so is the smoothing
-//! that shows their error: a Gaussian of [`SIGMA`]. The windows that were chosen differ, so the motion loses
-//! `(1 - G)^4`, as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
+//! There are two parts. The windows of data term and regularisation are the same everywhere, so their loss is
+//! measured with a Gaussian of [`FIXED_SIGMA`]. The chosen windows differ, so the motion loses `(1 - G)^4`,
+//! as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
 use super::{Entries, binomial_mean};
 use crate::flow::coarse_to_fine::planes::Planes;
@@ -17,32 +17,32 @@ use crate::simd::SimdReal;
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
-/// Standard deviation of the first Gaussian, px: about twice that of the windows that bent flow is given.
+/// Standard deviation of the fixed Gaussian, px: about twice that of the windows chosen in curved flow.
 const FIXED_SIGMA: f64 = 6.0;
-/// Standard deviations of the others over those of the windows.
+/// Standard deviations of the other Gaussians over those of the windows.
 const CHOSEN_SIGMA_FACTOR: f64 = 1.25;
-/// The narrowest window that has one of its own, px.
+/// Minimum sigma, px, of a window whose loss is measured separately.
 const MIN_CHOSEN_SIGMA: f64 = 3.5;
-/// Share of the slopes' squared errors that goes any way, not that of what is lost: turbulence without
-/// divergence bends without it, yet its estimate diverges.
+/// Isotropic share of the slopes' squared errors: turbulence without divergence loses none, yet its estimate
+/// has divergence.
 const ISOTROPIC_SHARE: f64 = 0.2;
-/// Places that one thread smooths at a time.
+/// Nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
 /// Planes of the motion.
 const MOTION: usize = 6;
-/// The motion or what it loses, at one place.
+/// The motion or its loss at a node.
 type Loss = [f64; MOTION];
 
-/// Errors over what is lost, in the flow and in the slopes.
+/// Errors over losses, of the flow and of the slopes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shares {
-    /// To the first Gaussian.
+    /// Of the loss to the fixed Gaussian.
     pub fixed: [f64; 2],
-    /// To those of the windows.
+    /// Of the loss to the chosen windows.
     pub chosen: [f64; 2],
 }
 
-/// The covariance at the places of the evidence.
+/// The covariance at the nodes of the statistics.
 pub(super) fn curvature_bias<T: SimdReal>(
     motion: &Planes<T>,
     statistics: &WindowStatistics<T>,
@@ -59,7 +59,7 @@ pub(super) fn curvature_bias<T: SimdReal>(
     products
 }
 
-/// Adds the errors that go with a loss.
+/// Adds the error of a loss.
 fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
     let energy = shares[1].powi(2) * loss[2..].iter().map(|slope| slope * slope).sum::<f64>();
     let kept = [1.0, (1.0 - ISOTROPIC_SHARE).sqrt()];
@@ -72,13 +72,13 @@ fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
     (2..MOTION).for_each(|k| out[upper(k, k)] += ISOTROPIC_SHARE * energy / 4.0);
 }
 
-/// The motion at a place.
+/// The motion at a node.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize)) -> Loss {
     let (x, y) = ((SPACING * x).min(motion.width - 1), (SPACING * y).min(motion.height - 1));
     std::array::from_fn(|k| motion.at(k, x, y).to_f64())
 }
 
-/// `(1 - G)^2` of the motion at the places, G being [`SIGMA`] px wide.
+/// `(1 - G)^2` of the motion at the nodes, G of [`FIXED_SIGMA`] px.
 fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
     // G and G G.
     let kernels = [FIXED_SIGMA / PITCH, FIXED_SIGMA / PITCH * SQRT_2];
@@ -108,15 +108,15 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     rows.concat()
 }
 
-/// The sum over the windows of weight times `(1 - G)^4` of the motion, G being [`WIDER`] than the window. The
-/// motion there is smooth enough to be smoothed from place to place.
+/// The sum over the windows of weight times `(1 - G)^4` of the motion, G wider than the window by
+/// [`CHOSEN_SIGMA_FACTOR`]. The motion there is smooth enough to be smoothed from node to node.
 fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistics<T>) -> Vec<Loss> {
     let (width, height) = statistics.size();
-    let places: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
-    let whole: Vec<Loss> = places.iter().map(|&at| motion_at(motion, at)).collect();
+    let nodes: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
+    let whole: Vec<Loss> = nodes.iter().map(|&at| motion_at(motion, at)).collect();
     let mut lost = vec![[0.0; MOTION]; whole.len()];
     for (l, sigma) in statistics.sigmas.iter().enumerate().filter(|(_, s)| **s >= MIN_CHOSEN_SIGMA) {
-        let weights: Vec<[f64; 2]> = places.iter().map(|&(x, y)| statistics.weights(l, x, y)).collect();
+        let weights: Vec<[f64; 2]> = nodes.iter().map(|&(x, y)| statistics.weights(l, x, y)).collect();
         if weights.iter().flatten().all(|w| *w < 0.01) {
             continue;
         }
@@ -134,7 +134,7 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
     lost
 }
 
-/// Gaussian means of `sigma` places.
+/// Gaussian means of `sigma` nodes.
 fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec<Loss> {
     let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
     let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {
@@ -150,17 +150,17 @@ fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec
     nodes_in_parallel().map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
 }
 
-/// SamplingGrid and their weights.
+/// Sites and their weights.
 type Taps = Vec<(usize, f64)>;
 
-/// A Gaussian of `sigma` sites about each of some places, so many and so far apart; beyond the edges values
-/// go on by reflection at the point on the edge, so that affine motion is not bent.
-fn gaussians(sigma: f64, (places, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
+/// A Gaussian of `sigma` sites about each of `nodes` positions, `spacing` apart. Beyond the edges values are
+/// reflected at the point on the edge, so that affine motion has no loss.
+fn gaussians(sigma: f64, (nodes, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
     let radius = (3.0 * sigma).ceil() as isize;
     let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
     let total: f64 = raw.iter().sum();
     let last = sites as isize - 1;
-    (0..places)
+    (0..nodes)
         .map(|n| {
             let centre = ((spacing * n) as isize).min(last);
             let mut weights = vec![0.0; sites];

@@ -1,21 +1,21 @@
-//! How far places are from the edge of what all frames see.
+//! Data support: distances of nodes from the edge of the area that all frames show.
 //!
-//! Where motion leads out of a frame there are no data, and the motion is that of the nearest seen sites,
-//! continued. That edge, and not the frame's, is where windows see less. Areas without texture are continued
-//! in the same way.
+//! Where motion leads out of a frame there are no data, and the motion is extrapolated from the nearest
+//! usable sites. Windows are truncated at that edge, not at the frame's. Untextured areas are extrapolated in
+//! the same way.
 
 use crate::flow::coarse_to_fine::data_term::SEEN;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
 use crate::simd::SimdReal;
 
-/// Usable share of a window from which on a site counts as seen: the sites along the frame's edge do.
+/// Minimum usable share of a window; sites along the frame's edge have more.
 const MIN_USABLE_SHARE: f64 = 0.1;
 
-/// Where the places of the evidence lie in what is seen.
+/// Positions of the nodes in the usable area.
 pub(super) struct DataSupport {
-    /// Signed distances, px, along x and along y, to the outermost seen site; negative where a place itself
-    /// is not seen.
+    /// Signed distances, px, along x and along y, to the outermost usable site; negative at a node without
+    /// data.
     distances: Vec<[f64; 2]>,
     along: Axis,
     across: Axis,
@@ -24,20 +24,20 @@ pub(super) struct DataSupport {
 
 /// The nearer edge of the frame along an axis.
 pub(super) struct Edge {
-    /// How far it is, px.
+    /// Distance, px.
     pub distance: f64,
-    /// How wide the strip is, px, that is not seen there.
+    /// Width, px, of the strip without data at that edge.
     pub strip: f64,
 }
 
 impl DataSupport {
-    /// At the `width x height` places of the evidence.
+    /// At the `width x height` nodes of the statistics.
     pub fn new<T: SimdReal>(data: &Planes<T>, size: (usize, usize)) -> Self {
         Self::with(data, size, |_, _| true)
     }
 
-    /// The same, where only those sites count as seen whose nearest place has texture (`textured`, row by
-    /// row): where there is none, motion is continued as well.
+    /// The same, counting only sites whose nearest node has texture (`textured`, row by row): elsewhere
+    /// motion is extrapolated as well.
     pub fn textured<T: SimdReal>(data: &Planes<T>, size: (usize, usize), textured: &[bool]) -> Self {
         let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
         Self::with(data, size, |x, y| textured[nearest(y, size.1) * size.0 + nearest(x, size.0)])
@@ -54,7 +54,7 @@ impl DataSupport {
         let distances = (0..width * height).map(|n| {
             let (x, y) = (n % width, n / width);
             let [mut dx, mut dy] = [along.distance(x, y), across.distance(y, x)];
-            // Inside a hole the nearer side is what the motion is continued from.
+            // Inside a hole, motion is extrapolated from the nearer side.
             if dx < 0.0 && dy < 0.0 && along.own[y] && across.own[x] {
                 if dx < dy { dx = f64::INFINITY } else { dy = f64::INFINITY }
             }
@@ -63,18 +63,18 @@ impl DataSupport {
         Self { distances: distances.collect(), along, across, width }
     }
 
-    /// Of a place, along x and along y, px: to the outermost seen site of its run, or, negative, back to the
-    /// nearest seen one.
+    /// Distances of a node along x and along y, px: to the outermost usable site of its run, or, negative,
+    /// back to the nearest usable one.
     pub fn distances(&self, x: usize, y: usize) -> [f64; 2] {
         self.distances[y * self.width + x]
     }
 
-    /// The edges of the frame that a place is nearest to, along x and along y.
+    /// The nearest edges of the frame, along x and along y.
     pub fn edges(&self, x: usize, y: usize) -> [Edge; 2] {
         [self.along.edge(x, y), self.across.edge(y, x)]
     }
 
-    /// How far the motion of a place is continued, px; 0 where it is seen.
+    /// Distance over which the motion of a node is extrapolated, px; 0 where there are data.
     pub fn continued_distance(&self, x: usize, y: usize) -> f64 {
         let [dx, dy] = self.distances(x, y).map(|d| (-d).max(0.0));
         dx.hypot(dy)
@@ -83,38 +83,38 @@ impl DataSupport {
 
 /// The distances along one axis.
 struct Axis {
-    /// Of every place, line by line.
+    /// Of every node, line by line.
     distances: Vec<f64>,
-    places: usize,
-    /// The first and the last seen site of every line of places.
+    nodes: usize,
+    /// The first and the last usable site of every line of nodes.
     ends: Vec<[usize; 2]>,
     sites: usize,
-    /// Whether anything is seen on a line itself and not only on a neighbouring one.
+    /// Whether a line itself has usable sites, and not only a neighbouring one.
     own: Vec<bool>,
 }
 
 impl Axis {
-    /// For lines of so many sites and so many lines of them; the same of places; whether the site at a
-    /// position on a line is seen.
-    fn new(sites: [usize; 2], places: [usize; 2], is_usable: impl Fn(usize, usize) -> bool) -> Self {
+    /// For `sites[1]` lines of `sites[0]` sites, the same of nodes, and whether the site at a position on a
+    /// line is usable.
+    fn new(sites: [usize; 2], nodes: [usize; 2], is_usable: impl Fn(usize, usize) -> bool) -> Self {
         let any: Vec<bool> = (0..sites[1]).map(|line| (0..sites[0]).any(|at| is_usable(at, line))).collect();
-        let (mut distances, mut own, mut ends) = (Vec::with_capacity(places[0] * places[1]), Vec::new(), Vec::new());
-        for n in 0..places[1] {
+        let (mut distances, mut own, mut ends) = (Vec::with_capacity(nodes[0] * nodes[1]), Vec::new(), Vec::new());
+        for n in 0..nodes[1] {
             let line = (SPACING * n).min(sites[1] - 1);
             let nearest = (0..sites[1]).filter(|l| any[*l]).min_by_key(|l| l.abs_diff(line));
             own.push(any[line]);
             if let Some(line) = nearest {
                 let row: Vec<bool> = (0..sites[0]).map(|at| is_usable(at, line)).collect();
                 let all = signed(&row);
-                distances.extend((0..places[0]).map(|n| PITCH * all[(SPACING * n).min(sites[0] - 1)]));
+                distances.extend((0..nodes[0]).map(|n| PITCH * all[(SPACING * n).min(sites[0] - 1)]));
                 let first = row.iter().position(|is_usable| *is_usable).unwrap_or(0);
                 ends.push([first, row.iter().rposition(|is_usable| *is_usable).unwrap_or(first)]);
             } else {
-                distances.extend((0..places[0]).map(|_| -PITCH * sites[0] as f64));
+                distances.extend((0..nodes[0]).map(|_| -PITCH * sites[0] as f64));
                 ends.push([0, sites[0] - 1]);
             }
         }
-        Self { distances, places: places[0], ends, sites: sites[0], own }
+        Self { distances, nodes: nodes[0], ends, sites: sites[0], own }
     }
 
     fn edge(&self, at: usize, line: usize) -> Edge {
@@ -125,11 +125,11 @@ impl Axis {
     }
 
     fn distance(&self, at: usize, line: usize) -> f64 {
-        self.distances[line * self.places + at]
+        self.distances[line * self.nodes + at]
     }
 }
 
-/// Steps from each site to the outermost seen one of its run, or back to the nearest seen one.
+/// Steps from each site to the outermost usable one of its run, or back to the nearest usable one.
 fn signed(is_usable: &[bool]) -> Vec<f64> {
     let steps = |order: &mut dyn Iterator<Item = usize>| {
         let mut out = vec![f64::INFINITY; is_usable.len()];
@@ -138,7 +138,7 @@ fn signed(is_usable: &[bool]) -> Vec<f64> {
             let count = match before {
                 Some((same, count)) if same == is_usable[at] => count + 1.0,
                 Some(_) if !is_usable[at] => 1.0,
-                // Unseen ones at the frame's edge have nothing to come from on that side.
+                // At the frame's edge there is nothing to extrapolate from on that side.
                 None if !is_usable[at] => f64::INFINITY,
                 _ => 0.0,
             };

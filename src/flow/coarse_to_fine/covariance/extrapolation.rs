@@ -1,9 +1,9 @@
-//! What motion differs by from its affine continuation: the error of sites without data.
+//! Extrapolation error: difference of the motion from its affine continuation, at sites without data.
 //!
-//! The field itself tells. Over a distance `d`, as far as it is seen, `e_u(d) = u(p + d) - u(p) - M(p) d` and
-//! `e_M(d) = M(p + d) - M(p)` are measured along both axes; their mean squares are the variances of motion
-//! that is continued by `d`. They are taken from mean absolute values, as of Gaussian errors, so that the few
-//! pairs of places across a motion boundary do not tell for all others.
+//! Over a distance `d` within the usable area, `e_u(d) = u(p + d) - u(p) - M(p) d` and `e_M(d) = M(p + d) -
+//! M(p)` are measured along both axes; their mean squares are the variances of motion extrapolated by `d`.
+//! They are taken from mean absolute values, as for Gaussian errors, so that a few pairs of nodes across a
+//! motion boundary do not dominate.
 
 use super::data_support::DataSupport;
 use super::{Entries, curvature_bias};
@@ -13,24 +13,25 @@ use crate::flow::windowed::solve::upper;
 use crate::simd::SimdReal;
 use std::f64::consts::FRAC_PI_2;
 
-/// Distances that are measured, places; each twice the one before.
+/// Measured distances, nodes; each twice the one before.
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
-/// Windows at the edge see one side: their motion is that of half a deviation further in, continued.
+/// Shift, in standard deviations, of one-sided windows at the edge: their motion is that further in,
+/// extrapolated.
 const EDGE_SHIFT: f64 = 0.5;
-/// The widest of them, px: wider ones are only chosen where nothing bends.
+/// Maximum sigma of such a window, px: wider ones are chosen only where nothing is curved.
 const MAX_EDGE_SIGMA: f64 = 8.0;
-/// Deviation of the windows of the data and of the coupling, px.
+/// Standard deviation of the fixed windows of data term and regularisation, px.
 const FIXED_WINDOW_STD: f64 = 2.0;
 
-/// How far motion is continued, px, at a signed distance from the edge of the seen by windows of `sigma` px.
+/// Distance of extrapolation, px, at a signed distance from the edge of the data, for windows of `sigma` px.
 fn continued(distance: f64, sigma: f64) -> f64 {
     let reach = sigma.min(MAX_EDGE_SIGMA) + FIXED_WINDOW_STD;
     let inner = distance.max(0.0) / reach;
     (-distance).max(0.0) + EDGE_SHIFT * reach * (-2.0 * inner * inner).exp()
 }
 
-/// Variances of continued motion.
+/// Variances of extrapolated motion.
 pub(super) struct Extrapolation {
     /// Of the flow, px^2, and of the slopes, at each of [`STEPS`].
     variances: [[f64; 2]; STEPS.len()],
@@ -39,24 +40,24 @@ pub(super) struct Extrapolation {
 impl Extrapolation {
     pub fn new<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistics<T>, support: &DataSupport) -> Self {
         let (width, height) = statistics.size();
-        let places: Vec<Option<[f64; 6]>> = (0..width * height)
+        let nodes: Vec<Option<[f64; 6]>> = (0..width * height)
             .map(|n| (n % width, n / width))
             .map(|(x, y)| (support.continued_distance(x, y) == 0.0).then(|| curvature_bias::motion_at(motion, (x, y))))
             .collect();
         let mut variances = [[0.0; 2]; STEPS.len()];
         for (n, step) in STEPS.into_iter().enumerate() {
             let mut sums = [0.0; 3];
-            for (at, here) in places.iter().enumerate() {
+            for (at, here) in nodes.iter().enumerate() {
                 let Some(here) = here else { continue };
                 let (x, y) = (at % width, at / width);
-                // The last places are nearer to the ones before.
-                let along = (x + step + 1 < width).then(|| (places[at + step], 2));
-                let across = (y + step + 1 < height).then(|| (places[at + step * width], 4));
+                // The last nodes are nearer to the ones before.
+                let along = (x + step + 1 < width).then(|| (nodes[at + step], 2));
+                let across = (y + step + 1 < height).then(|| (nodes[at + step * width], 4));
                 for (there, slope) in along.into_iter().chain(across) {
                     let Some(there) = there else { continue };
                     let distance = PITCH * (SPACING * step) as f64;
                     for k in 0..2 {
-                        // Forth and back, so that neither end is preferred.
+                        // Forward and backward, so that neither end is preferred.
                         let turn = there[k] - here[k];
                         sums[0] +=
                             (turn - distance * here[slope + k]).abs() + (turn - distance * there[slope + k]).abs();
@@ -69,24 +70,24 @@ impl Extrapolation {
                 variances[n] = [0, 1].map(|k| FRAC_PI_2 * (sums[k] / sums[2]).powi(2));
             }
             if n > 0 {
-                // The farther, the less is known; small frames have no far places.
+                // Variances do not decrease with the distance; small frames have no distant nodes.
                 variances[n] = [0, 1].map(|k| variances[n][k].max(variances[n - 1][k]));
             }
         }
         Self { variances }
     }
 
-    /// Adds them at a place so far (px, along both axes) from the edge of the seen; `sigmas`: of the windows
-    /// that flow and slopes have there, px.
-    pub fn add(&self, place: &mut Entries, distances: [f64; 2], sigmas: [f64; 2]) {
+    /// Adds the variances at a node with the given distances (px, along both axes) from the edge of the data;
+    /// `sigmas`: of the windows of flow and slopes there, px.
+    pub fn add(&self, node: &mut Entries, distances: [f64; 2], sigmas: [f64; 2]) {
         for (kind, (sigma, entries)) in sigmas.into_iter().zip([0..2, 2..6]).enumerate() {
             let [x, y] = distances.map(|d| continued(d, sigma));
             let variance = self.variance(kind, x.hypot(y));
-            entries.for_each(|k| place[upper(k, k)] += variance);
+            entries.for_each(|k| node[upper(k, k)] += variance);
         }
     }
 
-    /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one,
+    /// Of the flow (`kind` 0) or the slopes (1): linear in the squared distance below the first measured one
     /// and between them; constant beyond the last.
     fn variance(&self, kind: usize, distance: f64) -> f64 {
         let (mut from, mut below) = (0.0, 0.0);
@@ -112,10 +113,10 @@ mod tests {
         let e = Extrapolation { variances: [1.0, 4.0, 9.0, 16.0].map(from) };
         assert_eq!(e.variance(0, 0.0), 0.0);
         assert_eq!((e.variance(0, 4.0), e.variance(1, 8.0), e.variance(0, 1e4)), (0.25, 0.1, 16.0));
-        let mut place = [0.0; crate::flow::windowed::solve::ENTRIES];
-        e.add(&mut place, [f64::INFINITY, 100.0], [3.0, 4.0]);
-        assert!(place.iter().all(|entry| *entry < 1e-30));
-        e.add(&mut place, [-20.0, 100.0], [3.0, 4.0]);
-        assert!(place[upper(0, 0)] > 4.0 && place[upper(5, 5)] > 0.4 && place[upper(0, 1)] == 0.0);
+        let mut node = [0.0; crate::flow::windowed::solve::ENTRIES];
+        e.add(&mut node, [f64::INFINITY, 100.0], [3.0, 4.0]);
+        assert!(node.iter().all(|entry| *entry < 1e-30));
+        e.add(&mut node, [-20.0, 100.0], [3.0, 4.0]);
+        assert!(node[upper(0, 0)] > 4.0 && node[upper(5, 5)] > 0.4 && node[upper(0, 1)] == 0.0);
     }
 }

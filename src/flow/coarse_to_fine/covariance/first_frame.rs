@@ -1,7 +1,7 @@
-//! A pair's covariance, known midway between the frames, told at the pixels of the first.
+//! Covariance of a pair at the pixels of the first frame, from that midway between the frames.
 //!
-//! The motion `m` of the place `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 =
-//! N M` with `N = (I - M / 2)^-1`. To first order errors go along as `N du` and `N dM N`.
+//! The motion `m` at `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 = N M` with
+//! `N = (I - M / 2)^-1`. To first order errors become `N du` and `N dM N`.
 
 use super::Entries;
 use super::map::NodeAxis;
@@ -12,29 +12,29 @@ use crate::simd::SimdReal;
 
 type Square = [[f64; 6]; 6];
 
-/// The covariance at the places, taken from half their way and carried along.
+/// The covariance at the nodes, taken from half their motion away and transformed.
 pub(super) fn to_first_frame<T: SimdReal>(
-    places: &[Entries],
+    nodes: &[Entries],
     motion: &Planes<T>,
     axes: (NodeAxis, NodeAxis),
 ) -> Vec<Entries> {
     let last = (motion.width - 1, motion.height - 1);
-    (0..places.len())
+    (0..nodes.len())
         .map(|n| {
             let (x, y) = (n % axes.0.count, n / axes.0.count);
             let m = super::curvature_bias::motion_at(motion, (x, y));
-            let place = |n: usize, last: usize| (SPACING * n).min(last) as f64 / SPACING as f64;
+            let node = |n: usize, last: usize| (SPACING * n).min(last) as f64 / SPACING as f64;
             let half_way = 0.5 / (PITCH * SPACING as f64);
-            let there = blend(places, axes, place(x, last.0) + half_way * m[0], place(y, last.1) + half_way * m[1]);
+            let there = blend(nodes, axes, node(x, last.0) + half_way * m[0], node(y, last.1) + half_way * m[1]);
             inverse_half_step(&m).map_or(there, |inverse| transformed(&there, &inverse))
         })
         .collect()
 }
 
-/// Linear between the places, constant beyond.
-fn blend(places: &[Entries], (along, across): (NodeAxis, NodeAxis), x: f64, y: f64) -> Entries {
+/// Linear between the nodes, constant beyond.
+fn blend(nodes: &[Entries], (along, across): (NodeAxis, NodeAxis), x: f64, y: f64) -> Entries {
     let ((left, right, fx), (above, below, fy)) = (along.around(x), across.around(y));
-    let at = |x: usize, y: usize| &places[y * along.count + x];
+    let at = |x: usize, y: usize| &nodes[y * along.count + x];
     let (a, b, c, d) = (at(left, above), at(right, above), at(left, below), at(right, below));
     std::array::from_fn(|k| (1.0 - fy) * ((1.0 - fx) * a[k] + fx * b[k]) + fy * ((1.0 - fx) * c[k] + fx * d[k]))
 }
@@ -89,7 +89,7 @@ mod tests {
             let column = |a: f64, b: f64| [n[0][0] * a + n[0][1] * b, n[1][0] * a + n[1][1] * b];
             [column(m[2], m[3]), column(m[4], m[5])].concat()
         };
-        // An error along one direction, by differences of the carried motion.
+        // An error along one direction, by differences of the transformed motion.
         let error = [0.3, -0.2, 0.5, 0.1, -0.4, 0.2];
         let mut entries = [0.0; ENTRIES];
         for i in 0..6 {

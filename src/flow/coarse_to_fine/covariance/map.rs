@@ -1,29 +1,29 @@
-//! From the places of the covariance to pixels.
+//! Covariance at pixels, interpolated from the nodes.
 
 use super::Entries;
 use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, places};
+use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, node_count};
 use crate::flow::windowed::solve::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
-/// Pixels of the level of the estimate from one place to the next.
+/// Distance of the nodes, pixels of the estimate's level.
 const NODE_SPACING: usize = SPACING * PITCH as usize;
 
-/// The places along one axis. All are as far apart but the last two: the last one is where the last site is.
+/// The nodes along one axis, at equal distances except the last two: the last one is at the last site.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct NodeAxis {
     pub count: usize,
-    /// Where the last one is, in distances of the others.
+    /// Position of the last node, in distances of the others.
     end: f64,
 }
 
 impl NodeAxis {
     /// For so many sites.
     pub fn of(sites: usize) -> Self {
-        Self { count: places(sites), end: (sites - 1) as f64 / SPACING as f64 }
+        Self { count: node_count(sites), end: (sites - 1) as f64 / SPACING as f64 }
     }
 
-    /// The places around a coordinate and the share of the second; beyond the last, that one alone.
+    /// The nodes around a coordinate and the weight of the second; beyond the last, that one alone.
     pub fn around(&self, at: f64) -> (usize, usize, f64) {
         let at = at.clamp(0.0, self.end);
         let first = (at as usize).min(self.count.saturating_sub(2));
@@ -31,36 +31,36 @@ impl NodeAxis {
         (first, (first + 1).min(self.count - 1), if length > 0.0 { (at - first as f64) / length } else { 0.0 })
     }
 
-    /// From a place to the next.
+    /// Distance from a node to the next.
     fn length(&self, first: usize) -> f64 {
         (self.end - first as f64).clamp(0.0, 1.0)
     }
 }
 
-/// A covariance that is linear between places, hence positive definite where theirs is.
+/// A covariance that is linear between nodes, hence positive definite where theirs is.
 #[derive(Debug, Default)]
 pub(in crate::flow::coarse_to_fine) struct CovarianceMap<T> {
     planes: Planes<T>,
     along: NodeAxis,
     across: NodeAxis,
-    /// Pixels from one place to the next.
+    /// Pixels from one node to the next.
     step: usize,
 }
 
 impl<T: SimdReal> CovarianceMap<T> {
-    /// Of places, row by row, of the given level of the pyramid: flow in pixels of the frame is so many times
-    /// larger, slopes are the same.
-    pub(super) fn new(places: &[Entries], (along, across): (NodeAxis, NodeAxis), level: usize) -> Self {
+    /// From nodes, row by row, of the given level of the pyramid: flow is scaled to pixels of the frame,
+    /// slopes are the same.
+    pub(super) fn new(nodes: &[Entries], (along, across): (NodeAxis, NodeAxis), level: usize) -> Self {
         let factor = f64::from(1 << level as u32);
         let mut scale = [0.0; ENTRIES];
         for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
             scale[upper(i, j)] = factor.powi(i32::from(i < 2) + i32::from(j < 2));
         }
         let mut planes = Planes::new(along.count, across.count, ENTRIES);
-        for (y, row) in places.chunks_exact(along.count.max(1)).enumerate() {
+        for (y, row) in nodes.chunks_exact(along.count.max(1)).enumerate() {
             for k in 0..ENTRIES {
                 let line = planes.line_mut(k, y);
-                line.iter_mut().zip(row).for_each(|(out, place)| *out = T::from_f64(scale[k] * place[k]));
+                line.iter_mut().zip(row).for_each(|(out, node)| *out = T::from_f64(scale[k] * node[k]));
             }
         }
         Self { planes, along, across, step: NODE_SPACING << level }
@@ -68,9 +68,8 @@ impl<T: SimdReal> CovarianceMap<T> {
 
     /// Entry `k` at a pixel.
     pub fn at(&self, k: usize, (x, y): (usize, usize)) -> T {
-        let place = |at: usize| at as f64 / self.step as f64;
-        let ((left, right, across), (above, below, share)) =
-            (self.along.around(place(x)), self.across.around(place(y)));
+        let node = |at: usize| at as f64 / self.step as f64;
+        let ((left, right, across), (above, below, share)) = (self.along.around(node(x)), self.across.around(node(y)));
         let row = |y: usize| {
             let (a, b) = (self.planes.at(k, left, y).to_f64(), self.planes.at(k, right, y).to_f64());
             a + (b - a) * across
@@ -78,16 +77,16 @@ impl<T: SimdReal> CovarianceMap<T> {
         T::from_f64(row(above) + (row(below) - row(above)) * share)
     }
 
-    /// Entry `k` along row `y`, to the end of `out`; `places` is memory to work in.
-    pub fn row(&self, k: usize, y: usize, places: &mut Vec<T>, out: &mut [T]) {
+    /// Entry `k` along row `y`, to the end of `out`; `nodes` is scratch memory.
+    pub fn row(&self, k: usize, y: usize, nodes: &mut Vec<T>, out: &mut [T]) {
         let (above, below, share) = self.across.around(y as f64 / self.step as f64);
         let share = T::from_f64(share);
-        places.clear();
+        nodes.clear();
         let (upper, lower) = (self.planes.line(k, above), self.planes.line(k, below));
-        places.extend(upper.iter().zip(lower).map(|(&a, &b)| a + (b - a) * share));
-        let last = places.len() - 1;
+        nodes.extend(upper.iter().zip(lower).map(|(&a, &b)| a + (b - a) * share));
+        let last = nodes.len() - 1;
         for (n, out) in out.chunks_mut(self.step).enumerate() {
-            let (first, next) = (places[n.min(last)], places[(n + 1).min(last)]);
+            let (first, next) = (nodes[n.min(last)], nodes[(n + 1).min(last)]);
             let length = self.step as f64 * self.along.length(n);
             let rise = (next - first) * T::from_f64(if length > 0.0 { 1.0 / length } else { 0.0 });
             let (sloping, flat) = out.split_at_mut(out.len().min(length.ceil() as usize));
@@ -105,9 +104,9 @@ mod tests {
 
     #[test]
     fn rows_are_what_single_pixels_are() {
-        let places: Vec<Entries> = (0..6).map(|n| std::array::from_fn(|k| ((n * n + 3 * k) as f64).cos())).collect();
+        let nodes: Vec<Entries> = (0..6).map(|n| std::array::from_fn(|k| ((n * n + 3 * k) as f64).cos())).collect();
         // The last column is a single site after the one before, the last row three.
-        let spread = CovarianceMap::<f64>::new(&places, (NodeAxis::of(6), NodeAxis::of(4)), 0);
+        let spread = CovarianceMap::<f64>::new(&nodes, (NodeAxis::of(6), NodeAxis::of(4)), 0);
         let (mut memory, mut row) = (Vec::new(), [0.0; 22]);
         for y in 0..15 {
             for k in 0..ENTRIES {
@@ -117,10 +116,10 @@ mod tests {
                 }
             }
         }
-        assert!((spread.at(0, (4, 0)) - 0.5 * (places[0][0] + places[1][0])).abs() < 1e-12);
-        assert!((spread.at(0, (9, 0)) - 0.5 * (places[1][0] + places[2][0])).abs() < 1e-12);
+        assert!((spread.at(0, (4, 0)) - 0.5 * (nodes[0][0] + nodes[1][0])).abs() < 1e-12);
+        assert!((spread.at(0, (9, 0)) - 0.5 * (nodes[1][0] + nodes[2][0])).abs() < 1e-12);
         for beyond in [(10, 6), (21, 14)] {
-            assert!((spread.at(5, beyond) - places[5][5]).abs() < 1e-12);
+            assert!((spread.at(5, beyond) - nodes[5][5]).abs() < 1e-12);
         }
     }
 }

@@ -1,23 +1,22 @@
-//! How far the refined motion can be trusted: the covariance of `(u, v, u_x, v_x, u_y, v_y)`, at every eighth
-//! pixel and linear in between.
+//! Covariance of the refined motion `(u, v, u_x, v_x, u_y, v_y)`, at nodes every eighth pixel and linear
+//! between.
 //!
-//! Errors of several kinds add up, all seen in the frames themselves:
+//! Errors of several kinds add, each measured in the frames themselves:
 //!
-//! * *Noise* ([`noise`]). What the chosen windows leave of the flow's noise. How strong that noise is, is
-//!   read from how much the flow changes from window to window.
-//! * *Bending* ([`bending`]). Flow that is not affine within the windows (those of the data too) is smoothed.
-//!   What smoothing once more takes away, as one vector of six, tells the direction and the size of the
-//!   error: a bent flow without divergence has errors without divergence.
-//! * *Continuation* ([`extrapolation`]). Where motion leads out of a frame, or where there is no texture, it
-//!   is that of other sites, continued; the field itself tells how fast it departs from that.
-//! * *Inheritance* ([`inherited`]). Where there is no texture, or only in one direction, finer levels do not
-//!   correct what coarser ones left.
-//! * *Peak locking* ([`Locking`]). A share of what was corrected may be left.
-//! * *Change from step to step*, a triple's only: noise of its own, which is independent of the other, and a
-//!   share of the acceleration.
+//! * Noise ([`noise`]): the noise of the flow that the chosen windows leave, its size read from how much the
+//!   flow changes from window to window.
+//! * Curvature bias ([`curvature_bias`]): flow that is not affine within the windows is smoothed. The loss by
+//!   smoothing once more, a vector of six, gives direction and size of the error.
+//! * Extrapolation ([`extrapolation`]): where motion leads out of a frame, or without texture
+//!   ([`data_support`]), it is extrapolated from other sites.
+//! * Coarse-level error ([`coarse_level_error`]): without texture, or with texture of one direction only
+//!   ([`constrained_directions`]), finer levels do not correct coarser ones.
+//! * Peak locking ([`PeakLocking`]): a share of the correction may remain.
+//! * Acceleration, three frames only: independent noise, and a share of the acceleration.
 //!
-//! The constants were fitted on made scenes (three carriers, six motions, noise of 0 to 4 grey levels, pairs
-//! and triples) and checked on others; `benchmarks/tables/coverage.py` measures what they hold.
+//! [`first_frame`] carries a pair's covariance to the first frame, [`map`] interpolates. The constants were
+//! fitted on synthetic scenes (three carriers, six motions, noise of 0 to 4 grey levels, two and three
+//! frames) and checked on others; `benchmarks/tables/coverage.py` measures the coverage.
 
 mod coarse_level_error;
 mod constrained_directions;
@@ -37,50 +36,48 @@ pub(super) use map::CovarianceMap;
 pub(super) use noise::Energy;
 use rayon::prelude::*;
 
-/// Variance of the flow over that of averaged white noise of the density that changes between windows show:
-/// the noise is not white, and strongest in what windows do not remove. Of pairs, and of triples, whose last
-/// linearisation is about the refined motion.
+/// Variance of the flow over that of white noise of the density seen between windows: real noise is not white
+/// and strongest where windows do not remove it. For two frames, and for three, whose last linearisation is
+/// about the refined motion.
 const FLOW_NOISE_FACTOR: [f64; 2] = [1.15, 1.35];
 /// The same for the slopes.
 const SLOPE_NOISE_FACTOR: f64 = 0.42;
-/// Errors over what bent motion loses, in the flow and in the slopes; of pairs and of triples.
+/// Errors over the loss of curved motion, of the flow and of the slopes; for two and for three frames.
 const CURVATURE_SHARES: [curvature_bias::Shares; 2] = [
     curvature_bias::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.68] },
     curvature_bias::Shares { fixed: [0.36, 0.66], chosen: [0.14, 0.46] },
 ];
-/// Share of the corrected peak locking that is left.
+/// Remaining share of the corrected peak locking.
 const LOCKING_SHARE: f64 = 0.33;
-/// Share of its amplitude that is left in the flow whatever the motion is.
+/// Share of its amplitude that remains in the flow whatever the motion.
 const LOCKING_FLOOR: f64 = 0.06;
 /// White noise in the difference of two frames over that in half the difference of the outer ones of three.
 const NEXT_FRAME_ENERGY: f64 = 4.0;
-/// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: what the next frame alone has beside what all
-/// three have.
+/// Noise of `w_2 - (w_3 - w_1) / 2` over that of `w_3 - w_2`: the part of the next frame alone.
 const CHANGE_NOISE_FACTOR: f64 = 0.55;
-/// Share of the acceleration, px/frame^2, that a triple takes for motion.
+/// Share of the acceleration, px/frame^2, that three frames take for motion.
 const ACCELERATION_SHARE: f64 = 0.015;
-/// Where no more than this share of the places has texture, they do not tell how motion differs from place to
-/// place.
+/// Minimum share of textured nodes from which the field's own variation is measured.
 const MIN_TEXTURED_SHARE: f64 = 0.02;
-/// Share of the variance of noise that repeats itself in the next frames' estimates: the texture moves on
-/// slowly, and its part of the errors with it.
+/// Share of the noise variance that the next frames' estimates repeat: the texture, and its part of the
+/// errors, moves on slowly.
 const REPEATED_NOISE_SHARE: f64 = 0.3;
 
 /// A covariance: its upper triangle, row by row.
 type Entries = [f64; ENTRIES];
 
-/// A covariance and that part of it which does not average out over time, if it was asked for.
+/// A covariance and its systematic part, which does not average out over time, if requested.
 #[derive(Debug, Default)]
 pub(super) struct CovarianceMaps<T> {
     pub whole: CovarianceMap<T>,
     pub systematic: Option<CovarianceMap<T>>,
 }
 
-/// The covariance at every place of the evidence.
+/// The covariance at every node of the statistics.
 ///
-/// `energy`: the residual energy of the noise. `carried`: told at the pixels of the first frame, where the
-/// motion of a pair is found midway. `apart`: with the systematic part beside it, all that is not noise, and
-/// a share of that.
+/// `energy`: residual energy of the noise. `is_pair`: carried to the pixels of the first frame, since a
+/// pair's motion is estimated midway. `with_systematic`: also the systematic part, everything that is not
+/// noise and a share of the noise.
 pub(super) fn covariance<T: SimdReal>(
     estimate: &Estimate<T>,
     energy: Energy,
@@ -105,9 +102,9 @@ pub(super) fn covariance<T: SimdReal>(
         noise::Noise::new(statistics, data, energy.times(NEXT_FRAME_ENERGY), true).at_least_as_noisy_as(&noise)
     });
     let kind = usize::from(!is_pair);
-    let mut places = curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]);
-    let mut noises = vec![[0.0; ENTRIES]; if with_systematic { places.len() } else { 0 }];
-    for (n, place) in places.iter_mut().enumerate() {
+    let mut nodes = curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]);
+    let mut noises = vec![[0.0; ENTRIES]; if with_systematic { nodes.len() } else { 0 }];
+    for (n, node) in nodes.iter_mut().enumerate() {
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);
         let mut noise_part = [0.0; ENTRIES];
@@ -119,99 +116,99 @@ pub(super) fn covariance<T: SimdReal>(
                 [CHANGE_NOISE_FACTOR * FLOW_NOISE_FACTOR[kind], CHANGE_NOISE_FACTOR * SLOPE_NOISE_FACTOR],
             );
         }
-        extrapolation.add(place, textured_support.distances(at.0, at.1), statistics.mean_sigmas(at.0, at.1));
-        add_coarse_level_error(place, &coarse_errors[n]);
-        add_locking(place, &motion, &estimate.locking);
+        extrapolation.add(node, textured_support.distances(at.0, at.1), statistics.mean_sigmas(at.0, at.1));
+        add_coarse_level_error(node, &coarse_errors[n]);
+        add_locking(node, &motion, &estimate.locking);
         if !is_pair {
-            add_acceleration(place, &motion);
+            add_acceleration(node, &motion);
         }
-        place.iter_mut().zip(&noise_part).for_each(|(entry, noise)| *entry += noise);
+        node.iter_mut().zip(&noise_part).for_each(|(entry, noise)| *entry += noise);
         if with_systematic {
             noises[n] = noise_part;
         }
     }
-    let map = |places: Vec<Entries>| {
-        let carried = if is_pair { first_frame::to_first_frame(&places, &estimate.motion, axes) } else { places };
+    let map = |nodes: Vec<Entries>| {
+        let carried = if is_pair { first_frame::to_first_frame(&nodes, &estimate.motion, axes) } else { nodes };
         CovarianceMap::new(&carried, axes, estimate.level)
     };
     let systematic = with_systematic.then(|| {
-        let without = |(place, noise): (&Entries, &Entries)| {
-            std::array::from_fn(|k| place[k] - (1.0 - REPEATED_NOISE_SHARE) * noise[k])
+        let without = |(node, noise): (&Entries, &Entries)| {
+            std::array::from_fn(|k| node[k] - (1.0 - REPEATED_NOISE_SHARE) * noise[k])
         };
-        map(places.iter().zip(&noises).map(without).collect())
+        map(nodes.iter().zip(&noises).map(without).collect())
     });
-    CovarianceMaps { whole: map(places), systematic }
+    CovarianceMaps { whole: map(nodes), systematic }
 }
 
-/// What is seen and has texture, if it is less than what is seen, and not too little to tell anything.
+/// Support of sites with data and texture, if smaller than that of sites with data but not negligible.
 fn textured_support<T: SimdReal>(
     noise: &noise::Noise<'_, T>,
     data: &Planes<T>,
     size: (usize, usize),
 ) -> Option<data_support::DataSupport> {
-    let places = (0..size.0 * size.1).into_par_iter();
-    let textured: Vec<bool> = places.map(|n| noise.is_textured(data, n % size.0, n / size.0)).collect();
+    let nodes = (0..size.0 * size.1).into_par_iter();
+    let textured: Vec<bool> = nodes.map(|n| noise.is_textured(data, n % size.0, n / size.0)).collect();
     let count = textured.iter().filter(|textured| **textured).count();
     let tells = count < textured.len() && count as f64 >= MIN_TEXTURED_SHARE * textured.len() as f64;
     tells.then(|| data_support::DataSupport::textured(data, size, &textured))
 }
 
-/// Adds noise of the density times its share in the flow and in the derivatives along x and y; `factors` for
-/// the flow and for the slopes.
-fn add_noise(place: &mut Entries, left: &noise::RemainingNoise, [flow, slopes]: [f64; 2]) {
+/// Adds the noise density times its share in the flow and in the derivatives along x and y; `factors` for the
+/// flow and for the slopes.
+fn add_noise(node: &mut Entries, left: &noise::RemainingNoise, [flow, slopes]: [f64; 2]) {
     let factors = [flow * left.flow, slopes * left.slopes[0], slopes * left.slopes[1]];
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-            place[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];
+            node[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];
         }
     }
 }
 
-/// Binomial means over three by three places.
-fn binomial_mean<const N: usize>(places: &mut [[f64; N]], (width, height): (usize, usize)) {
+/// Binomial means over 3 x 3 nodes.
+fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize, usize)) {
     let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
     let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
-    for row in places.chunks_exact_mut(width.max(1)) {
+    for row in nodes.chunks_exact_mut(width.max(1)) {
         let old = row.to_vec();
         for (x, out) in row.iter_mut().enumerate() {
             *out = mean(around(x, width).map(|x| &old[x]));
         }
     }
-    let old = places.to_vec();
-    for (n, out) in places.iter_mut().enumerate() {
+    let old = nodes.to_vec();
+    for (n, out) in nodes.iter_mut().enumerate() {
         let (x, y) = (n % width, n / width);
         *out = mean(around(y, height).map(|y| &old[y * width + x]));
     }
 }
 
-/// Adds variances of the flow and of the slopes, in the directions that are not led.
-fn add_coarse_level_error(place: &mut Entries, inheritance: &coarse_level_error::CoarseLevelError) {
+/// Adds variances of the flow and of the slopes, in the unconstrained directions.
+fn add_coarse_level_error(node: &mut Entries, inheritance: &coarse_level_error::CoarseLevelError) {
     let [flow, slopes] = inheritance.variances;
     for (block, variance) in [flow, slopes, slopes].into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-            place[upper(2 * block + i, 2 * block + j)] += variance * inheritance.directions[k];
+            node[upper(2 * block + i, 2 * block + j)] += variance * inheritance.directions[k];
         }
     }
 }
 
-/// Adds what may be left of peak locking.
-fn add_locking(place: &mut Entries, motion: &[f64; 6], locking: &PeakLocking) {
+/// Adds the remaining peak locking.
+fn add_locking(node: &mut Entries, motion: &[f64; 6], locking: &PeakLocking) {
     for c in 0..2 {
         let (sine, slope) = locking.phase(motion[c]);
         let square = locking.amplitude[c].powi(2);
         let share = LOCKING_SHARE.powi(2) * square + locking.variance[c];
-        place[upper(c, c)] += share * sine * sine + LOCKING_FLOOR.powi(2) * square;
+        node[upper(c, c)] += share * sine * sine + LOCKING_FLOOR.powi(2) * square;
         for k in [2 + c, 4 + c] {
-            place[upper(k, k)] += share * (slope * motion[k]).powi(2);
+            node[upper(k, k)] += share * (slope * motion[k]).powi(2);
         }
     }
 }
 
-/// Adds what paths that are curved, `M (u, v)` in a steady flow, do to a triple: its outer frames are warped
-/// as if the steps before and after were equal.
-fn add_acceleration(place: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) {
-    place[upper(0, 0)] += (ACCELERATION_SHARE * (u_x * u + u_y * v)).powi(2);
-    place[upper(1, 1)] += (ACCELERATION_SHARE * (v_x * u + v_y * v)).powi(2);
+/// Adds the effect of curved paths, `M (u, v)` in steady flow, on three frames, whose outer ones are warped
+/// by equal steps.
+fn add_acceleration(node: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) {
+    node[upper(0, 0)] += (ACCELERATION_SHARE * (u_x * u + u_y * v)).powi(2);
+    node[upper(1, 1)] += (ACCELERATION_SHARE * (v_x * u + v_y * v)).powi(2);
 }
 
 #[cfg(test)]
@@ -221,11 +218,11 @@ mod tests {
     #[test]
     fn noise_fills_the_blocks_of_flow_and_slopes() {
         let left = noise::RemainingNoise { density: [2.0, -0.5, 1.0], flow: 0.1, slopes: [0.01, 0.03] };
-        let mut place = [0.0; ENTRIES];
-        add_noise(&mut place, &left, [FLOW_NOISE_FACTOR[0], SLOPE_NOISE_FACTOR]);
-        assert!((place[upper(0, 1)] + FLOW_NOISE_FACTOR[0] * 0.05).abs() < 1e-15);
-        assert!((place[upper(2, 2)] - SLOPE_NOISE_FACTOR * 0.02).abs() < 1e-15);
-        assert!((place[upper(5, 5)] - SLOPE_NOISE_FACTOR * 0.03).abs() < 1e-15);
-        assert_eq!(place[upper(2, 4)], 0.0);
+        let mut node = [0.0; ENTRIES];
+        add_noise(&mut node, &left, [FLOW_NOISE_FACTOR[0], SLOPE_NOISE_FACTOR]);
+        assert!((node[upper(0, 1)] + FLOW_NOISE_FACTOR[0] * 0.05).abs() < 1e-15);
+        assert!((node[upper(2, 2)] - SLOPE_NOISE_FACTOR * 0.02).abs() < 1e-15);
+        assert!((node[upper(5, 5)] - SLOPE_NOISE_FACTOR * 0.03).abs() < 1e-15);
+        assert_eq!(node[upper(2, 4)], 0.0);
     }
 }

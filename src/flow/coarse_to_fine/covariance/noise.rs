@@ -1,4 +1,4 @@
-//! What windows leave of the noise of the flow.
+//! Noise of the flow that the windows leave.
 //!
 //! White noise of density `D` (variance times area) leaves in the windows' means and slopes (standard
 //! deviation `s`, transfer function `H = 1 - (1 - G)^4`) the covariances
@@ -8,16 +8,16 @@
 //!
 //! where `H = sum c_n G^n` gives `F = sum c_m c_n 2 / (m + n)` and `S = sum c_m c_n (2 / (m + n))^2`.
 //!
-//! Its shape is that of `e P^-1`, `P` being the information and `e` the residual energy around a place. Its
-//! size is not: errors of brightness go into two orders of derivatives, texture has its own spectrum, and
-//! coupling takes away the finest part. So the size is taken from the flow: between two windows that were
-//! both accepted the flow changes by noise, over that of white noise of unit density. The geometric mean of
-//! this excess over the frame is well determined, a single place's is not.
+//! Its shape is that of `e P^-1`, `P` the information and `e` the residual energy around a node. Its size is
+//! not: errors of brightness enter two orders of derivatives, texture has its own spectrum, and
+//! regularisation removes the finest part. So the size is measured in the flow: between two accepted windows
+//! the flow changes by noise, over that of white noise of unit density. The geometric mean of this excess
+//! over the frame is well determined, that of a single node is not.
 //!
-//! At the frame's edge windows see less: flow continued by reflection at its own noisy edge leaves up to
-//! fifteen times the variance, slopes across it twenty-four times. These are the factors of white noise drawn
-//! and smoothed, as functions of the distance over the window. Where motion leads out of a frame that edge
-//! has been continued with slopes as noisy as those of the data's windows.
+//! At the frame's edge windows are truncated: flow reflected at its own noisy edge has up to fifteen times
+//! the variance, slopes across it twenty-four times. These factors come from simulated white noise, as
+//! functions of the distance over the window. Where motion leads out of a frame, that edge is extrapolated
+//! with the noisy slopes of the data windows.
 
 use super::data_support::{DataSupport, Edge};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
@@ -26,55 +26,55 @@ use crate::flow::coarse_to_fine::refine::{SPACING, TERMS, WindowStatistics};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 
-/// Bounds of the excess: beyond them the flow tells nothing about noise.
+/// Bounds of the excess; beyond them it does not measure noise.
 const EXCESS_BOUNDS: [f64; 2] = [0.5, 50.0];
-/// Of white noise with variance 1, rows 1 to 3 with gradients weighing 4 have the information 52.25 times the
-/// variance of the mean frame and the residual energy 8.25 times that of the rate: 1/2 and 2 for pairs, 3/8
-/// and 1/2 for triples. A third of that is hidden where motion was fitted to nothing but noise.
+/// White noise of variance 1, rows 1 to 3 with gradient weight 4: the information is 52.25 times the variance
+/// of the mean frame, the residual energy 8.25 times that of the rate: 1/2 and 2 for pairs, 3/8 and 1/2 for
+/// triples. Where motion was fitted to noise alone, a third of the energy is missing.
 const PAIR_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.25 * FITTED_NOISE_FACTOR;
 const TRIPLE_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.75 * FITTED_NOISE_FACTOR;
 const FITTED_NOISE_FACTOR: f64 = 1.5;
-/// Width of an unseen strip, px, that doubles the variance at its edge of the frame: of means and of slopes.
+/// Width of a strip without data, px, that doubles the variance at its edge of the frame: of means and of
+/// slopes.
 const STRIP_UNIT: [f64; 2] = [3.5, 4.0];
-/// Wider strips are as uncertain as this one, px; what they are continued by tells the rest.
+/// Maximum width of such a strip, px; the extrapolation error covers wider ones.
 const MAX_STRIP: f64 = 16.0;
-/// Windows at whose edge nothing more is felt.
+/// Distance, in windows, beyond which an edge has no effect.
 const MAX_EDGE_DISTANCE: f64 = 2.5;
-/// Share of the information that is believed in any case.
+/// Minimum share of the information that is kept.
 const MIN_INFORMATION_SHARE: f64 = 1e-3;
-/// Least weight of wider windows at a place that counts.
+/// Minimum weight of wider windows at a node, for its excess to count.
 const MIN_WIDE_WEIGHT: f64 = 0.1;
-/// Texture is looked for within so many sites of a place.
+/// Reach, sites, of the test for texture around a node.
 const TEXTURE_REACH: usize = 2;
-/// Greatest density of the noise of the flow where there is texture, px^4: a window of 4 px would leave .2
-/// px.
+/// Maximum noise density of the flow with texture, px^4: a window of 4 px would leave .2 px.
 const MAX_TEXTURED_DENSITY: f64 = 10.0;
 
-/// Information beyond that of noise over the residual energy, px^-2, from which on data lead. Bonds are
-/// stronger, but pull where the neighbours are led as well.
+/// Minimum information beyond that of noise over the residual energy, px^-2, for data to constrain the
+/// motion. Smoothness is stronger, but acts where neighbours are constrained as well.
 const MIN_CONSTRAINING_INFORMATION: f64 = 0.5;
-/// The same, where motion in the other direction is not led: as strong as the bonds.
+/// The same, if motion in the other direction is unconstrained: as strong as smoothness.
 const MIN_INFORMATION_OF_ONE_DIRECTION: f64 = 20.0;
 
-/// The matrix `xx, xy, yy` that leaves of motion what data do not lead: zero where they lead all of it, the
-/// unit matrix where they lead nothing, and else the projection onto the direction without texture.
+/// Projection `xx, xy, yy` onto the unconstrained directions: zero where data constrain all of the motion,
+/// the unit matrix where they constrain none of it.
 pub(super) type UnconstrainedDirections = [f32; 3];
-/// Nothing is led.
+/// All directions are unconstrained.
 pub(super) const ALL: UnconstrainedDirections = [1.0, 0.0, 1.0];
-/// Everything is.
+/// No direction is.
 pub(super) const NONE: UnconstrainedDirections = [0.0; 3];
 
-/// The residual energy that noise leaves, grey^2.
+/// Residual energy of the noise, grey^2.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::flow::coarse_to_fine) enum Energy {
-    /// That of noise which is known.
+    /// Of known noise.
     Known(f64),
-    /// As the residuals tell, but no less.
+    /// From the residuals, but at least this.
     AtLeast(f64),
 }
 
 impl Energy {
-    /// So many times as much, where it is known; residuals tell by themselves.
+    /// Scales a known energy; residuals need no factor.
     pub fn times(self, factor: f64) -> Self {
         match self {
             Self::Known(energy) => Self::Known(factor * energy),
@@ -90,19 +90,19 @@ fn of_white_noise(power: i32) -> f64 {
     terms().flat_map(|(c, m)| terms().map(move |(d, n)| c * d * (2.0 / f64::from(m + n)).powi(power))).sum()
 }
 
-/// What is left at a place: the density's matrix `D_uu, D_uv, D_vv`, px^4, and the shares that go into the
-/// flow and into the derivatives along x and y.
+/// Remaining noise at a node: the density matrix `D_uu, D_uv, D_vv`, px^4, and its shares in the flow and in
+/// the derivatives along x and y.
 pub(super) struct RemainingNoise {
     pub density: [f64; 3],
     pub flow: f64,
     pub slopes: [f64; 2],
 }
 
-/// What was taken for nothing may be as large as noise in the widest window: this share of its variance.
+/// Variance of a vanished field, as a share of the noise in the widest window.
 const VANISHED_NOISE_SHARE: f64 = 0.5;
 
-/// What an edge of the frame adds to the noise that a window leaves: the factor of means and of slopes along
-/// the edge, and that of slopes across it.
+/// Factors of the noise at an edge of the frame: of means and of slopes along the edge, and of slopes across
+/// it.
 fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
     let t = edge.distance / sigma;
     if t > MAX_EDGE_DISTANCE {
@@ -117,7 +117,7 @@ pub(super) struct Noise<'a, T> {
     statistics: &'a WindowStatistics<T>,
     energy: Energy,
     excess: f64,
-    /// Information, in any direction, that white noise seems to have, over the residual energy it leaves.
+    /// Information, in any direction, that white noise contributes, over its residual energy.
     noise_information: f64,
     support: &'a DataSupport,
 }
@@ -139,13 +139,13 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// With an excess that is no less than that of the `other`, from the same frames: where nearly nothing is
-    /// accepted, little is seen of it.
+    /// With at least the excess of `other`, from the same frames: where nearly no window is accepted, the
+    /// excess is poorly measured.
     pub fn at_least_as_noisy_as(self, other: &Self) -> Self {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
-    /// The residual energy of the noise at a place.
+    /// The residual energy of the noise at a node.
     fn energy(&self, x: usize, y: usize) -> f64 {
         match self.energy {
             Energy::Known(energy) => energy,
@@ -153,11 +153,11 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// Whether there is texture within [`NEAR`] sites of a place, that is whether motion in any direction is
-    /// known from there alone.
+    /// Whether there is texture within [`TEXTURE_REACH`] sites of a node, so that motion in every direction
+    /// is determined there.
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
-        let around = |place: usize, len: usize| {
-            let middle = (SPACING * place).min(len - 1);
+        let around = |node: usize, len: usize| {
+            let middle = (SPACING * node).min(len - 1);
             middle.saturating_sub(TEXTURE_REACH)..(middle + TEXTURE_REACH + 1).min(len)
         };
         let (columns, rows) = (around(x, data.width), around(y, data.height));
@@ -172,8 +172,8 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
 
-    /// In which directions the data of sites near a place, whose mean information this is, do not lead their
-    /// motion, so that the first visits do not correct it.
+    /// Directions in which the data of sites near a node, with this mean information, do not constrain the
+    /// motion, so that the first iterations do not correct it.
     pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
         let radius = half.hypot(b);
@@ -189,7 +189,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         [0.5 * (1.0 - cosine), -0.5 * sine, 0.5 * (1.0 + cosine)].map(|entry| entry as f32)
     }
 
-    /// What is left at a place.
+    /// The remaining noise at a node.
     pub fn at(&self, x: usize, y: usize) -> RemainingNoise {
         let energy = self.energy(x, y);
         let inverse = inverse_without_noise(
@@ -215,9 +215,8 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     }
 }
 
-/// The inverse of the information without what noise seems to add to it in every direction: `N` in the frames
-/// has gradients of its own, and where there is nothing else, nothing is known. A share of [`LEAST_LEFT`] is
-/// left in any case.
+/// Inverse of the information without the contribution of noise in every direction: noise has gradients of
+/// its own, and where there is nothing else, nothing is known. A share of [`MIN_INFORMATION_SHARE`] is kept.
 fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
     let radius = half.hypot(b);
@@ -228,14 +227,13 @@ fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     [mean + spread * cosine, spread * sine, mean - spread * cosine]
 }
 
-/// Information that is positive definite.
+/// Information made positive definite.
 fn positive_definite([a, b, c]: [f64; 3]) -> [f64; 3] {
     let floor = 1e-6 + 1e-4 * (a + c);
     [a + floor, b, c + floor]
 }
 
-/// Geometric mean over the places with data: the density that the accepted changes show over that of the
-/// residuals.
+/// Geometric mean over the nodes with data: the density of the accepted changes over that of the residuals.
 fn excess<T: SimdReal>(statistics: &WindowStatistics<T>, data: &Planes<T>) -> f64 {
     let (width, height) = statistics.size();
     let (mut sum, mut count) = (0.0, 0.0);

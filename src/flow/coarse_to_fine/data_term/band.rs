@@ -1,5 +1,4 @@
-//! A band of site rows, tile after tile, row after row: what a row needs from the rows above stays in the
-//! processor's caches.
+//! One band of site rows, tile by tile and row by row, so that the rows above stay in the processor's caches.
 
 use super::View;
 use super::dense::dense_row;
@@ -11,12 +10,12 @@ use crate::flow::coarse_to_fine::planes::{LEFT as GRID_LEFT, Planes};
 use crate::simd::{Kernel, Lanes, SimdReal};
 use std::ops::Range;
 
-/// Most site columns of a tile.
+/// Maximum site columns of a tile, so that its rows fit the second-level cache.
 const TILE: usize = 320;
 
-/// What all bands of a level share.
+/// Inputs that all bands of a level share.
 pub(super) struct Task<'a, T> {
-    /// Of the level, in pixels.
+    /// Size of the level, pixels.
     pub size: (usize, usize),
     pub views: &'a [View<'a, T>],
     pub motion: &'a Planes<T>,
@@ -48,8 +47,7 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
         let radius = self.task.taps.len() - 1;
         let width = sites.div_ceil(sites.div_ceil(TILE)).next_multiple_of(CHUNK);
         for from in (0..sites).step_by(width) {
-            // The stencils read one pixel beyond the window, and the last odd column is not blended with the
-            // site after it.
+            // The stencils read one pixel beyond the window, and the last odd column needs the site after it.
             let columns = Columns::new(from, (from + width).min(sites), self.task.size.0, radius / 2 + 2, V::LANES);
             self.scratch.prepare(columns, radius);
             self.tile::<V>(&columns);
@@ -125,7 +123,7 @@ impl<T: SimdReal> Band<'_, T> {
         let out = &mut self.out[(site - self.rows.start) * len..(site + 1 - self.rows.start) * len];
         let at = |plane: usize| plane * self.task.stride + GRID_LEFT + columns.from;
         let mut starts = [0; 64];
-        // Plane by plane: what the one filter writes is still in the nearest cache when the other reads it.
+        // Plane by plane: the output of one filter is still in the nearest cache when the other reads it.
         for plane in 0..PRODUCTS {
             for (k, start) in starts[..ring].iter_mut().enumerate() {
                 *start = (2 * site + k) % ring * columns.row(PRODUCTS) + plane * row;

@@ -1,4 +1,4 @@
-//! The motion at every pixel: between sites parabolas that have their values and the turn of their slopes.
+//! Motion at every pixel: between sites, parabolas with the values of both and the change of their slopes.
 
 use super::scratch::{Columns, LEFT};
 use crate::flow::coarse_to_fine::planes::{LEFT as GRID_LEFT, Planes};
@@ -22,7 +22,7 @@ pub(super) fn dense_row<V: Lanes>(
 }
 
 /// Component `c` and its slope along x where row `y` of pixels crosses the columns of sites, and one site
-/// further than the level has.
+/// beyond the last.
 #[inline(always)]
 fn site_row<V: Lanes>(
     motion: &Planes<V::Scalar>,
@@ -63,7 +63,7 @@ fn site_row<V: Lanes>(
         }
         along.copy_from_slice(ux);
     }
-    // The site beyond the last: halfway to it lies what the last one extrapolates to.
+    // The site beyond the last is extrapolated.
     let end = motion.width - columns.first;
     if end <= n {
         let last = LEFT + end - 1;

@@ -1,8 +1,8 @@
-//! The data term of one linearisation on one level: the views warped by the present motion, rows 1-3 of the
-//! equations of affine flow at every pixel, and their windowed normal equations at every site.
+//! Data term of one linearisation on one level: the views warped by the present motion, rows 1 to 3 of the
+//! equations of affine flow at every pixel, and windowed normal equations at every site.
 //!
 //! A site (X, Y) is the pixel (2X, 2Y). With `A` the mean and `R` the rate of the warped views and `m` the
-//! motion they were warped by, a pixel says
+//! motion they were warped by, the equations of a pixel are
 //!
 //! ```text
 //! A_x u + A_y v = -R + A_x u_m + A_y v_m
@@ -10,12 +10,12 @@
 //! g (A_xy u + A_yy v) = g (-R_y + A_xy u_m + A_yy v_m)
 //! ```
 //!
-//! of the whole motion `u = u_0 + u_x x + u_y y` at its offset `(x, y)` from a site. These are rows 1 to 3 of
-//! `J(i)` (21) of WO2010/098160, transported to the site; how `A_x` changes the gradient along a deforming
-//! motion is already in the warped views. Warping is that of B. D. Lucas and T. Kanade, "An iterative image
-//! registration technique with an application to stereo vision", 1981, towards the middle of the views. The
-//! right side holds the whole motion and not only its increment, so that the smoothing by the window is
-//! applied once and not undone by the iterations.
+//! for the whole motion `u = u_0 + u_x x + u_y y` at its offset `(x, y)` from a site: rows 1 to 3 of `J(i)`
+//! (21) of WO2010/098160, transported to the site. The terms by which a deforming motion changes the gradient
+//! are already in the warped views. Warping towards the middle of the views follows B. D. Lucas and T.
+//! Kanade, "An iterative image registration technique with an application to stereo vision", 1981. The right
+//! side holds the whole motion and not only its increment, so that iterations do not undo the smoothing by
+//! the window.
 
 mod band;
 mod dense;
@@ -40,32 +40,31 @@ use rayon::prelude::*;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
 
-/// Most site rows of a band: the halo above and below costs a sixth of 32 rows, a tenth of 48; more would
-/// leave threads without work.
+/// Maximum site rows of a band: its halo costs a sixth of 32 rows and a tenth of 48; larger bands would leave
+/// threads idle.
 const BAND: usize = 48;
 
-/// Rows of each band: all alike, and as many bands as two threads can share. The split depends on the size
-/// alone.
+/// Rows of each band: equal, and an even number of bands. The split depends on the size alone.
 fn band_rows(height: usize) -> usize {
     let bands = height.div_ceil(BAND);
     height.div_ceil(if bands > 1 { bands.next_multiple_of(2) } else { bands })
 }
 
-/// Planes of the motion that comes in: `u, v, u_x, v_x, u_y, v_y`.
+/// Planes of the given motion: `u, v, u_x, v_x, u_y, v_y`.
 pub(super) const MOTION: usize = 6;
 
-/// One frame of a level, as the data term sees it.
+/// One frame of a level as input of the data term.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View<'a, T> {
-    /// Brightness between the pixels.
+    /// Brightness between pixels.
     pub spline: &'a Spline<T>,
-    /// Pixels that may be used; all where there is none.
+    /// Usable pixels; `None`: all.
     pub usable: Option<&'a Mask>,
-    /// When, in frames from the time that the motion belongs to.
+    /// Time, in frames from that of the motion.
     pub time: T,
-    /// Share in the mean `A`.
+    /// Weight in the mean `A`.
     pub mean: T,
-    /// Share in the rate `R`.
+    /// Weight in the rate `R`.
     pub rate: T,
 }
 
@@ -76,14 +75,13 @@ impl<'a, T: SimdReal> View<'a, T> {
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
     }
 
-    /// Three frames about the middle one's time.
+    /// Three frames about the time of the middle one.
     pub fn triple(splines: [&'a Spline<T>; 3], usable: [Option<&'a Mask>; 3]) -> [Self; 3] {
         let parts = [(-1.0, 0.25, -0.5), (0.0, 0.5, 0.0), (1.0, 0.25, 0.5)];
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
     }
 
-    /// Two frames, at the first one's time: what differs from [`View::pair`] is whose pixels the motion
-    /// belongs to.
+    /// Two frames at the time of the first one, whose pixels the motion then belongs to.
     pub fn ahead(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
         let parts = [(0.0, 0.5, -1.0), (1.0, 0.5, 1.0)];
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
@@ -95,14 +93,14 @@ impl<'a, T: SimdReal> View<'a, T> {
     }
 }
 
-/// How pixels are weighed and summed.
+/// Weights and window of the equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DataOptions {
     /// Weight `g` of the rows 2 and 3 against row 1, px.
     pub gradient: f64,
-    /// Standard deviation of the Gaussian window, px; it is cut off at three of them.
+    /// Standard deviation of the Gaussian window, px; truncated at three of them.
     pub sigma: f64,
-    /// Robust constant `c`: a pixel whose `R` is `c` scales weighs half.
+    /// Robust constant `c`: a pixel with `R` of `c` standard deviations has weight 1/2.
     pub robust: f64,
 }
 
@@ -112,11 +110,11 @@ impl Default for DataOptions {
     }
 }
 
-/// The working memory of the threads that make data terms.
+/// Working memory of the threads.
 #[derive(Debug, Default)]
 pub(super) struct Pool<T>(Mutex<Vec<Scratch<T>>>);
 
-/// Makes data terms.
+/// Computes data terms.
 #[derive(Debug)]
 pub(super) struct DataTerm<'a, T> {
     level: Level,
@@ -130,12 +128,12 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         Self { level, options, taps: taps(options.sigma), pool }
     }
 
-    /// The [`COUNT`] planes of moments of a level of `size` pixels, in `out`; and `|R|` at every fourth
-    /// usable pixel of every fourth row.
+    /// Writes the [`COUNT`] planes of moments of a level of `size` pixels to `out`; returns `|R|` at every
+    /// fourth usable pixel of every fourth row.
     ///
     /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
-    /// the standard deviation of `R` where brightness is constant; without it every usable pixel weighs 1.
-    /// Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on the
+    /// the standard deviation of `R` where brightness is constant; without it every usable pixel has weight
+    /// 1. Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on the
     /// number of threads.
     pub fn linearise(
         &self,

@@ -4,14 +4,15 @@
 //! that they are multiplied by and `c` the component, the normal matrix and the right side are
 //!
 //! ```text
-//! N[(k, c), (l, d)] = sum over the window of g x_k x_l P_cd        x_0, x_1, x_2 = 1, x, y px from the site
-//! n[(k, c)]         = sum over the window of g x_k q_c             sum of g over the whole window = 1
-//! P_uu = w (A_x^2 + G (A_xx^2 + A_xy^2))          q_u = w (A_x b_1 + G (A_xx b_2 + A_xy b_3))      G = g^2 of the gradient rows
+//! N[(k, c), (l, d)] = sum over the window of g x_k x_l P_cd
+//! n[(k, c)]         = sum over the window of g x_k q_c
+//! P_uu = w (A_x^2 + G (A_xx^2 + A_xy^2))          q_u = w (A_x b_1 + G (A_xx b_2 + A_xy b_3))
 //! P_uv = w (A_x A_y + G (A_xx A_xy + A_xy A_yy))  q_v = w (A_y b_1 + G (A_xy b_2 + A_yy b_3))
 //! P_vv = w (A_y^2 + G (A_xy^2 + A_yy^2))          e   = w (R^2 + G (R_x^2 + R_y^2))
 //! ```
 //!
-//! with `w` between 0 (not usable) and 1. [`normal`] and [`right`] name the planes.
+//! with `x_0, x_1, x_2 = 1, x, y` px from the site, `g` the window (sum 1), `G` the squared weight of the
+//! gradient rows and `w` between 0 (not usable) and 1. [`normal`] and [`right`] name the planes.
 
 use super::scratch::{CHUNK, Columns, LEFT};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -50,10 +51,10 @@ pub(in super::super) const VV: usize = 2;
 pub(in super::super) const ENERGY: usize = 3;
 /// Share of the window that is usable.
 pub(in super::super) const SEEN: usize = 4;
-/// Number of planes.
+/// Number of planes of the summary.
 pub(in super::super) const SUMMARY: usize = 5;
 
-/// The summary of a data term.
+/// Summary of a data term for later stages: all its planes would be most of an estimate's memory.
 pub(in super::super) fn summary<T: SimdReal>(space: &PlanePool<T>, data: &Planes<T>) -> Planes<T> {
     let mut out = space.planes(data.width, data.height, SUMMARY);
     let planes = [(UU, normal(0, 0)), (UV, normal(0, 1)), (VV, normal(1, 1)), (ENERGY, ERROR), (SEEN, VALID)];
@@ -66,7 +67,7 @@ pub(in super::super) fn summary<T: SimdReal>(space: &PlanePool<T>, data: &Planes
 /// The filters of one axis at distance 0, 1, ...: `[g, g k, g k^2]` of the Gaussian of `sigma` px, its full
 /// sum 1.
 pub(super) fn taps<T: SimdReal>(sigma: f64) -> Vec<[T; 3]> {
-    // The margins of the rows hold no wider window.
+    // The margins of the rows do not hold a wider window.
     let radius = ((3.0 * sigma + 0.5) as usize).min(2 * LEFT - 2);
     let raw: Vec<f64> = (0..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();

@@ -1,4 +1,4 @@
-//! What the equations of one pixel add to the normal equations.
+//! Contributions of one pixel's equations to the normal equations.
 
 use super::scratch::{Columns, IMAGE, LEFT, PRODUCTS};
 use crate::simd::{Lanes, SimdReal};
@@ -48,7 +48,7 @@ fn along<V: Lanes>([left, here, right]: [V; 3]) -> [V; 3] {
 pub(super) struct Weights<V> {
     /// Square of the gradient rows' weight.
     pub gradient: V,
-    /// 1 / (c s), the inverse of the `R` at which a pixel weighs half; 0: all weigh the same.
+    /// 1 / (c s), the inverse of the `R` at which a pixel has weight 1/2; 0: all have weight 1.
     pub inverse: V,
 }
 
@@ -114,7 +114,7 @@ fn products<V: Lanes>(near: [[V; 3]; 5], [u, v, valid]: [V; 3], weights: Weights
     let [ayy, _, _] = along(near[2]);
     let [r, rx, _] = along(near[3]);
     let [ry, _, _] = along(near[4]);
-    // What was not seen may be anything: it must not come through as 0 times infinity.
+    // Unusable pixels may hold any value: it must not enter as 0 times infinity.
     let seen = V::zero().lt(valid);
     let (u, v) = (V::select(seen, u, V::zero()), V::select(seen, v, V::zero()));
     let b1 = ax.mul_add(u, ay.mul_add(v, -r));

@@ -1,8 +1,8 @@
-//! The rows that a band keeps at hand.
+//! Rows that a band keeps in memory.
 //!
-//! Every row of pixels lies as two halves, the even and the odd columns: column `2X` is sample `X` of the
-//! first half, column `2X + 1` sample `X` of the second. Motion on the sites widens to such rows, and windows
-//! on the sites read them, without moving a sample across lanes.
+//! Every row of pixels is stored as two halves, the even and the odd columns: column `2X` is sample `X` of
+//! the first half, column `2X + 1` sample `X` of the second. Motion on the sites is interpolated to such
+//! rows, and windows on the sites read them, without moving a sample across lanes.
 
 use crate::simd::SimdReal;
 
@@ -10,7 +10,7 @@ use crate::simd::SimdReal;
 pub(super) const LEFT: usize = 16;
 /// Window filters write this many sites at a time.
 pub(super) const CHUNK: usize = 32;
-/// Images and motion: rows kept.
+/// Rows of images and motion that are kept.
 pub(super) const RING: usize = 3;
 
 /// The columns of a tile.
@@ -20,9 +20,9 @@ pub(super) struct Columns {
     pub first: usize,
     /// Samples to compute in a half, a multiple of the lanes.
     pub count: usize,
-    /// Site columns to write: from here ...
+    /// First site column to write.
     pub from: usize,
-    /// ... to here.
+    /// End of the site columns to write.
     pub to: usize,
     /// Columns of the level, in pixels.
     pub width: usize,
@@ -31,8 +31,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Site columns `from..to` of a level of `width` pixels, with `halo` more to both sides, as far as the
-    /// level has them.
+    /// Site columns `from..to` of a level of `width` pixels, with up to `halo` more on both sides.
     pub fn new(from: usize, to: usize, width: usize, halo: usize, lanes: usize) -> Self {
         let first = from.saturating_sub(halo);
         let count = ((to + halo).min(width.div_ceil(2)) - first).next_multiple_of(lanes);
@@ -85,15 +84,15 @@ pub(super) const IMAGE: usize = 5;
 pub(super) const STENCIL: usize = 5;
 /// Planes of products: `P_uu, P_uv, P_vv, q_u, q_v, e`, validity.
 pub(super) const PRODUCTS: usize = 7;
-/// Most planes that the vertical filters make of one.
+/// Maximum number of planes that the vertical filters make of one.
 pub(super) const VERTICAL: usize = 3;
 
-/// All of it.
+/// All rows of a band.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<T> {
     columns: Columns,
     radius: usize,
-    /// Column numbers, and 1 inside the rim, 0 on it and beyond.
+    /// Column numbers, and 1 inside the border, 0 on it and beyond.
     pub frame: Buffer<T>,
     /// `u, u_x, v, v_x` on the site columns of a pixel row: halves, not rows.
     pub sites: Buffer<T>,

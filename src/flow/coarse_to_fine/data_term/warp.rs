@@ -1,18 +1,18 @@
-//! The views along the motion: their mean, their rate, and where all of them can be seen.
+//! Views along the motion: their mean, their rate, and where all of them are usable.
 
 use super::View;
 use super::scratch::Columns;
 use crate::simd::{Lanes, SimdReal};
 use crate::types::Mask;
 
-/// Most lanes of a vector.
+/// Maximum number of lanes of a vector.
 const MAX_LANES: usize = 16;
 
 /// Mean and rate of the views in row `y` of a level of `width x height` pixels, and 1 where every view is
-/// seen inside the rim on a usable pixel.
+/// usable and inside the border.
 ///
 /// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are
-/// known.
+/// given.
 #[inline(always)]
 pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     views: &[View<'_, T>],

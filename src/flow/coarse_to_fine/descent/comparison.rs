@@ -1,4 +1,4 @@
-//! Two motions between the same frames: each site takes the one that explains them better.
+//! Compares two motions between the same frames; each site takes the one with less residual energy.
 
 use crate::flow::coarse_to_fine::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, Pool, VALID};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -6,29 +6,28 @@ use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
 use crate::simd::{Level, SimdReal};
 
-/// A motion must leave so many times less of the frames than the one that it replaces, what is usually left
-/// added to both: less is chance.
+/// Minimum ratio of residual energies, the typical energy added to both: smaller differences are chance.
 const MIN_ENERGY_RATIO: f64 = 1.1;
-/// Where less of a window than this is seen, less than in a corner of the frame, what a motion leaves there
-/// tells nothing.
+/// Minimum usable share of a window, somewhat less than in a corner of the frame.
 const MIN_USABLE_SHARE: f64 = 0.1;
 
-/// What motions are compared by.
+/// Frames and scales by which motions are compared.
 pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
     pub simd: Level,
-    /// The level whose sites the motions are on.
+    /// Level whose sites the motions are on.
     pub level: &'a PyramidLevel<T>,
-    /// Its frames that are compared.
+    /// Frames that are compared.
     pub compared: ComparedFrames,
-    /// Standard deviation of the residual.
+    /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
     pub pool: &'a Pool<T>,
     pub space: &'a PlanePool<T>,
 }
 
 impl<T: SimdReal> Comparison<'_, T> {
-    /// Lets `other` replace the `motion` where it is further from it than `apart`, px of the level, and
-    /// explains the frames better; beside such sites both are blended. Whether there are such sites.
+    /// Replaces `motion` by `other` where both differ by more than `min_distance`, px of the level, and
+    /// `other` has less residual energy; beside such sites both are blended. Returns whether there are such
+    /// sites.
     pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
         let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
         let typical = median(known.iter().copied().filter(|residual_energies| !residual_energies.is_nan()).collect());
@@ -38,7 +37,7 @@ impl<T: SimdReal> Comparison<'_, T> {
                 [0, 1].map(|k| (motion.at(k, n % size.0, n / size.0) - other.at(k, n % size.0, n / size.0)).to_f64());
             u.hypot(v)
         };
-        // Comparisons with what is not known are false.
+        // Comparisons with NaN are false.
         let better =
             |n: usize| MIN_ENERGY_RATIO * (found[n] + typical) < known[n] + typical && distance(n) > min_distance;
         let wins: Vec<bool> = (0..known.len()).map(better).collect();
@@ -57,8 +56,7 @@ impl<T: SimdReal> Comparison<'_, T> {
         true
     }
 
-    /// The residual energy that a motion leaves around each site, grey^2, row by row; NaN where too little is
-    /// seen.
+    /// Residual energy of a motion around each site, grey^2, row by row; NaN where too little is usable.
     fn residual_energies(&self, motion: &Planes<T>) -> Vec<f64> {
         let mut data = self.space.planes(motion.width, motion.height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), self.pool);
@@ -74,12 +72,12 @@ impl<T: SimdReal> Comparison<'_, T> {
     }
 }
 
-/// The upper median; nothing of nothing.
+/// The upper median; 0 of an empty list.
 fn median(mut values: Vec<f64>) -> f64 {
     crate::math::median(&mut values).unwrap_or(0.0)
 }
 
-/// The share of sites around one that win, by their nearness: half the weight along each axis is its own.
+/// Weighted share of winning sites around one; half of the weight along each axis is its own.
 fn share_around(wins: &[bool], (width, height): (usize, usize), (x, y): (usize, usize)) -> f64 {
     let near = |at: usize, len: usize| [(at.saturating_sub(1), 0.25), (at, 0.5), ((at + 1).min(len - 1), 0.25)];
     let mut share = 0.0;
@@ -127,8 +125,8 @@ mod tests {
                 assert!(u[2..12].iter().all(|u| *u == 0.0) && u[20..].iter().all(|u| *u == 1.0), "{y}: {u:?}");
             }
         }
-        // (Along the left edge nothing is seen of what is said to have come from outside.) Nothing is better
-        // than itself, or than what is as near as that.
+        // Along the left edge nothing is visible of what would have come from outside. No motion is better
+        // than itself or than one nearer than the minimum distance.
         for (other, min_distance) in [(&moved, 0.0), (&still, 1.0)] {
             let mut same = moved.clone();
             assert!(!comparison.replace_where_better(&mut same, other, min_distance));

@@ -1,4 +1,4 @@
-//! What a level found, refined before the next finer one begins with it.
+//! Intermediate refinement: a level's motion is refined before the next finer level starts from it.
 
 use crate::flow::coarse_to_fine::data_term::{MOTION, summary};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -8,13 +8,13 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Refinement that moves a site this far, px of the level, counts half: it takes noise away, while what it
-/// would move by more is a small object's own motion.
+/// Distance, px of the level, at which refinement has half its weight: smaller changes remove noise, larger
+/// ones would remove the own motion of small objects.
 const HALF_WEIGHT_DISTANCE: f64 = 0.35;
 
-/// Refines the `motion` of a level, given the `data` it was coupled with, for a finer one to begin with.
+/// Refines the `motion` of a level, given its `data` term, as start of the next finer level.
 ///
-/// Each site goes the share `1 / (1 + (d / c)^4)` of the way `d` to its refined motion, `c` = 0.35 px.
+/// A site moves by the share `1 / (1 + (d / c)^4)` of the distance `d` to its refined motion, `c` = 0.35 px.
 pub(super) fn refine_intermediate<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -31,13 +31,13 @@ pub(super) fn refine_intermediate<T: SimdReal>(
         .for_each(|planes| space.keep(planes));
 }
 
-/// Moves `motion` towards what is `refined`, the less the further that is.
+/// Moves `motion` towards `refined`, less where they are farther apart.
 fn blend_towards<T: SimdReal>(simd: Level, motion: &mut Planes<T>, refined: &Planes<T>) {
     let (len, stride) = (motion.row_len(), motion.stride());
     for_each_band(motion.data_mut(), len, |_, rows, out| dispatch(simd, Blend { refined, rows, out, stride }));
 }
 
-/// Some rows of [`draw_near`].
+/// Some rows of [`blend_towards`].
 struct Blend<'a, T> {
     refined: &'a Planes<T>,
     rows: Range<usize>,

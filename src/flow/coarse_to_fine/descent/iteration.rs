@@ -1,4 +1,4 @@
-//! One iteration: a linearisation, and the motion that follows from it.
+//! One iteration: a linearisation and the regularised solution that follows.
 
 use super::DescentPlan;
 use super::comparison::Comparison;
@@ -11,46 +11,47 @@ use crate::flow::coarse_to_fine::resample::rederive;
 use crate::simd::SimdReal;
 use std::ops::Range;
 
-/// Noise is taken for at least this share of the brightness' standard deviation.
+/// Minimum standard deviation of the noise, as a share of that of the brightness.
 const MIN_NOISE_SHARE: f64 = 1e-3;
-/// The scale of the robust weights is at least this share of the brightness' standard deviation.
+/// Minimum scale of the robust weights, as a share of the standard deviation of the brightness.
 const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 
-/// A site that an iteration moves further than this is on its way, px of the level.
+/// Distance, px of the level, beyond which a site has not converged.
 const MIN_MOVING_DISTANCE: f64 = 0.1;
-/// So many of those may be an object that is too small to be felt in the mean over the frame.
+/// Number of such sites that may be an object too small to change the mean over the frame.
 const MIN_OBJECT_SITES: usize = 4;
-/// SamplingGrid along the edge that do not count, at least and at most: what leaves the frame there may drift for
-/// ever, and leads the further the more sites there are.
+/// Minimum and maximum width, sites, of a border that is not counted: motion out of the frame may drift
+/// without end.
 const BORDER_SITES: (usize, usize) = (2, 4);
-/// A sixteenth of the sites, within those bounds.
+/// The border is this fraction of the sites, within those bounds.
 const BORDER_DIVISOR: usize = 16;
 
-/// Iterations with loose bonds, and these: each site follows its own data. A small object that moves before a
-/// still ground is held back by the usual ones, but the ground could not be told as well.
+/// Iterations of the unregularised trial and its weak smoothness: each site follows its own data. A small
+/// object before a static ground is held back by the usual smoothness, which the ground needs.
 const TRIAL: (usize, Smoothness) =
     (3, Smoothness { flow: 1.0, jacobian: 100.0, break_strain: 0.1, sweeps: 4, reweight_every: 2 });
-/// What they find is another motion when it is further away than this, px of the level; nearer, it is the
-/// same with more noise.
+/// Minimum distance, px of the level, of the trial's motion from the regularised one; nearer, it is the same
+/// motion with more noise.
 const MIN_MOTION_DIFFERENCE: f64 = 0.5;
-/// Where the first of them moves no site by this much, none is on its way to another motion, px of the level.
+/// Minimum change in the first iteration of the trial, px of the level: without it, no site leaves its
+/// motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
-/// Iterations that join both motions.
+/// Regularised iterations after both motions are combined.
 const JOINT_ITERATIONS: usize = 2;
 
-/// One linearisation, and the motion that follows from it.
+/// One linearisation and the regularised solution.
 pub(super) struct Iteration<'a, T> {
     pub plan: &'a DescentPlan,
     pub compared: ComparedFrames,
     pub term: DataTerm<'a, T>,
     pub data: &'a mut Planes<T>,
     pub scratch: &'a mut RegularizeScratch<T>,
-    /// Standard deviation of what brightness changes by along the motion, from the iteration before.
+    /// Standard deviation of the residual of the previous iteration, grey levels.
     pub residual_std: Option<T>,
 }
 
 impl<T: SimdReal> Iteration<'_, T> {
-    /// Iterates once; the motion before is the `old` one afterwards.
+    /// Iterates once; `old` becomes the previous motion. Returns the root-mean-square change of the flow, px.
     pub fn advance(
         &mut self,
         level: &PyramidLevel<T>,
@@ -62,7 +63,7 @@ impl<T: SimdReal> Iteration<'_, T> {
         self.iterate(level, smoothness, motion)
     }
 
-    /// Iterates so many times.
+    /// Iterates `count` times.
     fn repeat(
         &mut self,
         count: usize,
@@ -75,8 +76,8 @@ impl<T: SimdReal> Iteration<'_, T> {
         }
     }
 
-    /// Tries sites without their neighbours, and gives the `motion` what explains the frames better: small
-    /// objects come free.
+    /// Unregularised trial: estimates sites without their neighbours and keeps what explains the frames
+    /// better, so that small objects are found.
     pub fn try_unregularized(
         &mut self,
         level: &PyramidLevel<T>,
@@ -98,7 +99,7 @@ impl<T: SimdReal> Iteration<'_, T> {
         space.keep(trial);
     }
 
-    /// Linearises about `motion` and moves it; by how much, px (root mean square).
+    /// Linearises about `motion` and updates it. Returns the root-mean-square change of the flow, px.
     fn iterate(&mut self, level: &PyramidLevel<T>, smoothness: &Smoothness, motion: &mut Planes<T>) -> f64 {
         let views = level.views(self.compared);
         let residuals = self.term.linearise(level.size, &views, motion, self.residual_std, self.data);
@@ -108,7 +109,7 @@ impl<T: SimdReal> Iteration<'_, T> {
         regularize(self.plan.simd, self.data, motion, smoothness, floor, self.scratch)
     }
 
-    /// Robust standard deviation of residuals whose magnitudes these are.
+    /// Robust standard deviation from the absolute values of residuals (1.4826 times the median).
     fn residual_std(&self, mut residuals: Vec<T>) -> Option<T> {
         if residuals.is_empty() {
             return None;
@@ -120,13 +121,12 @@ impl<T: SimdReal> Iteration<'_, T> {
     }
 }
 
-/// Whether no object is on its way any more, after an iteration `from` a motion `to` another. SamplingGrid of the
-/// rim do not count.
+/// Whether no object is still moving between two iterations. Sites of the border do not count.
 pub(super) fn has_settled<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> bool {
     moving_inside(from, to) < MIN_OBJECT_SITES
 }
 
-/// How many sites, but for those of the rim, are on their way.
+/// Number of sites inside the border that have not converged.
 fn moving_inside<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> usize {
     let without_border = |len: usize| {
         let border = (len / BORDER_DIVISOR).clamp(BORDER_SITES.0, BORDER_SITES.1).min(len);
@@ -135,7 +135,7 @@ fn moving_inside<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> usize {
     moving((from, to), MIN_MOVING_DISTANCE, (without_border(to.width), without_border(to.height)))
 }
 
-/// How many of the sites in some columns and rows are further than `far` px from where they were.
+/// Number of sites in some columns and rows that moved by more than `distance` px.
 fn moving<T: SimdReal>(
     (from, to): (&Planes<T>, &Planes<T>),
     distance: f64,
@@ -150,7 +150,7 @@ fn moving<T: SimdReal>(
     rows.map(in_row).sum()
 }
 
-/// The motion in planes of its own; there may be more planes in what it comes from.
+/// A copy of the motion; its source may have more planes.
 pub(super) fn copy<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>) -> Planes<T> {
     let mut out = space.planes(motion.width, motion.height, MOTION);
     for (k, y) in (0..MOTION).flat_map(|k| (0..motion.height).map(move |y| (k, y))) {

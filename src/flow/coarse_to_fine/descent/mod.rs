@@ -1,4 +1,4 @@
-//! From level to level: the iterations.
+//! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
 
 pub(super) mod comparison;
 mod intermediate;
@@ -17,34 +17,34 @@ use intermediate::refine_intermediate;
 use iteration::{Iteration, copy, has_settled};
 use std::ops::RangeInclusive;
 
-/// What all iterations have in common.
+/// Settings of all iterations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DescentPlan {
     pub simd: Level,
     pub schedule: Schedule,
-    /// How brightness was scaled.
+    /// Scaling of the brightness.
     pub brightness: BrightnessScale,
-    /// The finest level there is to work on.
+    /// Finest level to estimate.
     pub finest: usize,
-    /// Whether [`Plan::all`] keeps what it finds on the way.
+    /// Whether the motion on coarser levels is kept, for the covariance.
     pub keeps_levels: bool,
 }
 
-/// What there is on the finest level.
+/// Result on the finest level.
 #[derive(Debug)]
 pub(super) struct DescentResult<T> {
-    /// The coupled motion.
+    /// The regularised motion.
     pub motion: Planes<T>,
-    /// The summary of the last data term.
+    /// Summary of the last data term.
     pub data: Planes<T>,
-    /// Standard deviation of the residual.
+    /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
-    /// The coupled motion on each coarser level, the finest of them first, where it was to be kept.
+    /// The regularised motion on each coarser level, the finest first, if kept.
     pub coarser_motions: Vec<Planes<T>>,
 }
 
 impl DescentPlan {
-    /// The way down from the coarsest level of the filled pyramid, where nothing is known.
+    /// Descends from the coarsest level of the filled pyramid, starting without motion.
     pub fn from_coarsest<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
@@ -56,7 +56,7 @@ impl DescentPlan {
         self.descend(workspace, ComparedFrames::All, motion, (&schedules, self.finest))
     }
 
-    /// Once more about a better `motion`, on the finest level.
+    /// Repeats the finest level about a better `motion`.
     pub fn relinearise<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> DescentResult<T> {
         let start = copy(&workspace.space, motion);
         self.descend(
@@ -67,9 +67,9 @@ impl DescentPlan {
         )
     }
 
-    /// The way for the step to the next frame alone, from two levels above the finest down. It begins with
-    /// what is known of all frames together, the `motion`, but for what the next frame alone tells better on
-    /// the levels above: things may turn back.
+    /// The step to the next frame alone, from two levels above the finest down. Starts from the `motion` of
+    /// all frames, except where the next frame alone gives a better one on coarser levels: objects may turn
+    /// back.
     pub fn next_step<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> DescentResult<T> {
         let coarsest = workspace.pyramid.levels().len() - 1;
         let first = coarsest.min(self.finest + self.schedule.next_frame_iterations.len() - 1);
@@ -82,13 +82,13 @@ impl DescentPlan {
         self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, self.finest))
     }
 
-    /// The same, but that nothing is kept on the way.
+    /// The same plan without keeping coarser levels.
     fn without_levels(&self) -> Self {
         Self { keeps_levels: false, ..*self }
     }
 
-    /// Gives the `motion` on a level what the next frame alone, from the coarsest level down to the one
-    /// above, tells better.
+    /// Replaces the `motion` on a level where the middle and the next frame alone, from the coarsest level
+    /// down to the one above, give a better one.
     fn replace_from_next_frame<T: SimdReal>(&self, workspace: &mut Workspace<T>, level: usize, motion: &mut Planes<T>) {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
@@ -109,7 +109,7 @@ impl DescentPlan {
         }
     }
 
-    /// From the coarsest of the levels that `limits` names, on which `motion` is, down to the level `to`.
+    /// Descends from the coarsest level that has a schedule, on which `motion` is given, to the level `to`.
     fn descend<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,
@@ -131,7 +131,7 @@ impl DescentPlan {
             }
             for _ in 0..schedule.max_iterations {
                 let change = step.advance(level, &schedule.smoothness, (&mut motion, &mut old));
-                // On the finest level what is left to do is for the coarser ones to have done.
+                // The finest level does not wait for objects: coarser levels have found them.
                 let is_calm = || k == self.finest || has_settled(&old, &motion);
                 if change <= schedule.tolerance && is_calm() {
                     break;
@@ -155,7 +155,7 @@ impl DescentPlan {
     }
 }
 
-/// The motion on the last of some levels from that on the first.
+/// Carries the motion from the first of some levels up to the last.
 fn coarsened<T: SimdReal>(workspace: &Workspace<T>, motion: &Planes<T>, levels: RangeInclusive<usize>) -> Planes<T> {
     let space = &workspace.space;
     let mut out = copy(space, motion);
@@ -167,7 +167,7 @@ fn coarsened<T: SimdReal>(workspace: &Workspace<T>, motion: &Planes<T>, levels: 
     out
 }
 
-/// SamplingGrid along x and y of a level of `size` pixels.
+/// Sites along x and y of a level of `size` pixels.
 fn site_counts(size: (usize, usize)) -> (usize, usize) {
     (size.0.div_ceil(2), size.1.div_ceil(2))
 }

@@ -1,4 +1,4 @@
-//! Where the frames do not agree with the motion that was found.
+//! Sites where the frames contradict the motion.
 
 use crate::flow::coarse_to_fine::data_term::{DataOptions, ENERGY, UU, VV};
 use crate::flow::coarse_to_fine::estimate::Estimate;
@@ -7,26 +7,25 @@ use crate::simd::SimdReal;
 use crate::types::Mask;
 use rayon::prelude::*;
 
-/// SamplingGrid that the usual energy is taken from, about.
+/// Approximate maximum number of sites in the median of the energy.
 const MAX_SAMPLES: usize = 20_000;
-/// Rows of a task, at least.
+/// Minimum rows of a parallel task.
 const ROWS_PER_TASK: usize = 16;
 
-/// Residual energy, over that of the usual textured site, from which on frames contradict the motion.
+/// Maximum residual energy over that of the typical textured site.
 const MAX_ENERGY_RATIO: f64 = 10.0;
-/// Residual energy over information, px^2: where texture is strong, so are the errors of its interpolation,
-/// and a residual that a shift of this square explains is none.
+/// Residual energy over information, px^2, that interpolation may cause: with strong texture its errors are
+/// large, and a residual explained by a shift of 0.1 px is no contradiction.
 const MAX_EXPLAINED_SHIFT_SQUARE: f64 = 0.01;
-/// Share of the brightness' standard deviation that is never a residual.
+/// Minimum residual, as a share of the standard deviation of the brightness.
 const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 
-/// Residual energy over information, px^2, beyond which frames have nothing to do with each other, however
-/// usual that is; and the share of the brightness' standard deviation that the residual then has at least, so
-/// that noise where there is no texture is no contradiction.
+/// Residual energy over information, px^2, beyond which the frames are unrelated, however common that is; and
+/// the minimum residual for it, as a share of the standard deviation of the brightness, since noise without
+/// texture is no contradiction.
 const UNRELATED: (f64, f64) = (0.5, 0.15);
 
-/// The sites of the data whose residual, along the motion, stands out: what is seen in one frame is hidden in
-/// the other or has changed, or its motion was missed.
+/// Sites with an outlying residual along the motion: occluded in one frame, changed, or wrongly matched.
 #[derive(Debug)]
 pub(super) struct Consistency {
     contradicted: Mask,
@@ -54,12 +53,12 @@ impl Consistency {
         Self { contradicted, rows }
     }
 
-    /// At a site.
+    /// Whether the frames contradict the motion at a site.
     pub fn is_contradicted(&self, x: usize, y: usize) -> bool {
         self.contradicted.get(x, y)
     }
 
-    /// At any site of a row.
+    /// Whether they do at any site of a row.
     pub fn has_contradiction(&self, y: usize) -> bool {
         self.rows[y]
     }
@@ -71,8 +70,8 @@ fn row_energies<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item =
     uu.iter().zip(vv).zip(energy).map(|((uu, vv), energy)| [uu.to_f64() + vv.to_f64(), energy.to_f64()])
 }
 
-/// Median of the energies of that half of the sites which has most information: untextured ones show no
-/// residual whatever the motion is.
+/// Median energy of the half of the sites with most information: untextured ones have no residual whatever
+/// the motion.
 fn typical_energy<T: SimdReal>(data: &Planes<T>) -> f64 {
     let stride = (data.width * data.height / MAX_SAMPLES).max(1);
     let mut known: Vec<_> = (0..data.height).flat_map(|y| row_energies(data, y)).step_by(stride).collect();

@@ -1,4 +1,4 @@
-//! From the sites' motion to the field that was asked for.
+//! Field at the requested sites: motion, covariance, status and diagnostics.
 
 mod consistency;
 
@@ -20,7 +20,7 @@ use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
 use rayon::prelude::*;
 
-/// Pixels between sites.
+/// Distance of the sites, px.
 const SITE_SPACING: f64 = 2.0;
 
 /// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
@@ -28,27 +28,27 @@ fn rows() -> f64 {
     1.0 + 2.0 * DataOptions::default().gradient.powi(2)
 }
 
-/// The covariance of the estimate, wherever it may be asked for.
+/// The covariance of the estimate at every node.
 pub(super) fn covariance_of<T: SimdReal>(
     estimate: &Estimate<T>,
     frames: &[&Frame<T>],
     common: &EstimatorOptions,
 ) -> CovarianceMaps<T> {
-    // White noise through the rows' stencils: half its variance in each row of a pair's difference, an eighth
-    // in a triple's.
+    // White noise through the stencils of the rows: half its variance in each row of a pair's difference, an
+    // eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let halving_gain = halved_noise().powi(estimate.level as i32);
     let energy_of = |variance: f64| share * rows() * halving_gain * variance * estimate.brightness.gain.powi(2);
     let noise = match common.noise {
         Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
-        // Rounding is the least noise that whole numbers can have.
+        // Rounding is the minimum noise of integer samples.
         None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
     };
     covariance(estimate, noise, frames.len() == 2, common.systematic)
 }
 
-/// Writes the estimate and its `covariance` at the field's sites. A pair's motion is carried from midway to
-/// the first frame.
+/// Writes the estimate and its covariance at the field's sites. A pair's motion is carried from midway to the
+/// first frame.
 pub(super) fn fill<T: SimdReal>(
     (estimate, spreads): (&Estimate<T>, Option<CovarianceMaps<T>>),
     space: &PlanePool<T>,
@@ -83,7 +83,7 @@ pub(super) fn fill<T: SimdReal>(
     moved.into_iter().chain(full).for_each(|planes| space.keep(planes));
 }
 
-/// The motion on the sites of the frame, where it was found on a coarser level.
+/// Motion on the sites of the frame, if estimated on a coarser level.
 fn at_full_resolution<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -100,19 +100,19 @@ fn at_full_resolution<T: SimdReal>(
     motion
 }
 
-/// Whether anything at all was seen: a constant image says nothing about motion.
+/// Whether there is any contrast: a constant image determines no motion.
 fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
     let (data, threshold) = (&estimate.data, 1e-9 * estimate.brightness.contrast.powi(2));
     (0..data.height).any(|y| data.line(UU, y).iter().chain(data.line(VV, y)).any(|v| v.to_f64() > threshold))
 }
 
-/// What the sites of the field are filled from.
+/// Sources of the field's values.
 struct Writer<'a, T: Clone> {
     simd: Level,
-    /// Pixels between the sites of the data.
+    /// Distance, px of the frame, between the sites of the data.
     pitch: usize,
     data: &'a Planes<T>,
-    /// From the root of the residual energy to grey levels.
+    /// Factor from the root of the residual energy to grey levels.
     per_row: f64,
     motion: &'a Planes<T>,
     reference: &'a Frame<T>,
@@ -139,7 +139,7 @@ impl<T: SimdReal> Writer<'_, T> {
         }
     }
 
-    /// The covariance and its systematic part, as far as they are wanted, with the planes they go to.
+    /// The covariance and its systematic part, if requested, with the planes they are written to.
     fn spreads<'s, 'p, 'b>(
         &'s self,
         band: &'p mut FieldBand<'b, T>,
@@ -149,8 +149,7 @@ impl<T: SimdReal> Writer<'_, T> {
         whole.zip(Some(&mut band.covariance)).into_iter().chain(systematic.zip(Some(&mut band.systematic)))
     }
 
-    /// Status and diagnostics of a site whose values are written; where there is no estimate they are taken
-    /// back.
+    /// Writes status and diagnostics of a site, and NaN where there is no valid estimate.
     fn finish_site(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
         let status = self.status(pixel);
         band.status[at] = status;
@@ -161,17 +160,16 @@ impl<T: SimdReal> Writer<'_, T> {
         self.diagnose(band, at, pixel, status.is_valid());
     }
 
-    /// Whether every pixel of row `y` has an estimate and nothing but that is wanted.
+    /// Whether every pixel of row `y` has a valid estimate and no diagnostics are requested.
     fn is_plain(&self, y: usize, band: &FieldBand<'_, T>) -> bool {
         let bare = band.residual.is_none() && band.rank.is_none() && band.condition.is_none() && band.window.is_none();
-        // Without a short circuit, so that the compiler may use lanes.
+        // Without a short circuit, so that the compiler uses lanes.
         let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
         let agrees = !self.consistency.has_contradiction(y / self.pitch);
         bare && agrees && self.observable && self.mask.is_none() && finite()
     }
 
-    /// Residual, rank and condition number, where they are wanted: those of the equations around the nearest
-    /// site.
+    /// Residual, rank and condition number of the equations at the nearest site, if requested.
     fn diagnose(&self, band: &mut FieldBand<'_, T>, at: usize, (x, y): (usize, usize), known: bool) {
         let (x, y) = (x / self.pitch, y / self.pitch);
         if let Some(window) = &mut band.window {
@@ -193,8 +191,7 @@ impl<T: SimdReal> Writer<'_, T> {
         }
     }
 
-    /// The window of the slopes around a site, px of the frame: that of the nearest place where windows were
-    /// chosen.
+    /// Window of the slopes, px of the frame, at the nearest node of the window statistics.
     fn window_at(&self, statistics: &WindowStatistics<T>, (x, y): (usize, usize)) -> T {
         let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
         let (columns, rows) = statistics.size();
@@ -202,7 +199,7 @@ impl<T: SimdReal> Writer<'_, T> {
         T::from_f64(slopes * self.pitch as f64 / SITE_SPACING)
     }
 
-    /// What can be said of a pixel before looking at its motion.
+    /// Status of a pixel, before its motion is looked at.
     fn status(&self, (x, y): (usize, usize)) -> Status {
         if self.mask.is_some_and(|mask| !mask.get(x, y)) {
             Status::Masked

@@ -1,16 +1,15 @@
-//! Peak locking: how texture that is too fine for the pixels draws the motion, measured in the frames and
-//! taken out.
+//! Peak locking: bias of the motion by undersampled texture, measured in the frames and removed.
 //!
 //! Detail of more than half a cycle per pixel is recorded at a wrong wave number, `k - 2 pi` instead of `k`.
 //! Shifting a frame by `d` px turns the true wave by `k d`, but the recorded one by `(k - 2 pi) d`. A pair is
-//! warped by `-u / 2` and `u / 2`, so what remains between the two is proportional to `sin(pi u)`, and draws
-//! the flow by `A sin(pi u)` towards half-integer displacements; where a frame stays as it is (a triple,
-//! warped by `-u`, 0 and `u`) by `A sin(2 pi u)`. Particle images show it most (M. Raffel et al., *Particle
+//! warped by `-u / 2` and `u / 2`, so the remaining difference is proportional to `sin(pi u)`, and biases the
+//! flow by `A sin(pi u)` towards half-integer displacements; where one frame is not warped (a triple, warped
+//! by `-u`, 0 and `u`), by `A sin(2 pi u)`. It is strongest in particle images (M. Raffel et al., *Particle
 //! Image Velocimetry*, on peak locking).
 //!
-//! `A` is a property of the texture, and can be seen: with the warped frames sampled half a pixel aside, the
-//! wrong waves change their sign and everything else stays. Half the difference of the two right sides is
-//! what the wrong waves add, regressed here on the sine over patches all over the frame.
+//! `A` is a property of the texture and can be measured: in warped frames sampled half a pixel aside, the
+//! aliased waves change their sign and everything else stays. Half the difference of the two right sides is
+//! the contribution of the aliases, regressed here on the sine over patches all over the frame.
 
 use super::data_term::{DataOptions, View};
 use super::planes::{LEFT, Planes};
@@ -23,26 +22,26 @@ use std::f64::consts::{PI, TAU};
 const SIDE: usize = 16;
 /// Samples of a patch.
 const SAMPLES: usize = SIDE * SIDE;
-/// Patches, about.
+/// Approximate number of patches.
 const PATCHES: f64 = 48.0;
-/// Fewer patches tell nothing.
+/// Minimum number of patches for a regression.
 const MIN_PATCHES: usize = 4;
-/// Amplitudes beyond this are no peak locking, px.
+/// Maximum amplitude of peak locking, px.
 const MAX_AMPLITUDE: f64 = 0.1;
 
-/// By how much the flow is drawn, `amplitude sin(2 pi cycles flow)` along each axis.
+/// Bias of the flow, `amplitude sin(2 pi cycles flow)` along each axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct PeakLocking {
-    /// px.
+    /// Amplitude, px.
     pub amplitude: [f64; 2],
     /// Variance of the amplitudes, px^2.
     pub variance: [f64; 2],
-    /// Cycles per px of flow: 1/2 for frames that are both warped halfway, 1 where one stays as it is.
+    /// Cycles per px of flow: 1/2 if both frames are warped halfway, 1 if one is not warped.
     pub cycles: f64,
 }
 
 impl PeakLocking {
-    /// Measures it on the finest `level`, whose motion is known. `scale`: the standard deviation of the
+    /// Measures the bias on the finest `level` from its motion. `residual_std`: standard deviation of the
     /// residual, for the robust weights of the rows.
     pub fn measure<T: SimdReal>(
         simd: Level,
@@ -61,7 +60,7 @@ impl PeakLocking {
         let sums: Vec<[Sums; 2]> = (0..columns * rows)
             .into_par_iter()
             .filter_map(|n| {
-                // In the middle of what the spacing leaves over.
+                // Centred in the remainder of the spacing.
                 let start = |n: usize, count: usize, len: usize| {
                     n * spacing + (((len - SIDE - (count - 1) * spacing) / 2) & !1)
                 };
@@ -78,7 +77,7 @@ impl PeakLocking {
         found
     }
 
-    /// Takes it out of the flow and its derivatives.
+    /// Removes the bias from the flow and its derivatives.
     pub fn correct<T: SimdReal>(&self, simd: Level, motion: &mut Planes<T>) {
         if self.amplitude == [0.0; 2] {
             return;
@@ -89,7 +88,7 @@ impl PeakLocking {
         });
     }
 
-    /// What is left in the flow and in its derivatives, as shares of the amplitude: `sin` and, per unit of
+    /// Remaining bias of the flow and of its derivatives, as shares of the amplitude: `sin` and, per unit of
     /// the derivative, `2 pi cycles cos`.
     pub fn phase(&self, flow: f64) -> (f64, f64) {
         let (sine, cosine) = (TAU * self.cycles * flow).sin_cos();
@@ -97,8 +96,7 @@ impl PeakLocking {
     }
 }
 
-/// Amplitude and its variance from the sums of patches: their scatter tells how far they can be trusted, and
-/// what is no more than scatter is shrunk away.
+/// Amplitude and its variance, from the scatter of the patches' sums; the amplitude is shrunk by its scatter.
 fn regress<'a>(sums: impl Iterator<Item = &'a Sums> + Clone) -> (f64, f64) {
     let (product, weight) = sums.clone().fold((0.0, 0.0), |(p, w), s| (p + s.product, w + s.weight));
     if weight <= 0.0 {
@@ -110,7 +108,7 @@ fn regress<'a>(sums: impl Iterator<Item = &'a Sums> + Clone) -> (f64, f64) {
     ((kept * amplitude).clamp(-MAX_AMPLITUDE, MAX_AMPLITUDE), variance)
 }
 
-/// What one patch adds along one axis.
+/// Contribution of one patch along one axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     /// Sine times right side.
@@ -143,7 +141,7 @@ impl Patch {
         Self { corner, flow, sine }
     }
 
-    /// None where a frame is not seen.
+    /// `None` where a frame is not usable.
     fn sums<T: SimdReal>(
         &self,
         simd: Level,
@@ -211,8 +209,8 @@ struct Warped {
 }
 
 impl Warped {
-    /// Residual, entry of the normal matrix and of the right side along the axis `c`, of the rows that the
-    /// data term has.
+    /// Residual, entry of the normal matrix and right side along the axis `c`, of the same rows as in the
+    /// data term.
     fn row(&self, i: usize, c: usize) -> (f64, f64, f64) {
         let gradient = DataOptions::default().gradient.powi(2);
         // Steps along the axis and across it.
@@ -234,7 +232,7 @@ impl Warped {
     }
 }
 
-/// One row of [`Locking::correct`].
+/// One row of [`PeakLocking::correct`].
 struct Correct<'a, T> {
     locking: &'a PeakLocking,
     row: &'a mut [T],
@@ -269,7 +267,7 @@ impl<T: SimdReal> Kernel<T> for Correct<'_, T> {
 fn sine<V: Lanes>(turns: V) -> V {
     let half = V::constant(0.5);
     let rest = turns - (turns + half).floor();
-    // Mirrored into the quarters beside 0.
+    // Folded into the quarters beside 0.
     let folded = rest.min(half - rest).max(V::zero() - half - rest);
     let angle = folded * V::constant(2.0 * PI);
     let square = angle * angle;

@@ -48,7 +48,7 @@ fn fine_spots_lock_and_broad_ones_do_not() {
         assert!(broad.amplitude[c].abs() < 0.15 * fine.amplitude[c], "{broad:?}");
     }
     assert_eq!(fine.cycles, 0.5);
-    // At whole displacements there is nothing to see.
+    // At integer displacements there is no bias.
     assert!(measured(0.7, (2.0, -1.0)).amplitude.iter().all(|a| a.abs() < 0.05));
 }
 

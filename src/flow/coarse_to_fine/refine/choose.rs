@@ -1,7 +1,7 @@
-//! Which windows a site uses: O. V. Lepski's comparison of scales, softened.
+//! Weights of the windows at each site: O. V. Lepski's comparison of scales with soft decisions.
 //!
 //! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider
-//! windows as long as the estimate changes by no more than noise explains.
+//! windows while the estimate changes by no more than noise explains.
 
 use super::RefineOptions;
 use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
@@ -11,24 +11,24 @@ use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 
-/// Weights below this count as none, so that whole rows can pass a window by.
+/// Minimum weight of a window; smaller ones are set to 0, so that whole rows can skip a window.
 const MIN_WEIGHT: f64 = 1e-2;
-/// Least noise density, px^4: below what frames of any kind show.
+/// Minimum noise density, px^4: below that of any real frame.
 const MIN_NOISE_DENSITY: f64 = 1e-9;
-/// The step of the ladder that tells whether the flow is restless: wider than what the coupling smooths,
-/// narrower than what smooth flow bends in.
+/// Step of the ladder from which unrest is measured: wider than what regularisation smooths, narrower than
+/// the curvature of smooth flow.
 const UNREST_WINDOW: usize = 2;
-/// Share of the change that counts.
+/// Share of the measured change that counts as unrest.
 const UNREST_SHARE: f64 = 0.8;
 /// Added to the determinant of the information, (grey^2/px^2)^2.
 const MIN_DETERMINANT: f64 = 1e-6;
 
-/// What windows are chosen for.
+/// Parts of the motion that windows are chosen for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     /// The flow of the plain fits.
     Flow,
-    /// Their slopes.
+    /// The slopes of the plain fits.
     Slopes,
     /// The edge fits.
     Edges,
@@ -37,7 +37,7 @@ pub(super) enum Use {
 impl Use {
     const ALL: [Self; 3] = [Self::Flow, Self::Slopes, Self::Edges];
 
-    /// Change, over what noise explains, that is accepted.
+    /// Accepted change over that explained by noise.
     fn kappa(self, options: &RefineOptions) -> f64 {
         match self {
             Self::Flow => options.kappa,
@@ -47,9 +47,9 @@ impl Use {
     }
 }
 
-/// The order of the planes of a choice: for each [`Use`] the weights of the windows, the sum of those on
-/// coarser grids, for each grid, and the mean sigma, px; then the weights of the flow over the windows'
-/// regional misfits, and the noise density.
+/// Order of the planes of a choice: for each [`Use`] the weights of the windows, for each grid the sum of
+/// those on coarser grids, and the mean sigma, px; then the weights of the flow over the windows' regional
+/// misfits, and the noise density.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Order {
     pub windows: usize,
@@ -80,7 +80,7 @@ impl Order {
     }
 }
 
-/// Weights of the windows, of sum 1 (less where the field vanishes), and what came with them.
+/// Weights of the windows, of sum 1 (less where the field vanishes), and derived planes.
 pub(super) struct Choice<T> {
     pub planes: Planes<T>,
     pub order: Order,
@@ -118,15 +118,15 @@ pub(super) fn choose<T: SimdReal>(
     Choice { planes, order }
 }
 
-/// The climb from narrow windows to wide ones.
+/// Inputs of the climb from narrow windows to wide ones.
 struct Climb<'a, T> {
     means: &'a Planes<T>,
     options: &'a RefineOptions,
     /// Standard deviations of the windows, px.
     sigmas: Vec<f64>,
-    /// The grids they are computed on.
+    /// The grids that the windows are computed on.
     octaves: Vec<usize>,
-    /// Variance of the step from each to the next, for noise of unit density.
+    /// Variance of the step from each window to the next, for noise of unit density.
     noise: Vec<f64>,
     order: Order,
 }
@@ -161,7 +161,7 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
                 misfit.store(&mut out[order.misfit(l) * stride..]);
             }
         }
-        // The last site goes on, for those finer ones that lie beyond it.
+        // The last site is repeated for finer sites beyond it.
         for line in out.chunks_exact_mut(stride) {
             let end = LEFT + means.width;
             line[end] = line[end - 1];
@@ -170,8 +170,8 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
 }
 
 impl<T: SimdReal> Climb<'_, T> {
-    /// How restless the flow is, from 1 on: its change from one of the narrow windows to the next, over what
-    /// white noise explains.
+    /// Unrest of the flow, at least 1: its change from one narrow window to the next, over that of white
+    /// noise.
     #[inline(always)]
     fn unrest<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
         let one = V::constant(1.0);
@@ -206,7 +206,7 @@ impl<T: SimdReal> Climb<'_, T> {
             sum = sum + weight;
             weight.store(&mut out[self.order.weight(of, l) * stride..]);
         }
-        // What goes on beyond the widest window is nothing at all.
+        // Beyond the widest window the field vanishes.
         let whole = V::constant(1.0) / (sum + accepted);
         (sigma * whole).store(&mut out[self.order.sigma(of) * stride..]);
         let mut coarser = [V::zero(); MAX_OCTAVE];

@@ -1,11 +1,11 @@
-//! Fits that keep to one side of a motion boundary.
+//! Edge fits: windows that keep to one side of a motion boundary.
 //!
-//! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the calmest of four windows
-//! beside a site; here each of nine is an affine model, and all count: the better the closer to affine the
-//! flow is in the window, and the closer the model comes to the site's own flow.
+//! M. Kuwahara et al., "Processing of RI-angiocardiographic images" (1976) choose the window of least
+//! variance among four beside a site. Here each of nine windows is an affine model and has a weight: larger,
+//! the closer to affine the flow is in the window, and the closer the model is to the site's own flow.
 //!
-//! Slopes are taken from the best of windows some steps wider: where the flow jumps, what windows make of the
-//! jump has a slope that no motion has, and reaches as far as they do.
+//! Slopes are taken from the best windows some steps wider: at a motion step, a window's fit has a slope that
+//! no motion has, which reaches as far as the window.
 
 use super::choose::{Choice, Use};
 use super::extended::{Field, RIM, chunk_of};
@@ -15,23 +15,23 @@ use super::upsample::widen;
 use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT};
 use crate::simd::{Lanes, SimdReal};
 
-/// Distance of the eight windows from the site, in units of sigma; never beyond the rim.
+/// Distance of the eight windows from the site, in units of sigma; limited by the rim.
 const WINDOW_OFFSET: f64 = 1.5;
-/// Variance added to what a window is judged by, px^2.
+/// Variance added to the misfit of a window, px^2.
 const MIN_MISFIT: f64 = 1e-4;
-/// Steps of the ladder from the windows that tell the flow to those that tell its slopes.
+/// Steps of the ladder from the windows of the flow to those of its slopes.
 const SLOPE_STEPS: usize = 2;
 
 /// A window whose edge fits are used at any site.
 pub(super) struct EdgeWindow {
-    /// Which one of the ladder.
+    /// Index in the ladder.
     pub index: usize,
-    /// The narrower ones that it tells the slopes for.
+    /// The narrower windows whose slopes it provides.
     slopes_of: Vec<usize>,
 }
 
-/// The windows whose edge fits are used at any site, for the flow or for slopes; what would need a window
-/// wider than the widest has that one.
+/// The windows whose edge fits are used at any site, for the flow or for slopes. Slopes that would need a
+/// window wider than the widest take that one.
 pub(super) fn used_windows<T: SimdReal>(choice: &Choice<T>) -> Vec<EdgeWindow> {
     let windows = choice.order.windows;
     let flow: Vec<bool> = (0..windows).map(|l| choice.wants_edges(l)).collect();
@@ -57,7 +57,7 @@ pub(super) struct Edges<'a, T> {
     windows: [OffsetWindow<T>; 9],
 }
 
-/// Lines of weights: of the flow, then of the slopes; and two to make them in.
+/// Lines of weights: of the flow, then of the slopes; and two scratch lines.
 pub(super) struct Lines<T> {
     flow: Vec<T>,
     slopes: Vec<T>,
@@ -94,7 +94,7 @@ pub(super) struct Site<'a, T> {
     pub y: usize,
     /// Their own flow.
     pub own: [&'a [T; CHUNK]; 2],
-    /// How far slopes are those of wider windows, 0 to 1.
+    /// Weight of the slopes of wider windows, 0 to 1.
     pub steps: &'a [T; CHUNK],
 }
 
@@ -111,7 +111,7 @@ impl<T: SimdReal> Edges<'_, T> {
         }
     }
 
-    /// Adds what this window has to say at [`CHUNK`] sites to a row of sums.
+    /// Adds the fits of this window at [`CHUNK`] sites to a row of sums.
     #[inline(always)]
     pub fn add<V: Lanes<Scalar = T>>(&self, site: &Site<'_, T>, lines: &Lines<T>, sums: &mut [T]) {
         let flow = chunk_of(&lines.flow[site.x..]);
@@ -129,7 +129,7 @@ impl<T: SimdReal> Edges<'_, T> {
     fn add_fits<V: Lanes<Scalar = T>>(&self, site: &Site<'_, T>, [flow, slopes]: [&[T; CHUNK]; 2], sums: &mut [T]) {
         let fits = self.fits;
         let at = fits.start(0, site.y as isize) + LEFT + site.x;
-        // Cut to a known length here, so that the loop below has nothing to check.
+        // Slices of known length, so that the loop below checks no bounds.
         let windows: [[&[T; CHUNK]; FIT]; 9] = std::array::from_fn(|n| {
             let window = &fits.data()[at.wrapping_add_signed(self.windows[n].offset)..];
             std::array::from_fn(|k| chunk_of(&window[k * fits.stride()..]))

@@ -1,14 +1,14 @@
-//! Planes that go on beyond the frame, so that windows need no special case at its edge.
+//! Planes extended beyond the frame, so that windows need no special case at its edge.
 
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT, Planes};
 use crate::simd::SimdReal;
 use std::ops::Range;
 
-/// SamplingGrid on each side of the frame: no window may reach farther.
+/// Sites on each side of the frame: the maximum reach of a window.
 pub(super) const RIM: usize = LEFT;
 
-/// How values go on beyond the edge.
+/// Extrapolation beyond the edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Continuation {
     /// Reflected at the point on the edge, `2 z(edge) - z(mirrored)`: affine motion stays affine.
@@ -30,13 +30,13 @@ impl<T: SimdReal> Field<T> {
         Self { planes: space.planes(width, height + 2 * RIM, count), width, height }
     }
 
-    /// The field itself; nothing is left.
+    /// Takes the field out, leaving an empty one.
     pub fn take(&mut self) -> Option<Self> {
         let planes = std::mem::take(&mut self.planes);
         (planes.room() > 0).then_some(Self { planes, width: self.width, height: self.height })
     }
 
-    /// Gives the memory of fields back.
+    /// Returns the memory of fields.
     pub fn keep(space: &PlanePool<T>, fields: impl IntoIterator<Item = Self>) {
         fields.into_iter().for_each(|field| space.keep(field.planes));
     }
@@ -47,7 +47,7 @@ impl<T: SimdReal> Field<T> {
         Self { planes: Planes::new(width, height + 2 * RIM, count), width, height }
     }
 
-    /// SamplingGrid that a kernel computes in a row.
+    /// Sites that a kernel computes in a row.
     pub fn padded(&self) -> usize {
         self.planes.padded()
     }
@@ -62,12 +62,12 @@ impl<T: SimdReal> Field<T> {
         self.planes.row_len()
     }
 
-    /// Everything.
+    /// All samples.
     pub fn data(&self) -> &[T] {
         self.planes.data()
     }
 
-    /// Everything.
+    /// All samples.
     pub fn data_mut(&mut self) -> &mut [T] {
         self.planes.data_mut()
     }
@@ -78,7 +78,7 @@ impl<T: SimdReal> Field<T> {
         (y + RIM as isize) as usize * self.row_len() + k * self.stride()
     }
 
-    /// Plane `k` in row `y`, with what lies beside it.
+    /// Plane `k` in row `y`, with the samples beside it.
     #[inline(always)]
     pub fn line(&self, k: usize, y: isize) -> &[T] {
         let start = self.start(k, y);
@@ -97,7 +97,7 @@ impl<T: SimdReal> Field<T> {
         self.line(k, y as isize)[LEFT + x]
     }
 
-    /// Continues some planes by `reach` sites beyond each edge.
+    /// Extends some planes by `reach` sites beyond each edge.
     pub fn extend(&mut self, planes: Range<usize>, beyond: Continuation, reach: usize) {
         let (width, height, stride) = (self.width, self.height, self.stride());
         for k in planes.clone() {
@@ -116,7 +116,7 @@ impl<T: SimdReal> Field<T> {
     /// Rows `-step` and `height - 1 + step` of a plane, after those nearer to the frame.
     fn extend_down(&mut self, k: usize, step: isize, beyond: Continuation) {
         let (last, stride) = (self.height as isize - 1, self.stride());
-        // A single row goes on unchanged.
+        // A single row is repeated.
         let mirrored = if last == 0 { 0 } else { step };
         let (edge, source, target) = (self.start(k, 0), self.start(k, mirrored), self.start(k, -step));
         let (before, after) = self.data_mut().split_at_mut(edge);
@@ -153,7 +153,7 @@ fn extend_line<T: SimdReal>(line: &mut [T], width: usize, beyond: Continuation, 
     let (first, last) = (LEFT, LEFT + width - 1);
     let (left, right) = (line[first], line[last]);
     if width > reach {
-        // Nothing beyond one edge is mirrored at the other.
+        // Samples beyond one edge are never mirrored at the other.
         let (before, inside) = line.split_at_mut(first + 1);
         mirror(&mut before[first - reach..first], inside[..reach].iter().rev(), left, beyond);
         let (inside, after) = line.split_at_mut(last + 1);

@@ -1,4 +1,4 @@
-//! The last step: across motion boundaries, fits from windows that keep to one side take over.
+//! Final motion of the refinement: plain fits, and edge fits across motion boundaries.
 
 use super::RefineOptions;
 use super::choose::{Choice, Use};
@@ -13,21 +13,21 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Shares of the edge fits below this count as none, so that calm places can pass them by.
+/// Minimum weight of edge fits; smaller ones are set to 0, so that smooth areas skip them.
 const MIN_EDGE_SHARE: f64 = 0.2;
-/// Relative misfit at which edge fits are all that counts; the sixth power of more would be too large for
-/// single precision.
+/// Maximum relative misfit, at which only edge fits count: the sixth power of more overflows in single
+/// precision.
 const MAX_MISFIT: f64 = 1e5;
-/// What the windows of the data and of the coupling, the same everywhere, smooth away: so much of the
-/// Laplacian of the flow and of its slopes, sites^2 (1 px^2 and somewhat less: at motion boundaries slopes
-/// lose more by it than they gain elsewhere).
+/// Share of the Laplacian of the flow and of its slopes, sites^2, that the fixed windows of data term and
+/// regularisation smooth away (1 px^2, and less for slopes, which lose more by it at motion boundaries than
+/// they gain elsewhere).
 const SHARPENING: [f64; 2] = [0.25, 0.2];
 /// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
-/// What the last step rests on.
+/// Inputs of the final motion.
 pub(super) struct FinishInputs<'a, T> {
     pub choice: &'a Choice<T>,
     /// The flow on the finest grid.
@@ -37,22 +37,22 @@ pub(super) struct FinishInputs<'a, T> {
     pub options: &'a RefineOptions,
 }
 
-/// How far edge fits count at [`CHUNK`] sites, and how far slopes are those of wider ones.
+/// Weights of edge fits at [`CHUNK`] sites, and of the slopes of wider ones.
 struct Gates<T> {
     shares: [T; CHUNK],
     steps: [T; CHUNK],
 }
 
 impl<T: SimdReal> FinishInputs<'_, T> {
-    /// Whether edge fits count anywhere.
+    /// Whether edge fits have a weight anywhere.
     pub fn has_edges(&self) -> bool {
-        // The relative misfit whose share is [`SHUT`].
+        // The relative misfit whose weight is [`MIN_EDGE_SHARE`].
         let threshold = T::from_f64(self.options.edge_misfit * (MIN_EDGE_SHARE / (1.0 - MIN_EDGE_SHARE)).cbrt());
         let misfits = |y: usize| &self.plain.line(FIT - 1, y as isize)[LEFT..LEFT + self.grid.width];
         (0..self.grid.height).any(|y| misfits(y).iter().any(|misfit| *misfit > threshold))
     }
 
-    /// From the relative misfit of the plain fits.
+    /// Weights from the relative misfit of the plain fits.
     #[inline(always)]
     fn gates<V: Lanes<Scalar = T>>(&self, x: usize, y: usize) -> Gates<T> {
         let cube = V::constant(self.options.edge_misfit.powi(3));
@@ -69,8 +69,8 @@ impl<T: SimdReal> FinishInputs<'_, T> {
         gates
     }
 
-    /// Plane `k` of the plain estimate without the smoothing that is the same everywhere, as far as edge fits
-    /// do not count: beside a step there is no smooth flow to be restored.
+    /// Plane `k` of the plain estimate with the fixed smoothing removed, less where edge fits have weight:
+    /// beside a step there is no smooth flow to restore.
     #[inline(always)]
     fn sharpened<V: Lanes<Scalar = T>>(&self, k: usize, (at, y): (usize, usize), share: V) -> V {
         let row = y as isize;
@@ -126,7 +126,7 @@ pub(super) fn add<T: SimdReal>(simd: Level, inputs: &FinishInputs<'_, T>, edges:
     for_each_band(sums.data_mut(), len, |_, rows, sums| dispatch(simd, Add { inputs, edges, rows, sums }));
 }
 
-/// Everything together.
+/// Combines plain fits, edge fits and the base motion.
 struct Finish<'a, T> {
     inputs: &'a FinishInputs<'a, T>,
     sums: Option<&'a Planes<T>>,

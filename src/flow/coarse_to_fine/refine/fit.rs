@@ -9,12 +9,11 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Planes of flow to be fitted: u, v and the mean of `u^2 + v^2` (of the flow itself, where u and v are
-/// smoothed).
+/// Planes of flow to be fitted: u, v and the mean of `u^2 + v^2` (before u and v were smoothed).
 pub(super) const FLOW: usize = 3;
 /// Planes of a fit: u, v, u_x, v_x, u_y, v_y and the misfit's variance in the window, px^2.
 pub(super) const FIT: usize = 7;
-/// Least misfit that is told apart from none, px^2.
+/// Minimum misfit, px^2: below it, rounding.
 pub(super) const MIN_MISFIT: f64 = 1e-6;
 
 /// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds
@@ -109,7 +108,7 @@ impl<T: SimdReal> Kernel<T> for Halve<'_, T> {
                 smooth_row::<V>(from, k, 2 * y, taps, &mut buffer);
                 pick(&buffer[from.stride()..], 2, &mut out[k * stride + LEFT..][..width]);
             }
-            // What the smoothing took away, kept as a variance so that it can be mirrored.
+            // The variance that smoothing removed, stored as such so that it can be mirrored.
             let (flow, square) = out.split_at_mut(2 * stride);
             for (x, s) in square[LEFT..LEFT + width].iter_mut().enumerate() {
                 let (u, v) = (flow[LEFT + x], flow[stride + LEFT + x]);
@@ -119,7 +118,7 @@ impl<T: SimdReal> Kernel<T> for Halve<'_, T> {
     }
 }
 
-/// Plane `k` along row `y`, smoothed: from the second line of `buffer` on, without free samples before it.
+/// Plane `k` along row `y`, smoothed: from the second line of `buffer` on, without unused samples before it.
 #[inline(always)]
 pub(super) fn smooth_row<V: Lanes>(
     from: &Field<V::Scalar>,
@@ -160,8 +159,8 @@ pub(super) fn halve<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field
     out
 }
 
-/// Continues a flow beyond the frame and completes its third plane, which holds the variance that smoothing
-/// took away.
+/// Extends a flow beyond the frame and completes its third plane, which holds the variance that smoothing
+/// removed.
 pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
     flow.extend(0..2, Continuation::Odd, RIM);
     flow.extend(2..3, Continuation::Even, RIM);

@@ -1,5 +1,4 @@
-//! The ladder of windows: which grid each is computed on, its taps, and how noise passes from one to the
-//! next.
+//! Ladder of windows: the grid that each is computed on, its taps, and the noise it leaves.
 
 use super::extended::RIM;
 use crate::flow::windowed::window::weights;
@@ -8,15 +7,15 @@ use std::f64::consts::PI;
 
 /// Each coarser grid takes every second site.
 pub(super) const MAX_OCTAVE: usize = 2;
-/// Steps towards a variance: enough for single precision's last bits.
+/// Iterations towards a variance: enough for the last bits of single precision.
 const VARIANCE_STEPS: usize = 12;
-/// The widest window of a grid, sites: beyond it, the next grid is fine enough.
+/// Maximum sigma of a window on a grid, sites; the next grid is fine enough for wider ones.
 const MAX_GRID_SIGMA: f64 = 2.9;
-/// Variance of the Gaussian before a grid is halved, sites^2: what folds onto slow variation is then damped a
+/// Variance of the Gaussian before a grid is halved, sites^2: aliases onto slow variation are damped a
 /// thousand times.
 const HALVING_VARIANCE: f64 = 1.5;
 
-/// Factors of what is smoothed once, twice, ...: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
+/// Coefficients of `G, G^2, ...`: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
 pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
 /// Passes after the first.
 pub(super) const EXTRA_PASSES: usize = TERMS.len() - 1;
@@ -32,16 +31,16 @@ pub(super) struct Taps<T> {
 }
 
 impl<T: SimdReal> Taps<T> {
-    /// A Gaussian of `sigma` sites, `pitch` px apart, cut off at 3 sigma and at the rim.
+    /// A Gaussian of `sigma` sites, `pitch` px apart, truncated at 3 sigma and at the rim.
     pub fn gaussian(sigma: f64, pitch: f64) -> Self {
         Self::cut_off(sigma, ((3.0 * sigma + 0.5) as usize).clamp(1, RIM), pitch)
     }
 
-    /// A Gaussian that has this variance, px^2, after it was cut off.
+    /// A Gaussian that has this variance, px^2, after truncation.
     fn of_variance(variance: f64, pitch: f64) -> Self {
         let mut sigma = variance.sqrt() / pitch;
         let radius = ((3.0 * sigma + 0.5) as usize).clamp(1, RIM);
-        // The variance grows with that of the Gaussian, and nearly as fast.
+        // The variance grows nearly as that of the Gaussian.
         for _ in 0..VARIANCE_STEPS {
             sigma *= (variance / Self::cut_off(sigma, radius, pitch).variance).sqrt();
         }
@@ -51,8 +50,8 @@ impl<T: SimdReal> Taps<T> {
     fn cut_off(sigma: f64, radius: usize, pitch: f64) -> Self {
         let g = weights(sigma, radius);
         let variance = 2.0 * moment(&g, 2);
-        // Cut off, a Gaussian loses more of its fourth moment than of its second: one that is somewhat wider
-        // is made up for it.
+        // Truncation takes more from the fourth moment than from the second: the Gaussian of the slope is
+        // widened to compensate.
         let mut slope = sigma;
         for _ in 0..VARIANCE_STEPS {
             let h = weights(slope, radius);
@@ -83,15 +82,15 @@ pub(super) struct Scale<T> {
     pub sigma: f64,
     /// It is computed on every `2^octave`-th site.
     pub octave: usize,
-    /// What is left of the window after the smoothing that came with the grid.
+    /// The remaining part of the window after the smoothing of its grid.
     pub first: Taps<T>,
     /// Windows of one, two, ... times its variance: smoothing once, twice, ... more.
     pub again: [Taps<T>; EXTRA_PASSES],
-    /// Variance of the whole window as it comes out, px^2.
+    /// Variance of the resulting window, px^2.
     pub variance: f64,
 }
 
-/// All windows, and what makes one grid from the other.
+/// All windows, and the filter between grids.
 #[derive(Debug, Clone)]
 pub(super) struct Ladder<T> {
     pub scales: Vec<Scale<T>>,

@@ -1,25 +1,27 @@
-//! The last stage: how far around each site the motion may be averaged, and across which sites it may not.
+//! Refinement: chooses at each site the window over which the motion is averaged.
 //!
-//! The coupled motion is as good as its data at each site, hence noisy. Wider windows suppress noise, but
-//! smooth away what is not affine in them. Three parts decide:
+//! The regularised motion has the noise of each site's own data. Wider windows suppress noise, but smooth
+//! away motion that is not affine in them. Data pass these files:
 //!
-//! * *Ladder.* Affine fits `K_l` to the flow in Gaussian windows of growing sigma, each repeated on what it
-//!   leaves: `1 - (1 - K)^4`. Once more is J. W. Tukey's twicing (*Exploratory Data Analysis*, 1977), often
-//!   more is P. Buehlmann and B. Yu's boosting ("Boosting with the L2 loss", 2003): bias of sixth order
-//!   cancels too, and where waves are to be told from noise the window may be half as wide again as a single
-//!   one.
-//! * *Choice* ([`choose`]). O. V. Lepski's comparison of scales (1991), softened: from one window to the next
+//! * [`ladder`], [`fit`]: affine fits `K_l` to the flow in Gaussian windows of growing sigma, each repeated
+//!   on its residual: `1 - (1 - K)^4`. Repeating once is J. W. Tukey's twicing (*Exploratory Data Analysis*,
+//!   1977), more often P. Buehlmann and B. Yu's boosting ("Boosting with the L2 loss", 2003): bias of sixth
+//!   order cancels too, and a window may be half as wide again for the same bias. [`extended`] has the
+//!   planes.
+//! * [`regional_means`]: robust means of changes, misfits and data around each node.
+//! * [`choose`]: O. V. Lepski's comparison of scales (1991) with soft decisions. From one window to the next
 //!   the flow may change by what noise explains. With `D_l` the squared change, `d_l` its variance for white
 //!   noise of unit density and `a` the noise density of the flow, `R_l = level(D_l) / (d_l a)`, the
 //!   acceptance is `A_0 = 1`, `A_{l+1} = A_l / (1 + (R_l / kappa)^4)`, and window l has the weight `A_l -
 //!   A_{l+1}`.
-//! * *Edges* ([`mix`]). Nine windows around the site, each fit transported to it, weighed by how affine the
-//!   flow is in the window and how near the fit comes to the site's flow (after M. Kuwahara et al., 1976).
-//!   They take over where the misfit of the plain window stands out of its region. Slopes there are those of
-//!   wider windows: what lies right beside a step knows the flow best, and the slope least.
+//! * [`plain_fits`], [`upsample`]: the weighted mean of the fits, grid by grid.
+//! * [`edge_fits`], [`finish`]: nine windows around the site, weighted by how affine the flow is in them and
+//!   how near their fit is to the site's flow (after M. Kuwahara et al., 1976). They take over where the
+//!   misfit of the plain window exceeds that of its region. Slopes there come from wider windows.
 //!
-//! Windows wider than three sites are computed on grids of every second or fourth site: smoothing before
-//! taking sites is part of the window, since variances of Gaussians add.
+//! [`window_statistics`] keeps what the covariance needs. Windows wider than three sites are computed on
+//! grids of every second or fourth site: smoothing before subsampling is part of the window, since variances
+//! of Gaussians add.
 
 mod choose;
 mod edge_fits;
@@ -43,7 +45,7 @@ pub(super) use ladder::TERMS;
 pub(super) use options::RefineOptions;
 use rayon::prelude::*;
 use regional_means::Fitted;
-pub(super) use window_statistics::{SPACING, WindowStatistics, places};
+pub(super) use window_statistics::{SPACING, WindowStatistics, node_count};
 
 /// Distance of the sites, px.
 pub(super) const PITCH: f64 = 2.0;
@@ -56,10 +58,9 @@ pub(super) const SIGMA: usize = 6;
 /// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given
 /// the summary of the last data term.
 ///
-/// Eight planes: the motion, the mean sigma, the noise density of the flow that came in (its variance times
-/// the area over which the noise is independent). Both inputs must have the same size and be finite; without
-/// sites there is nothing to do. Bit-identical for any number of threads. With them comes what the choice of
-/// windows rested on, if there was one.
+/// Returns eight planes: the motion, the mean sigma, the noise density of the given flow (its variance times
+/// the area over which the noise is independent); and the statistics of the choice, `None` without sites.
+/// Both inputs must have the same size and be finite. Bit-identical for any number of threads.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -142,7 +143,7 @@ fn grids<T: SimdReal>(
             }
         }
     }
-    // Nothing has been smoothed away yet.
+    // No variance has been smoothed away yet.
     for y in 0..motion.height {
         let start = finest.start(2, y as isize) + LEFT;
         finest.data_mut()[start..start + motion.width].fill(T::from_f64(0.0));
@@ -156,8 +157,8 @@ fn grids<T: SimdReal>(
     grids
 }
 
-/// The affine motion nearest to all sites, about site (0, 0): u, v, u_x, v_x, u_y, v_y. Without it, squares
-/// of large motion would drown the misfits of single precision.
+/// The affine motion nearest to all sites, about site (0, 0): u, v, u_x, v_x, u_y, v_y. Without subtracting
+/// it, squares of large motion would exceed the misfits in single precision.
 fn mean_motion<T: SimdReal>(motion: &Planes<T>) -> [f64; 6] {
     let (width, height) = (motion.width as f64, motion.height as f64);
     let (middle_x, middle_y) = ((width - 1.0) / 2.0, (height - 1.0) / 2.0);

@@ -1,49 +1,49 @@
-//! How motion is refined.
+//! Options of the refinement.
 
-/// So many windows of the ladder are enough for what is refined once more on a finer level.
+/// Number of windows for an intermediate refinement, which a finer level repeats.
 const INTERMEDIATE_WINDOWS: usize = 5;
 
-/// The first windows of the ladder are too narrow for changes.
+/// First window of the ladder for differences of motions; narrower ones leave too much noise.
 const FIRST_CHANGE_WINDOW: usize = 2;
 
-/// How motion is refined. Lengths are standard deviations of Gaussians, px.
+/// Options of the refinement. Lengths are standard deviations of Gaussians, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::flow::coarse_to_fine) struct RefineOptions {
     /// Windows, growing; at least one.
     pub ladder: &'static [f64],
-    /// Change, over what noise explains, that the plain fits accept for the flow.
+    /// Accepted change of the flow over that explained by noise, plain fits.
     pub kappa: f64,
-    /// The same for their slopes, where noise is white.
+    /// The same for their slopes, under white noise.
     pub kappa_slopes: f64,
-    /// By how much slopes may accept more where the flow is restless, at most: noise that is not white (that
-    /// of particle images) reaches wider windows than its density tells, and in turbulence no window is free
-    /// of bias. 1 does without.
+    /// Maximum factor by which slopes accept more in turbulent flow: noise that is not white (particle
+    /// images) reaches wider windows than its density says, and in turbulence no window is free of bias. 1:
+    /// none.
     pub max_unrest: f64,
     /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,
-    /// The same for the change from the widest plain fit to nothing.
+    /// The same for the change from the widest plain fit to zero.
     pub kappa_nothing: f64,
     /// Region of the changes.
     pub region: f64,
-    /// Region whose calm part judges the edge fits.
+    /// Region whose calm part decides on the edge fits.
     pub calm_region: f64,
-    /// Region that a misfit stands out of.
+    /// Region to whose misfit a site is compared.
     pub misfit_region: f64,
     /// Region of the noise density.
     pub noise_region: f64,
     /// Relative misfit at which edge fits and plain fits count equally.
     pub edge_misfit: f64,
-    /// Relative misfit at which slopes are half those of wider edge fits: a motion boundary is a step, and
-    /// the slope of what the windows make of it is none.
+    /// Relative misfit at which slopes are half those of wider edge fits: at a motion step, the slope of a
+    /// window's fit is no slope of the motion.
     pub step_misfit: f64,
-    /// Whether the field may be nothing but affine over the whole frame: beyond the widest window there is
-    /// then one more choice.
+    /// Whether the field may be affine over the whole frame: zero is then one more choice beyond the widest
+    /// window.
     pub may_vanish: bool,
 }
 
 impl RefineOptions {
-    /// For motion that a finer level begins with: that level's few iterations take noise away, but not what a
-    /// window has smoothed away over many of its pixels.
+    /// For motion that a finer level starts from: that level's few iterations remove noise, but do not
+    /// restore what a window has smoothed away.
     pub fn intermediate() -> Self {
         let Self { ladder, kappa, .. } = Self::default();
         Self {
@@ -53,13 +53,12 @@ impl RefineOptions {
         }
     }
 
-    /// For motion whose last linearisation was about one that had been refined: what is left of the residual
-    /// is noise then, and slopes need no more room than it explains.
+    /// For motion linearised about a refined one: the residual is then noise, and slopes accept no more.
     pub fn relinearised() -> Self {
         Self { kappa_slopes: 2.0, ..Self::default() }
     }
 
-    /// For what one step of the motion differs by from another, which is small and smooth or nothing.
+    /// For the difference of two steps, which is small and smooth, or zero.
     pub fn for_changes() -> Self {
         let Self { ladder, kappa, kappa_edge, .. } = Self::default();
         Self {

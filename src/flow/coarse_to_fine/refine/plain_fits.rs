@@ -1,4 +1,4 @@
-//! The windows' fits, mixed where the flow is smooth: grid by grid, the coarsest first.
+//! Plain fits: the weighted mean of the windows' fits where the flow is smooth, from the coarsest grid on.
 
 use super::choose::{Choice, Use};
 use super::extended::{Continuation, Field};
@@ -11,16 +11,16 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Least weight of the narrowest window of a coarse grid: interpolation to finer grids wants values
+/// Minimum weight of the narrowest window of a coarse grid: interpolation to finer grids needs values
 /// everywhere.
 const MIN_FIRST_WEIGHT: f64 = 1e-3;
-/// What plain fits are used for.
+/// Parts of the motion that plain fits provide.
 const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];
 
-/// The windows of one grid: place on the ladder, window, single fits.
+/// The windows of one grid: index in the ladder, window, single fits.
 pub(super) type Rungs<'a, T> = Vec<(usize, &'a Scale<T>, &'a Field<T>)>;
 
-/// The plain estimate as far as coarser grids have it, to be completed by the windows of one grid.
+/// The plain estimate of the coarser grids, to be completed by the windows of one grid.
 pub(super) struct Plain<'a, T> {
     pub choice: &'a Choice<T>,
     pub octave: usize,
@@ -31,7 +31,7 @@ pub(super) struct Plain<'a, T> {
     pub grid: &'a Field<T>,
 }
 
-/// Lines that rows are made in.
+/// Scratch lines.
 struct Scratch<T> {
     down: Vec<T>,
     again: Vec<T>,
@@ -70,7 +70,7 @@ impl<T: SimdReal> Plain<'_, T> {
         }
     }
 
-    /// What coarser grids have, with the weight of all their windows.
+    /// The estimate of the coarser grids, with the weight of all their windows.
     #[inline(always)]
     fn add_coarser<V: Lanes<Scalar = T>>(&self, y: usize, scratch: &mut Scratch<T>, out: &mut [T]) {
         let Self { choice, octave, coarser, grid, .. } = self;
@@ -110,7 +110,7 @@ impl<T: SimdReal> Plain<'_, T> {
 }
 
 impl<T: SimdReal> Scratch<T> {
-    /// Adds weights times `1 - (1 - K)^4` of the window that is at hand.
+    /// Adds weights times `1 - (1 - K)^4` of the present window.
     #[inline(always)]
     fn add<V: Lanes<Scalar = T>>(&mut self, once: &[T], padded: usize, stride: usize, out: &mut [T]) {
         let terms = TERMS.map(V::constant);
@@ -134,7 +134,7 @@ impl<T: SimdReal> Scratch<T> {
         }
     }
 
-    /// Makes means of the sums.
+    /// Divides the sums by their weights.
     #[inline(always)]
     fn divide<V: Lanes<Scalar = T>>(&self, padded: usize, stride: usize, out: &mut [T]) {
         for x in (0..padded).step_by(V::LANES) {
@@ -147,7 +147,7 @@ impl<T: SimdReal> Scratch<T> {
     }
 }
 
-/// Which of the weights goes with the plane `k` of [`FIT`].
+/// Index of the weights of plane `k` of [`FIT`].
 #[inline(always)]
 fn use_of(k: usize) -> usize {
     usize::from((2..FIT - 1).contains(&k))

@@ -1,7 +1,7 @@
-//! Robust regional levels: what is usual around a site, whatever few sites do.
+//! Robust regional means: typical values around a site, insensitive to a few outliers.
 //!
-//! The level is a power mean `(G * f^p)^(1/p)`: with p = 1/4 it lies near a median, with p = -1/4 near the
-//! calm part of the region.
+//! The mean is a power mean `(G * f^p)^(1/p)`: with p = 1/4 near a median, with p = -1/4 near the calm part
+//! of the region.
 
 use super::RefineOptions;
 use super::extended::{Continuation, Field, RIM};
@@ -22,7 +22,7 @@ const ROOT_OFFSET: f64 = 1e-12;
 /// misfit.
 pub(super) struct Layout {
     pub windows: usize,
-    /// From each window to the next; from the widest to nothing as well, where the field may be nothing.
+    /// Steps from each window to the next; from the widest to zero as well, if the field may vanish.
     pub steps: usize,
 }
 
@@ -46,14 +46,14 @@ impl Layout {
     }
 }
 
-/// What is averaged.
+/// Quantities that are averaged.
 enum Item<'a, T> {
-    /// A plane of the data term as it is.
+    /// A plane of the data term.
     Data(usize),
     /// The fourth root of the residual energy.
     Energy(usize),
-    /// The fourth root, and its inverse, of the squared change from one window to the next, or to nothing;
-    /// each with its distance of sites.
+    /// The fourth root, and its inverse, of the squared change from one window to the next, or to zero; each
+    /// with its distance of sites.
     Change((&'a Field<T>, usize), Option<(&'a Field<T>, usize)>),
     /// The inverse fourth root of the misfit.
     Misfit(&'a Field<T>, usize),
@@ -73,7 +73,7 @@ pub(super) struct Fitted<'a, T> {
     pub samples: Vec<Field<T>>,
 }
 
-/// The regional means of everything in the [`Layout`], on every fourth site.
+/// The regional means of all planes of the [`Layout`], on every fourth site.
 pub(super) fn regional_means<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -108,7 +108,7 @@ pub(super) fn regional_means<T: SimdReal>(
     out
 }
 
-/// What is averaged from the grid `octave`.
+/// Quantities averaged on the grid `octave`.
 fn collect<'a, T: SimdReal>(
     options: &RefineOptions,
     ladder: &Ladder<T>,
@@ -198,7 +198,7 @@ impl<T: SimdReal> Kernel<T> for Roots<'_, T> {
     }
 }
 
-/// The sites of a row, and what lies beside the last.
+/// The sites of a row, and the samples after the last.
 #[inline(always)]
 fn row_values<T: SimdReal>(data: &Planes<T>, k: usize, y: usize) -> &[T] {
     &data.row(y)[k * data.stride() + LEFT..]
@@ -214,7 +214,7 @@ fn squares<V: Lanes>(finer: &mut [V::Scalar], coarser: &[V::Scalar], stride: usi
     }
 }
 
-/// Fourth roots of what is positive, to the end of `out`.
+/// Fourth roots of positive values, to the end of `out`.
 #[inline(always)]
 fn roots<V: Lanes>(values: &[V::Scalar], out: &mut [V::Scalar]) {
     for x in (0..out.len()).step_by(V::LANES) {

@@ -1,4 +1,4 @@
-//! From coarse sites to fine ones.
+//! Interpolation from coarse sites to fine ones.
 
 use super::choose::Choice;
 use super::extended::{Continuation, Field, RIM};
@@ -31,7 +31,7 @@ pub(super) fn widen<V: Lanes>(
         let (a, b) = (V::load(&upper[x..]), V::load(&lower[x..]));
         (b - a).mul_add(share, a).store(&mut down[x..]);
     }
-    // One more, for the interpolation beyond the last.
+    // One more, for interpolation beyond the last.
     down[planes.width] = down[planes.width - 1];
     match octave {
         0 => along::<V::Scalar, 4>(down, planes.width, out),

@@ -1,4 +1,4 @@
-//! What the choice of windows rested on, kept for the covariance.
+//! Statistics by which windows were chosen, kept for the covariance.
 
 use super::choose::{Choice, Order, Use};
 use super::ladder::{MAX_OCTAVE, difference_variance};
@@ -6,16 +6,16 @@ use super::regional_means::Layout;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::SimdReal;
 
-/// SamplingGrid from one place of the evidence to the next.
+/// Distance of the nodes, sites.
 pub(in crate::flow::coarse_to_fine) const SPACING: usize = 1 << MAX_OCTAVE;
 
-/// Regional means and weights of windows, at every fourth site.
+/// Regional means and weights of windows at nodes, every fourth site.
 #[derive(Debug)]
 pub(in crate::flow::coarse_to_fine) struct WindowStatistics<T> {
     means: Planes<T>,
     choice: Planes<T>,
     order: Order,
-    /// SamplingGrid of the motion along x and y.
+    /// Sites of the motion along x and y.
     sites: (usize, usize),
     /// Standard deviations of the windows, px.
     pub sigmas: &'static [f64],
@@ -26,20 +26,19 @@ impl<T: SimdReal> WindowStatistics<T> {
         Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
     }
 
-    /// What the memory is.
+    /// The planes.
     pub fn planes_mut(&mut self) -> [&mut Planes<T>; 2] {
         [&mut self.means, &mut self.choice]
     }
 
-    /// The memory.
+    /// The planes.
     pub fn into_planes(self) -> [Planes<T>; 2] {
         [self.means, self.choice]
     }
 
-    /// Places along x and y, [`SPACING`] sites apart; the last ones are those of the last sites, however near
-    /// to the ones before.
+    /// Nodes along x and y, [`SPACING`] sites apart; the last ones are at the last sites and may be nearer.
     pub fn size(&self) -> (usize, usize) {
-        (places(self.sites.0), places(self.sites.1))
+        (node_count(self.sites.0), node_count(self.sites.1))
     }
 
     /// Regional information `P_uu, P_uv, P_vv`, grey^2/px^2.
@@ -71,12 +70,12 @@ impl<T: SimdReal> WindowStatistics<T> {
     }
 }
 
-/// How many places there are along so many sites.
-pub(in crate::flow::coarse_to_fine) fn places(sites: usize) -> usize {
+/// Number of nodes along so many sites.
+pub(in crate::flow::coarse_to_fine) fn node_count(sites: usize) -> usize {
     (sites - 1).div_ceil(SPACING) + 1
 }
 
-/// At a place; what the grid of regional means does not reach goes on as it ends.
+/// Value at a node; beyond the grid of regional means its last value.
 fn at<T: SimdReal>(planes: &Planes<T>, k: usize, x: usize, y: usize) -> f64 {
     planes.at(k, x.min(planes.width - 1), y.min(planes.height - 1)).to_f64()
 }

@@ -1,15 +1,18 @@
-//! Neighbouring sites' affine motions, bound together.
+//! Regularisation: minimises the data terms of all sites together with robust smoothness terms.
 //!
-//! Each site has a data term of its own, `m^T N m - 2 m^T r` over the noise there, and each pair of
-//! neighbours a bond: their affine models should give the same flow in the middle between them, and have the
-//! same Jacobian. The sum
+//! Each site has a data term `m^T N m - 2 m^T r` over the noise there, and each pair of neighbours a
+//! smoothness term: their affine models should give the same flow midway between them, and have the same
+//! Jacobian. The sum
 //!
 //! `sum_sites (m^T N m - 2 m^T r) / (s^2 + e) + sum_edges omega (flow |du|^2 + jacobian |dJ|^2)`
 //!
-//! is made smaller site by site: each visit solves the 6x6 equations of one site, its neighbours fixed (block
-//! Gauss-Seidel in zebra order). A bond weakens the more it is strained, `omega = 1 / (1 + (flow |du|^2 +
-//! jacobian |dJ|^2) / break_at)` (iteratively reweighted least squares with the weights of Cauchy's
-//! function), so that two motions may meet at an edge. SamplingGrid without data take what their neighbours tell.
+//! is minimised by relaxation: each visit solves the 6x6 equations of one site with its neighbours fixed
+//! (block Gauss-Seidel in zebra order). Smoothness weights fall with the strain, `omega = 1 / (1 + (flow
+//! |du|^2 + jacobian |dJ|^2) / break_strain)` (iteratively reweighted least squares with Cauchy's weights),
+//! so that two motions may meet at an edge. Sites without data take the motion of their neighbours.
+//!
+//! [`smoothness`] has the weights, [`solve`] the 6x6 equations, [`relaxation`] the visit to a row,
+//! [`wavefront`] the order of the visits.
 
 mod relaxation;
 mod smoothness;
@@ -25,55 +28,54 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use smoothness::SmoothnessProblem;
 
-/// Planes of the data term that the equations are made of: those before the energies.
+/// Planes of the data term that hold equations: those before the energies.
 const EQUATIONS: usize = ERROR;
 
-/// From a site to the middle between it and its neighbour, px.
+/// Distance from a site to the middle between it and its neighbour, px.
 const HALF_SPACING: f64 = 1.0;
 
-/// The flow of a site changes by no more than this in one call, px: the data term is a linearisation.
+/// Maximum change of a site's flow in one call, px: the data term is a linearisation.
 const MAX_FLOW_CHANGE: f64 = 2.0;
 
-/// How strongly neighbouring sites are bound.
+/// Smoothness terms and sweeps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Smoothness {
-    /// Strength of the bond between two flows, relative to the data over its noise, px^-2.
+    /// Weight of the flow term, relative to the data over its noise, px^-2.
     pub flow: f64,
-    /// Strength of the bond between two Jacobians.
+    /// Weight of the Jacobian term.
     pub jacobian: f64,
-    /// The strain at which a bond is half as strong; positive, infinite for bonds that never weaken.
+    /// Strain at which a smoothness weight is one half; positive, infinite for weights that never fall.
     pub break_strain: f64,
-    /// How often each site is visited.
+    /// Number of relaxation sweeps.
     pub sweeps: usize,
-    /// The bonds are weighed anew at every so many visits; positive.
+    /// Smoothness weights are updated at every so many visits; positive.
     pub reweight_every: usize,
 }
 
 impl Default for Smoothness {
-    /// 20 px^-2, 2000, 0.1 and 6 sweeps, reweighed at every second: chosen on recorded and made sequences
-    /// together.
+    /// 20 px^-2, 2000, 0.1 and 6 sweeps, updated at every second: chosen on recorded and synthetic sequences.
     fn default() -> Self {
         Self { flow: 20.0, jacobian: 2000.0, break_strain: 0.1, sweeps: 6, reweight_every: 2 }
     }
 }
 
-/// Memory that calls of [`couple`] share.
+/// Memory that calls of [`regularize`] share.
 #[derive(Debug, Default)]
 pub(super) struct RegularizeScratch<T> {
     /// The flow at the start.
     start: Planes<T>,
     energies: Vec<T>,
-    /// The bonds' weights.
+    /// The smoothness weights.
     weights: Planes<T>,
     rings: Vec<wavefront::Ring<T>>,
 }
 
-/// Couples the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Coupling::sweeps`] sweeps over the
-/// sites. `s^2` is the median over the sites with data of their residual energy, at least `floor` (positive),
-/// grey^2. Returns the root mean square over the sites of the change of the flow, px.
+/// Regularises the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Smoothness::sweeps`] relaxation
+/// sweeps. `s^2` is the median residual energy of the sites with data, at least `floor` (positive), grey^2.
+/// Returns the root-mean-square change of the flow, px.
 ///
-/// The flow ends no further than 2 px from where it was. Where neither data nor neighbours say anything the
-/// motion stays. The result is the same for any number of threads; call it inside
+/// The flow moves by at most 2 px. Where neither data nor neighbours determine it, the motion stays. The
+/// result is the same for any number of threads; call it inside
 /// [`Threads::install`](crate::parallel::Threads::install).
 pub(super) fn regularize<T: SimdReal>(
     level: Level,
@@ -110,7 +112,8 @@ fn typical_energy<T: SimdReal>(data: &Planes<T>, floor: T, energies: &mut Vec<T>
     Lanes::max(*energies.select_nth_unstable_by(middle, by_size).1, floor)
 }
 
-/// Copies the flow to `start`, and clears what lies beside the motion's sites: lanes there compute too.
+/// Copies the flow to `start`, and clears the samples beside the motion's sites, since lanes there compute
+/// too.
 fn save_flow<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     let (width, height) = (motion.width, motion.height);
     start.reshape(width, height, 2);
@@ -126,7 +129,7 @@ fn save_flow<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     });
 }
 
-/// Scales changes of the flow back to [`LONGEST`]; returns their root mean square.
+/// Limits changes of the flow to [`MAX_FLOW_CHANGE`]; returns their root mean square.
 fn limit_change<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Planes<T>) -> f64 {
     let (rows, stride, sites) = (motion.row_len(), motion.stride(), motion.width * motion.height);
     let rows = motion.data_mut().par_chunks_mut(rows).with_min_len(16).enumerate().map(|(y, row)| {
@@ -134,12 +137,12 @@ fn limit_change<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Plane
         let (u0, v0) = start.row(y).split_at(stride);
         dispatch(level, LimitChange { now: [u, v], start: [u0, v0] })
     });
-    // Row by row, so that the sum does not depend on who made which.
+    // Row by row, so that the sum does not depend on the threads.
     let sums: Vec<f64> = rows.collect();
     (sums.iter().sum::<f64>() / sites as f64).sqrt()
 }
 
-/// One row of [`limit`], and the sum over its sites of the squared change.
+/// One row of [`limit_change`]; returns the sum of the squared changes.
 struct LimitChange<'a, T> {
     now: [&'a mut [T]; 2],
     start: [&'a [T]; 2],
@@ -154,7 +157,7 @@ impl<T: SimdReal> Kernel<T> for LimitChange<'_, T> {
         let start = self.start[0].chunks_exact(V::LANES).zip(self.start[1].chunks_exact(V::LANES));
         let now = now_u.chunks_exact_mut(V::LANES).zip(now_v.chunks_exact_mut(V::LANES));
         let longest = V::constant(MAX_FLOW_CHANGE);
-        // What lies beside the sites is zero before and after.
+        // Samples beside the sites are zero before and after.
         let mut sums = V::zero();
         for ((u, v), (u0, v0)) in now.zip(start) {
             let (from_u, from_v, to_u, to_v) = (V::load(u0), V::load(v0), V::load(u), V::load(v));

@@ -1,4 +1,4 @@
-//! One visit to a row of sites.
+//! Relaxation of one row of sites.
 
 use super::smoothness::{
     ALONG, DOWN, NeighbourRows, SmoothnessProblem, Strengths, UP, WEIGHTS, add_smoothness, each, lines, six, strain,
@@ -10,28 +10,26 @@ use crate::flow::coarse_to_fine::planes::LEFT;
 use crate::simd::{Lanes, SimdReal};
 use std::ops::Range;
 
-/// SamplingGrid of a row that are visited together: their bonds to the right stay in the first-level cache.
+/// Sites of a row that are relaxed together: their edges to the right stay in the first-level cache.
 const RUN_SITES: usize = 128;
-/// The pulls of a bond along the row on the sites at its ends.
+/// Gradient terms of an edge along the row at the sites of its ends.
 const EDGE_TERMS: usize = 6;
-/// These for a run of sites, sample [`LEFT`] the first's.
+/// The same for a run of sites; sample [`LEFT`] is the first's.
 type EdgeTerms<T> = [[T; LEFT + RUN_SITES + LEFT]; EDGE_TERMS];
 
-/// What the visits to a row need, made when they begin: a row is visited many times, and this is one stream
-/// of memory.
+/// A row's equations and factors, packed once: a row is visited many times, and this is one stream of memory.
 #[derive(Debug, Default)]
 pub(super) struct PackedRow<T> {
-    /// For each vector of sites its equations over their noise, [`EQUATIONS`] planes one after the other.
+    /// For each vector of sites its equations over their noise, [`EQUATIONS`] planes in sequence.
     equations: Vec<T>,
-    /// For each vector of sites the factors of its matrix, bonds included, [`ENTRIES`] planes.
+    /// For each vector of sites the factors of its matrix with smoothness, [`ENTRIES`] planes.
     factors: Vec<T>,
-    /// The row of the data term, fetched in the order of memory: the planes' short lines, read side by side,
-    /// would come one by one.
+    /// The row of the data term, copied in memory order: reading its planes side by side would be slower.
     near: Vec<T>,
 }
 
 impl<T: SimdReal> PackedRow<T> {
-    /// Takes the equations of row `y`. Beside the sites there is no data.
+    /// Packs the equations of row `y`. Beside the sites there are no data.
     #[inline(always)]
     pub fn fill<V: Lanes<Scalar = T>>(&mut self, problem: &SmoothnessProblem<'_, T>, y: usize) {
         let (data, zero) = (problem.data, T::from_f64(0.0));
@@ -57,7 +55,7 @@ impl<T: SimdReal> PackedRow<T> {
         }
     }
 
-    /// Factorises the sites' matrices with bonds of the given weights.
+    /// Factorises the sites' matrices with the given smoothness weights.
     #[inline(always)]
     pub fn factorise<V: Lanes<Scalar = T>>(&mut self, problem: &SmoothnessProblem<'_, T>, weights: &[T]) {
         let strengths = Strengths::<V>::new(problem.smoothness);
@@ -91,7 +89,7 @@ fn entry<V: Lanes<Scalar = T>, T: SimdReal>(block: &[T], i: usize, j: usize) -> 
     at(block, normal(i, j))
 }
 
-/// The bonds that end (`back`: 1) or begin (0) at some sites.
+/// Terms of the edges that end (`back`: 1) or begin (0) at some sites.
 #[inline(always)]
 fn edge_terms_at<V: Lanes<Scalar = T>, T: SimdReal>(
     edge_terms: &EdgeTerms<T>,
@@ -110,8 +108,8 @@ fn less_row<V: Lanes<Scalar = T>, T: SimdReal>(block: &[T], i: usize, m: &[V; 6]
     f.neg_mul_add(m[5], e.neg_mul_add(m[4], start))
 }
 
-/// Solves the equations of each site of the row `own` with its neighbours as they are, those in the row as
-/// they were before the visit.
+/// Solves the equations of each site of the row `own`, its neighbours fixed; those in the row have their
+/// values from before the visit.
 #[inline(always)]
 pub(super) fn relax_row<V: Lanes<Scalar = T>, T: SimdReal>(
     problem: &SmoothnessProblem<'_, T>,
@@ -121,7 +119,7 @@ pub(super) fn relax_row<V: Lanes<Scalar = T>, T: SimdReal>(
 ) {
     let strengths = Strengths::<V>::new(problem.smoothness);
     let padded = own.len() / 6 - 2 * LEFT;
-    // No bond leads to the first site from the left.
+    // The first site has no edge to the left.
     let mut edge_terms = [[T::from_f64(0.0); LEFT + RUN_SITES + LEFT]; EDGE_TERMS];
     let mut start = 0;
     while start < padded {
@@ -136,7 +134,7 @@ pub(super) fn relax_row<V: Lanes<Scalar = T>, T: SimdReal>(
     }
 }
 
-/// The bonds from each site of a run to its right neighbour.
+/// Terms of the edges from each site of a run to its right neighbour.
 #[inline(always)]
 fn edge_term<V: Lanes<Scalar = T>, T: SimdReal>(
     weights: &[T],
@@ -162,7 +160,7 @@ fn edge_term<V: Lanes<Scalar = T>, T: SimdReal>(
     }
 }
 
-/// Moves each site of a run to where its equations are solved.
+/// Moves each site of a run to the solution of its equations.
 #[inline(always)]
 fn solve_sites<V: Lanes<Scalar = T>, T: SimdReal>(
     (packed, weights): (&PackedRow<T>, &[T]),
@@ -174,7 +172,7 @@ fn solve_sites<V: Lanes<Scalar = T>, T: SimdReal>(
 ) {
     let (stride, count) = (neighbours.stride, run.len().min(RUN_SITES));
     let half = V::constant(HALF_SPACING);
-    // A row that is not there pulls with no weight; any row may stand in for it.
+    // A missing row has weight 0; any row may stand in for it.
     let zeros = [T::from_f64(0.0); RUN_SITES];
     let [above, below] = [neighbours.above.or(neighbours.below), neighbours.below.or(neighbours.above)]
         .map(|row| row.map_or([&zeros[..count]; 6], |row| lines(row, stride, run.start, count)));
@@ -193,7 +191,7 @@ fn solve_sites<V: Lanes<Scalar = T>, T: SimdReal>(
         let ahead = edge_terms_at::<V, T>(edge_terms, i, 0);
         let behind = edge_terms_at::<V, T>(edge_terms, i, 1);
 
-        // Downhill: minus half the gradient of the energy.
+        // Minus half the gradient of the energy.
         let mut step = each!(k in [0 1 2 3 4 5] =>
             less_row(block, k, &here, at(block, right(k))));
         for c in 0..2 {

@@ -1,4 +1,4 @@
-//! Robust smoothness terms: strains between neighbours, their weights, and what they add to a site's matrix.
+//! Robust smoothness terms: strain between neighbours, weights, and contributions to a site's matrix.
 
 use super::solve::{ENTRIES, Guard, lower};
 use super::{HALF_SPACING, Smoothness};
@@ -6,7 +6,7 @@ use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
 use crate::simd::{Lanes, SimdReal};
 
 /// The values of an expression for each index in a list, written out: the optimiser does not unroll loops
-/// with this much in them.
+/// with bodies of this size.
 macro_rules! each {
     ($index:ident in [$($value:literal)*] => $expression:expr) => {
         [$({ let $index: usize = $value; $expression }),*]
@@ -14,7 +14,7 @@ macro_rules! each {
 }
 pub(super) use each;
 
-/// What binds the sites of a level.
+/// The data and smoothness terms of a level.
 pub(super) struct SmoothnessProblem<'a, T> {
     pub data: &'a Planes<T>,
     /// `s^2`, positive.
@@ -22,14 +22,14 @@ pub(super) struct SmoothnessProblem<'a, T> {
     pub smoothness: &'a Smoothness,
 }
 
-/// Lines of a row's weights `omega`: of the bonds from each site to the next in its row, to the row above and
-/// to the row below; 0 where there is none, and beside the sites.
+/// Lines of a row's weights `omega`: of the edges from each site to the next in its row, to the row above and
+/// to the row below; 0 without an edge, and beside the sites.
 pub(super) const WEIGHTS: usize = 3;
 pub(super) const ALONG: usize = 0;
 pub(super) const UP: usize = 1;
 pub(super) const DOWN: usize = 2;
 
-/// Weighs the bonds of the row `own` by their present strain.
+/// Updates the weights of the row `own` from the present strain.
 #[inline(always)]
 pub(super) fn update_weights<V: Lanes<Scalar = T>, T: SimdReal>(
     problem: &SmoothnessProblem<'_, T>,
@@ -54,7 +54,7 @@ pub(super) fn update_weights<V: Lanes<Scalar = T>, T: SimdReal>(
     }
 }
 
-/// Adds what bonds of the given strengths (behind, ahead, up, down) do to the site's matrix.
+/// Adds the smoothness terms of the edges (behind, ahead, up, down) to the site's matrix.
 #[inline(always)]
 pub(super) fn add_smoothness<V: Lanes>(
     matrix: &mut [V; ENTRIES],
@@ -80,22 +80,22 @@ pub(super) fn add_smoothness<V: Lanes>(
     }
 }
 
-/// The rows that a row's bonds lead to.
+/// The neighbouring rows.
 #[derive(Clone, Copy)]
 pub(super) struct NeighbourRows<'a, T> {
-    /// Nothing above the first row.
+    /// `None` above the first row.
     pub above: Option<&'a [T]>,
-    /// Nothing below the last row.
+    /// `None` below the last row.
     pub below: Option<&'a [T]>,
     /// From a plane's row to the next plane's.
     pub stride: usize,
 }
 
-/// The strengths in vectors.
+/// Weights of the smoothness terms, in vectors.
 pub(super) struct Strengths<V> {
     flow: V,
     jacobian: V,
-    /// The same over the strain at which bonds break.
+    /// The same over the break strain.
     flow_strain: V,
     jacobian_strain: V,
     pub guard: Guard<V>,
@@ -114,15 +114,15 @@ impl<V: Lanes> Strengths<V> {
     }
 }
 
-/// How far two neighbours are from giving one affine motion.
+/// Difference of the affine motions of two neighbours.
 pub(super) struct Strain<V> {
-    /// `du`: the flows' difference in the middle between them.
+    /// `du`: the difference of the flows midway between them.
     pub flow: [V; 2],
     /// `dJ`.
     pub jacobian: [V; 4],
 }
 
-/// The strain between `here` and the neighbour `there`, forwards or backwards along axis 1 (x) or 2 (y).
+/// Strain between `here` and the neighbour `there`, forwards or backwards along axis 1 (x) or 2 (y).
 #[inline(always)]
 pub(super) fn strain<V: Lanes>(here: &[V; 6], there: &[V; 6], (axis, forwards): (usize, bool)) -> Strain<V> {
     let half = V::constant(if forwards { HALF_SPACING } else { -HALF_SPACING });
@@ -137,7 +137,7 @@ pub(super) fn strain<V: Lanes>(here: &[V; 6], there: &[V; 6], (axis, forwards): 
 }
 
 impl<V: Lanes> Strain<V> {
-    /// The strength of a bond under this strain, 1 without any.
+    /// Weight of an edge with this strain, 1 without any.
     #[inline(always)]
     fn weight(&self, strengths: &Strengths<V>) -> V {
         let [du, dv] = self.flow;
@@ -148,9 +148,8 @@ impl<V: Lanes> Strain<V> {
         V::constant(1.0) / strain
     }
 
-    /// What a bond of such a strength does to the site at its beginning, `omega flow du` and `omega jacobian
-    /// dJ`; to the one at its end it does the opposite, but for the flow's pull on the derivative along the
-    /// bond, which is the same at both ends.
+    /// Gradient terms of an edge at its first site, `omega flow du` and `omega jacobian dJ`. At the other end
+    /// they have the opposite sign, except that of the flow on the derivative along the edge.
     #[inline(always)]
     pub fn edge_term(mut self, weight: V, strengths: &Strengths<V>) -> Self {
         let (by_flow, by_jacobian) = (weight * strengths.flow, weight * strengths.jacobian);
@@ -170,7 +169,7 @@ pub(super) fn six<V: Lanes<Scalar = T>, T: SimdReal>(planes: &[&[T]; 6], i: usiz
     each!(k in [0 1 2 3 4 5] => V::load(&planes[k][i..]))
 }
 
-/// The run of each plane that begins with sample `first` of its row.
+/// `len` samples of each plane, from sample `first` of its row on.
 #[inline(always)]
 pub(super) fn lines<T>(row: &[T], stride: usize, first: usize, len: usize) -> [&[T]; 6] {
     std::array::from_fn(|k| &row[k * stride + first..][..len])

@@ -1,4 +1,4 @@
-//! The six equations of a site.
+//! The 6x6 equations of a site.
 
 use crate::simd::Lanes;
 
@@ -26,11 +26,11 @@ pub(super) const PLACES: [(usize, usize); ENTRIES] = {
     places
 };
 
-/// Keeps pivots positive: each diagonal entry grows by a share of itself that is larger than what rounding
-/// can do to it, and by a little that no data term feels.
+/// Keeps pivots positive: each diagonal entry grows by a share of itself above its rounding error, and by a
+/// constant far below any data term.
 ///
-/// The unknowns are increments, so that neither moves the solution that the visits converge to: it only
-/// shortens steps that nothing supports.
+/// The unknowns are increments, so that neither moves the solution that relaxation converges to: both only
+/// shorten undetermined steps.
 pub(super) struct Guard<V> {
     share: V,
     least: V,
@@ -45,11 +45,11 @@ impl<V: Lanes> Guard<V> {
     }
 }
 
-/// Turns the lower triangle of a positive semidefinite matrix into its factors `L D L^T`: `L` below the
+/// Factorises a positive semidefinite matrix, given by its lower triangle, into `L D L^T`: `L` below the
 /// diagonal, on it the inverse of `D`.
 ///
-/// Pivots are taken two by two, since that needs one division for two: with the leading block `[[a, b], [b,
-/// c]]` and its determinant `d` they are `a` and `d / a`, and their inverses follow from `1 / (a d)`.
+/// Pivots are taken in pairs, which share one division: with the leading block `[[a, b], [b, c]]` and its
+/// determinant `d` they are `a` and `d / a`, and their inverses follow from `1 / (a d)`.
 #[inline(always)]
 pub(super) fn factorise<V: Lanes>(m: &mut [V; ENTRIES], guard: &Guard<V>) {
     for i in 0..6 {
@@ -62,7 +62,7 @@ pub(super) fn factorise<V: Lanes>(m: &mut [V; ENTRIES], guard: &Guard<V>) {
     }
 }
 
-/// Solves the equations that [`factorise`] was given the matrix of.
+/// Solves the equations whose matrix [`factorise`] has factorised.
 #[inline(always)]
 pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     let mut x = right;
@@ -80,7 +80,7 @@ pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     x
 }
 
-/// Turns columns `i` and `i + 1` of the rest of a matrix into those of `L`, takes them out of the columns
+/// Turns columns `i` and `i + 1` of the remaining matrix into those of `L`, eliminates them from the columns
 /// behind, and returns the inverses of both pivots.
 #[inline(always)]
 fn eliminate<V: Lanes>(m: &mut [V; ENTRIES], i: usize, guard: &Guard<V>) -> [V; 2] {
@@ -92,7 +92,7 @@ fn eliminate<V: Lanes>(m: &mut [V; ENTRIES], i: usize, guard: &Guard<V>) -> [V; 
     let mixed = b * inverse[0];
     m[lower(i + 1, i)] = mixed;
     for j in i + 2..6 {
-        // Row j, times D: what the rest loses is this times L.
+        // Row j, times D: this times L is subtracted from the remaining matrix.
         let first = m[lower(j, i)];
         let second = mixed.neg_mul_add(first, m[lower(j, i + 1)]);
         m[lower(j, i)] = first * inverse[0];

@@ -1,20 +1,19 @@
-//! The order of the visits.
+//! Order of the relaxation: sweeps as a wavefront through the rows.
 //!
 //! A sweep visits all even rows, then all odd ones; the next begins with the odd rows, and so on in turn.
-//! Rows of one parity do not see each other, so what counts is the order of a row and the two beside it, and
-//! the visits may be arranged such that little memory is walked through:
+//! Rows of one parity do not depend on each other, so only the order of a row and its two neighbours matters,
+//! and the visits are arranged to read memory once:
 //!
 //! * The second half of a sweep and the first of the next visit the same rows: each is visited twice while
-//!   its data are near. This leaves one *pass* more than there are sweeps; pass `p` visits rows of the parity
-//!   of `p`, twice but in the first and last pass.
-//! * Pass `p` comes to row `y` right after pass `p - 1` has left row `y + 1`: a wave as many rows deep as
-//!   there are passes runs down the frame, and a row's data come from far memory once for all sweeps.
-//! * Threads take bands of rows; from the band's edges inwards each pass ends one row earlier, since it lacks
-//!   what the other band does. The wedges between the bands that are left out are done afterwards, growing by
+//!   its data are in the cache. This gives one *pass* more than there are sweeps; pass `p` visits rows of the
+//!   parity of `p`, twice except in the first and last pass.
+//! * Pass `p` reaches row `y` right after pass `p - 1` has left row `y + 1`: a wavefront as many rows deep as
+//!   there are passes runs down the frame, and reads a row's data once for all sweeps.
+//! * Threads take bands of rows. From the edges of a band inwards each pass ends one row earlier, since it
+//!   lacks the results of the other band. The wedges left out between bands are done afterwards, growing by
 //!   one row a pass.
 //!
-//! Whatever the number of bands, each visit finds what it would find in the plain order: the results are the
-//! same to the last bit.
+//! Each visit finds the values of the plain order whatever the number of bands: results are bit-identical.
 
 use super::Planes;
 use super::relaxation::{PackedRow, relax_row};
@@ -23,7 +22,7 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What the visits to the rows need that a wave is at work on, and which rows these are.
+/// The packed rows of a wavefront, and which rows these are.
 #[derive(Debug, Default)]
 pub(super) struct Ring<T> {
     packed: Vec<PackedRow<T>>,
@@ -56,7 +55,7 @@ pub(super) fn sweep<T: SimdReal>(
     weights.reshape(motion.width, motion.height, WEIGHTS);
     let (height, stride, len) = (motion.height, motion.stride(), motion.row_len());
     let passes = problem.smoothness.sweeps + 1;
-    // A wedge reaches `passes` rows into the bands at both sides, and sees one more.
+    // A wedge reaches `passes` rows into the bands on both sides, and reads one more.
     let deep = passes + 1;
     let count = rayon::current_num_threads().min(height / (2 * deep)).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
@@ -82,7 +81,7 @@ pub(super) fn sweep<T: SimdReal>(
     work.into_par_iter().zip(rings.par_iter_mut()).with_max_len(1).for_each(|(part, ring)| run_span(part, ring));
 }
 
-/// The rows in each of some ranges that ascend and do not overlap.
+/// The rows in each of some ascending ranges that do not overlap.
 fn cut<'a, T>(mut data: &'a mut [T], row_len: usize, ranges: &[Range<usize>]) -> Vec<&'a mut [T]> {
     let mut parts = Vec::with_capacity(ranges.len());
     let mut done = 0;
@@ -97,9 +96,9 @@ fn cut<'a, T>(mut data: &'a mut [T], row_len: usize, ranges: &[Range<usize>]) ->
 /// The visits of all passes to the rows of a span.
 struct Wavefront<'a, T> {
     problem: &'a SmoothnessProblem<'a, T>,
-    /// The rows from `origin` on, one row more than the span at each side where there is one.
+    /// The rows from `origin` on, with one more than the span on each side where there is one.
     rows: &'a mut [T],
-    /// The bonds' weights there: a wedge goes on with those that the bands beside it left.
+    /// The smoothness weights there: a wedge continues with those that the bands beside it left.
     weights: &'a mut [T],
     origin: usize,
     span: Span,
@@ -126,8 +125,7 @@ impl<T: SimdReal> Kernel<T> for Wavefront<'_, T> {
                 if !span.contains(y, pass) {
                     continue;
                 }
-                // A row is visited during `passes` fronts, and the row that takes its place in the ring comes
-                // after.
+                // A row is visited during `passes` fronts, before another row takes its slot in the ring.
                 let place = y % passes;
                 let packed = &mut ring.packed[place];
                 let mut is_new = ring.rows[place] != Some(y);

@@ -1,4 +1,4 @@
-//! A pair's motion, found midway between the frames, told at the pixels of the first.
+//! Motion of a pair, estimated midway between the frames, at the pixels of the first frame.
 
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -10,16 +10,16 @@ use std::ops::Range;
 
 /// Distance of the sites, px.
 const SITE_SPACING: f64 = 2.0;
-/// Most lanes of a vector.
+/// Maximum number of lanes of a vector.
 const MAX_LANES: usize = 16;
-/// Least determinant of `I - M / 2`: below it, the motion folds the image.
+/// Minimum determinant of `I - M / 2`; below it the motion folds the image.
 const MIN_DETERMINANT: f64 = 0.1;
 
-/// The motion of the pixels of the first frame, from that of the places half way to the second.
+/// Motion at the pixels of the first frame from that midway to the second.
 ///
-/// The pixel `p` goes by `u_1(p) = u(p + u_1(p) / 2)`: its match lies half its own way off. The implicit
-/// equation is started from the affine model about `p` and iterated once; its derivative is `M_1 = (I - M /
-/// 2)^-1 M`, `M` at the place midway.
+/// The pixel `p` moves by `u_1(p) = u(p + u_1(p) / 2)`, since its midway position is half its own motion off.
+/// The implicit equation is started from the affine model about `p` and iterated once; its derivative is `M_1
+/// = (I - M / 2)^-1 M` with `M` midway.
 pub(in crate::flow::coarse_to_fine) fn at_first_frame<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -37,7 +37,7 @@ pub(in crate::flow::coarse_to_fine) fn at_first_frame<T: SimdReal>(
     out
 }
 
-/// Some rows of it.
+/// Some rows of [`at_first_frame`].
 struct ToFirstFrame<'a, T> {
     motion: &'a Planes<T>,
     /// Columns of the sites, px.
@@ -73,7 +73,7 @@ impl<T: SimdReal> Kernel<T> for ToFirstFrame<'_, T> {
     }
 }
 
-/// `(I - M / 2)^-1 b`, unless the motion folds the image.
+/// `(I - M / 2)^-1 b`, or `b` where the motion folds the image.
 #[inline(always)]
 fn solve<V: Lanes>(motion: &[V; MOTION], [a, b]: [V; 2]) -> [V; 2] {
     let [_, _, u_x, v_x, u_y, v_y] = *motion;
@@ -88,8 +88,8 @@ fn solve<V: Lanes>(motion: &[V; MOTION], [a, b]: [V; 2]) -> [V; 2] {
     [V::select(open, x, a), V::select(open, y, b)]
 }
 
-/// Where a coordinate lies among `count` sites: the site before it, the lever of that site's slope (px), and
-/// the next site's share. Beyond the last site its own model goes on.
+/// Position of a coordinate among `count` sites: the site before it, the lever of that site's slope (px), and
+/// the weight of the next site. Beyond the last site its own model is extrapolated.
 #[inline(always)]
 fn split<V: Lanes>(at: V, count: usize) -> (V, V, V) {
     let site = (at * V::constant(1.0 / SITE_SPACING)).max(V::zero()).min(V::constant(count as f64 - 1.0));
@@ -98,14 +98,14 @@ fn split<V: Lanes>(at: V, count: usize) -> (V, V, V) {
     (first, share.mul_add(V::constant(0.5 * SITE_SPACING), beyond), share)
 }
 
-/// As [`motion_at`](super::motion_at), a place a lane.
+/// As [`motion_at`](super::motion_at), one position a lane.
 #[inline(always)]
 fn blend<V: Lanes>(motion: &Planes<V::Scalar>, x: V, y: V) -> [V; MOTION] {
     let (column, dx, share_x) = split(x, motion.width);
     let (row, dy, share_y) = split(y, motion.height);
     let (stride, len) = (motion.stride(), motion.row_len());
     let starts = starts(column, row, len);
-    // A single row or column has no other; its share is zero.
+    // A single row or column has no neighbour; its weight is zero.
     let below = if motion.height > 1 { len } else { 0 };
     let (one, half) = (V::constant(1.0), V::constant(0.5 * SITE_SPACING));
     let mut sum = [V::zero(); MOTION];
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
     use crate::flow::coarse_to_fine::resample::motion_at;
 
-    /// The rest of `(I - M / 2)^-1 b`, in single places.
+    /// `(I - M / 2)^-1 b` for a single site.
     fn solved(m: &[f64; MOTION], b: [f64; 2]) -> [f64; 2] {
         solve::<f64>(m, b)
     }

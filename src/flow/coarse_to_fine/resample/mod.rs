@@ -1,4 +1,4 @@
-//! Motion between the sites, and on the sites of the next finer level.
+//! Motion between the sites, on the next finer or coarser level, and at other pixels.
 
 pub(super) mod first_frame;
 pub(super) mod rows;
@@ -9,13 +9,13 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use rows::RowReader;
 
-/// Rows of one task.
+/// Rows of a parallel task.
 const ROWS: usize = 32;
 
-/// The affine motions of the sites around a place, each carried there with half its lever, blended by their
-/// distance: exact where slopes turn evenly.
+/// Affine motions of the sites around a position, each evaluated with half its lever, blended by distance:
+/// exact where slopes change linearly.
 ///
-/// `(x, y)`: in px of the level whose sites are `step` px apart; beyond the last site its own model goes on.
+/// `(x, y)`: px of the level whose sites are `step` px apart; beyond the last site its model is extrapolated.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
     let split = |at: f64, count: usize| {
         let site = (at / step).clamp(0.0, (count - 1) as f64);
@@ -44,8 +44,8 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f
     blend
 }
 
-/// The motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles,
-/// the Jacobian stays.
+/// Motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles, the
+/// Jacobian stays.
 ///
 /// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
 pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
@@ -88,8 +88,8 @@ impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
     }
 }
 
-/// The motion on the `size` sites of the level half as fine: that of every second site, flow halved. The
-/// inverse of [`finer`].
+/// Motion on the `size` sites of the level half as fine: every second site, flow halved. The inverse of
+/// [`finer`].
 pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coarse: &mut Planes<T>) {
     coarse.reshape(size.0, size.1, MOTION);
     for (k, y) in (0..MOTION).flat_map(|k| (0..size.1).map(move |y| (k, y))) {
@@ -99,11 +99,10 @@ pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coars
     }
 }
 
-/// The same flow, with the Jacobian of every site that of the flow between the sites: the central difference
-/// over two pixels of the blend of the sites' affine models. SamplingGrid of the rim keep theirs across it.
+/// The same flow, with the Jacobian recomputed from it: the central difference over two pixels of the blended
+/// affine models. Border sites keep their Jacobian across the border.
 ///
-/// The coupling is stopped long before it has converged, and its flow is ahead of its Jacobian; this lets the
-/// Jacobian catch up.
+/// Relaxation stops long before it converges, with the Jacobian behind the flow; this lets it catch up.
 pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
     out.reshape(old.width, old.height, old.count);
     let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
@@ -124,7 +123,7 @@ pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
     });
 }
 
-/// Slopes between the sites of a row, of which the first and the last keep what they have.
+/// Slopes between the sites of a row; the first and the last are kept.
 fn slopes_along<T: SimdReal>(flow: &[T], slope: &[T], out: &mut [T]) {
     for end in [0, out.len() - 1] {
         out[end] = slope[end];
@@ -137,7 +136,7 @@ fn slopes_along<T: SimdReal>(flow: &[T], slope: &[T], out: &mut [T]) {
     }
 }
 
-/// Slopes at the sites of a row from the flow and the slopes of the rows above, here and below.
+/// Slopes at the sites of a row from flow and slopes of the rows above, here and below.
 fn slopes_across<T: SimdReal>([above, here, below]: [(&[T], &[T]); 3], out: &mut [T]) {
     let quarter = T::from_f64(0.25);
     for (x, out) in out.iter_mut().enumerate() {
@@ -198,7 +197,7 @@ mod tests {
         let want = motion.clone();
         for y in 0..7 {
             for x in 0..9 {
-                // A Jacobian that lags behind by the same amount everywhere leaves no trace.
+                // A constant offset of the Jacobian has no effect.
                 for k in 2..MOTION {
                     motion.line_mut(k, y)[x] += 0.5;
                 }

@@ -1,10 +1,10 @@
-//! Whole rows of pixels from planes on every second pixel.
+//! Rows of pixels interpolated from planes on every second pixel.
 
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::SimdReal;
 
-/// Reads planes on the sites (every second pixel) at the pixels of a row; keeps its memory from row to row.
+/// Reads planes on the sites (every second pixel) at the pixels of a row; keeps its memory between rows.
 #[derive(Debug)]
 pub(in crate::flow::coarse_to_fine) struct RowReader<T> {
     /// The planes at the sites' columns of the row.
@@ -25,16 +25,16 @@ impl<T: SimdReal> RowReader<T> {
         &self.pixels[k * self.width..(k + 1) * self.width]
     }
 
-    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites parabolas that
-    /// have their values and the turn of their slopes.
+    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites, parabolas with
+    /// the values of both and the change of their slopes.
     #[inline(always)]
     pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
         self.read(motion, y);
         let quarter = T::from_f64(0.25);
         let n = motion.width;
         if y % 2 == 1 {
-            // What the slopes along y add: a quarter of their difference between the rows; beyond the last
-            // all of it.
+            // Contribution of the slopes along y: a quarter of their difference between rows; beyond the last
+            // row, the whole slope.
             let (above, below) = (y / 2, y / 2 + 1);
             for c in 0..2 {
                 let (first, flow) = (motion.line(4 + c, above), &mut self.sites[c * n..(c + 1) * n]);
@@ -68,8 +68,8 @@ impl<T: SimdReal> RowReader<T> {
     }
 }
 
-/// Pixels of a row from its sites; with their slopes those of the parabola that has the values of both and
-/// turns as they say.
+/// Pixels of a row from its sites: linear, or with slopes a parabola with the values of both sites and the
+/// change of their slopes.
 #[inline(always)]
 fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
     let (half, quarter) = (T::from_f64(0.5), T::from_f64(0.25));
@@ -89,7 +89,7 @@ fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
             }
         }
     }
-    // The last site, and what it says of the pixel after it.
+    // The last site, and its extrapolation to the pixel after it.
     let beyond = slopes.map_or(sites[last], |slopes| sites[last] + slopes[last]);
     for (pixel, value) in rim.iter_mut().zip([sites[last], beyond]) {
         *pixel = value;

@@ -1,4 +1,4 @@
-//! The data term against its oracle; what must not change a bit; how long it takes.
+//! The data term against its oracle; independence of the number of threads; time of a pixel.
 
 mod oracle;
 
@@ -10,7 +10,7 @@ impl Case {
     fn check<T: SimdReal>(&self, tolerance: f64) {
         let (want, mut want_residuals) = self.oracle();
         want_residuals.sort_by(f64::total_cmp);
-        // Of the greatest of the six moments of a product, or of the three: a moment of its own may cancel.
+        // Relative to the largest moment of the same products: a single one may cancel.
         let family = |k: usize| match k {
             0..18 => k / 6 * 6..k / 6 * 6 + 6,
             18..24 => 18..24,

@@ -1,4 +1,4 @@
-//! The sums as the formulas say, in double precision, pixel by pixel.
+//! The sums of the formulas in double precision, pixel by pixel.
 
 use crate::flow::coarse_to_fine::data_term::*;
 use crate::parallel::Threads;
@@ -16,7 +16,7 @@ pub(super) struct Case {
 }
 
 impl Case {
-    /// Waves, moved by `speed` px times a motion that bends everywhere.
+    /// Waves, moved by `speed` px times a motion that is curved everywhere.
     pub fn new((width, height): (usize, usize), views: usize, speed: f64) -> Self {
         let frames = (0..views).map(|k| {
             let t = k as f64;
@@ -62,7 +62,7 @@ impl Case {
         };
         let (sw, sh) = (self.size.0.div_ceil(2), self.size.1.div_ceil(2));
         let mut motion = Planes::new(sw, sh, MOTION);
-        // Beside the sites anything finite may lie.
+        // Samples beside the sites may hold any finite value.
         motion.data_mut().fill(T::from_f64(1e30));
         for k in 0..MOTION {
             for y in 0..sh {
@@ -74,7 +74,7 @@ impl Case {
         let mut out = Planes::default();
         let scale = self.scale.map(T::from_f64);
         Threads::new(Some(threads)).unwrap().install(|| {
-            // Twice, so that what the first run leaves in memory is seen to do no harm.
+            // Twice, so that content left in memory is seen to do no harm.
             term.linearise(self.size, &views, &motion, scale, &mut out);
             let residuals = term.linearise(self.size, &views, &motion, scale, &mut out);
             (out, residuals)
@@ -92,8 +92,8 @@ impl Case {
             let mut sum = 0.0;
             for sy in &rows {
                 for sx in &columns {
-                    // Motion of constant bend lies midway between what the models of two sites say and the
-                    // mean of their values: slopes count half.
+                    // Motion of constant curvature lies midway between the extrapolations of two sites and
+                    // the mean of their values: slopes count half.
                     let lever = |p: usize, site: usize, n: usize| (p as f64 - 2.0 * site as f64) / n as f64;
                     let (dx, dy) = (lever(x, *sx, columns.len()), lever(y, *sy, rows.len()));
                     let at = |k: usize| self.motion[k][sy * sw + sx];

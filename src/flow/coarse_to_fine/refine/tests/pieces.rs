@@ -92,8 +92,8 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
                 for (got, want) in got.iter().zip(filtered(&scale.first.taps, &z, x as isize, y as isize)) {
                     assert!((got - want).abs() < 1e-12, "{} {x} {y}", scale.sigma);
                 }
-                // As good as a least-squares fit in the same window: slopes differ by how the Gaussian is cut
-                // off.
+                // Near a least-squares fit in the same window: slopes differ by the truncation of the
+                // Gaussian.
                 let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
                 assert!((got[0] - want[0]).abs() < 1e-12);
                 assert!((got[1] - want[1]).abs() < 0.01 && (got[2] - want[2]).abs() < 0.01, "{got:?} {want:?}");
@@ -167,7 +167,7 @@ fn choices_follow_the_formulas() {
     let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
     for x in 0..9 {
         assert!((choice.planes.at(order.density(), x, 0) / a - 1.0).abs() < 1e-12);
-        // What the third window changes to the fourth, over what white noise would.
+        // Change from the third window to the fourth, over that of white noise.
         let max_unrest = roots(2, x).powi(4) / (difference_variance(options.ladder[2], options.ladder[3]) * a);
         let slopes = 4.0 * (0.8 * max_unrest).clamp(1.0, 3.1);
         for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, slopes, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
@@ -271,7 +271,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let scale: &Scale<f64> = &ladder.scales[0];
     let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
     for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
-        // Of the flow, and of its slopes, which are weighed more sharply.
+        // For the flow, and for its slopes, which have sharper weights.
         let (mut sum, mut total) = ([0.0; 6], [0.0; 2]);
         // 1.5 sigma is 1.9 sites, and 1.3 along the diagonals.
         for (dx, dy) in [(0, 0), (2, 0), (-2, 0), (0, 2), (0, -2), (1, 1), (1, -1), (-1, 1), (-1, -1)] {

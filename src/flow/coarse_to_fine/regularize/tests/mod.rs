@@ -6,7 +6,7 @@ use reference::{affine, energy, filled, made, motion_at, naive, rough};
 
 const ROBUST: Smoothness = Smoothness { flow: 20.0, jacobian: 2000.0, break_strain: 0.1, sweeps: 6, reweight_every: 2 };
 const QUADRATIC: Smoothness = Smoothness { break_strain: f64::INFINITY, ..ROBUST };
-/// Couples, and gives the noise that it was done with.
+/// Regularises, and returns the noise that was used.
 fn run<T: SimdReal>(level: Level, data: &Planes<T>, motion: &mut Planes<T>, c: &Smoothness) -> f64 {
     let floor = T::from_f64(0.05);
     let before = motion.clone();
@@ -129,7 +129,7 @@ fn what_nothing_binds_stays() {
 #[test]
 fn quadratic_energy_falls_with_every_sweep() {
     let data = made::<f64>(33, 17, |x, y| ((x + y) % 3 != 0).then(|| affine(x, y)));
-    // Within the limit of the flow's change, which is no part of the descent.
+    // Within the limit on the change of the flow, which is no part of the descent.
     let near = |x, y| std::array::from_fn(|k| affine(x, y)[k] + 0.2 * rough(x, y)[k]);
     let mut last = f64::INFINITY;
     for sweeps in 0..12 {
@@ -145,7 +145,7 @@ fn quadratic_energy_falls_with_every_sweep() {
 #[test]
 fn motions_that_meet_at_an_edge_stay_apart() {
     let sides = |x: usize, _| [if x < 16 { 1.0 } else { -1.0 }, 0.0, 0.0, 0.0, 0.0, 0.0];
-    // One direction of the texture only, and weak: the bonds decide.
+    // Weak texture of one direction only: smoothness decides.
     let mut data = made::<f64>(33, 17, |x, y| Some(sides(x, y)));
     data.data_mut().iter_mut().for_each(|v| *v *= 0.05);
     let blur = |c: &Smoothness| {
@@ -183,7 +183,7 @@ fn threads_do_not_change_a_bit() {
     }
 }
 
-/// `cargo test --release --lib couple::tests::speed -- --ignored --nocapture`
+/// `cargo test --release --lib regularize::tests::speed -- --ignored --nocapture`
 #[test]
 #[ignore = "measures"]
 #[allow(clippy::print_stdout)]

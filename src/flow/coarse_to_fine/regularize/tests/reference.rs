@@ -1,4 +1,4 @@
-//! The definition, written out in double precision; made-up data and motions.
+//! The definition, written out in double precision; synthetic data and motions.
 
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::regularize::{ERROR, HALF_SPACING, MAX_FLOW_CHANGE, Smoothness, VALID};
@@ -17,7 +17,7 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, x: usize, y: usize) -> 
     std::array::from_fn(|k| motion.at(k, x, y).to_f64())
 }
 
-/// The motions' difference in the middle of a bond along `(dx, dy)`, and that of their Jacobians.
+/// The difference of the motions in the middle of an edge along `(dx, dy)`, and that of their Jacobians.
 fn strain(here: &[f64; 6], there: &[f64; 6], (dx, dy): (f64, f64)) -> ([f64; 2], [f64; 4]) {
     let at = |m: &[f64; 6], s: f64, c: usize| m[c] + s * (dx * m[2 + c] + dy * m[4 + c]);
     let flow = std::array::from_fn(|c| at(here, HALF_SPACING, c) - at(there, -HALF_SPACING, c));
@@ -105,8 +105,8 @@ pub(super) fn energy<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Smoo
     sum
 }
 
-/// Random texture under a window of a few pixels whose motion is `truth` at each site; nothing where `truth`
-/// says nothing.
+/// Random texture under a window of a few pixels whose motion is `truth` at each site; no data where `truth`
+/// is `None`.
 pub(super) fn made<T: SimdReal>(
     width: usize,
     height: usize,
@@ -114,7 +114,7 @@ pub(super) fn made<T: SimdReal>(
 ) -> Planes<T> {
     let rng = CounterRng::new(7);
     let mut data = Planes::new(width, height, 26);
-    // Lanes beside the sites may hold anything.
+    // Samples beside the sites may hold any finite value.
     data.data_mut().iter_mut().enumerate().for_each(|(i, v)| *v = T::from_f64(1e3 * rng.normal(i as u64)));
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let mut planes = [0.0; 26];
@@ -153,14 +153,14 @@ pub(super) fn filled<T: SimdReal>(width: usize, height: usize, value: impl Fn(us
     motion
 }
 
-/// Motions that differ from site to site, some by much.
+/// Motions that differ from site to site, some of them much.
 pub(super) fn rough(x: usize, y: usize) -> [f64; 6] {
     let rng = CounterRng::new(3).stream((1000 * y + x) as u64);
     let size = if rng.uniform(9) < 0.1 { 5.0 } else { 1.0 };
     std::array::from_fn(|k| size * rng.normal(k as u64) * if k < 2 { 0.5 } else { 0.03 })
 }
 
-/// One affine motion of the whole frame, as sites 2 px apart see it.
+/// One affine motion of the whole frame, sampled 2 px apart.
 pub(super) fn affine(x: usize, y: usize) -> [f64; 6] {
     let [u, v, ux, vx, uy, vy] = [0.5, -0.3, 0.02, -0.01, 0.015, -0.03];
     let (x, y) = (2.0 * HALF_SPACING * x as f64, 2.0 * HALF_SPACING * y as f64);
