@@ -84,7 +84,7 @@ pub fn preprocess(arguments: &InputArguments, mask: Option<&Mask>) -> Result<Pre
 /// What is done to frames before this estimator has them. The windowed one smooths on its own, and reads the
 /// noise from the frames before that.
 pub fn preprocess_for(estimator: &Estimator, arguments: &InputArguments) -> Result<Preprocess> {
-    let mut steps = preprocess(arguments, estimator.common().mask.as_ref())?;
+    let mut steps = preprocess(arguments, estimator.options().mask.as_ref())?;
     if matches!(estimator.method(), Method::Windowed(_)) {
         steps.smooth = None;
     }

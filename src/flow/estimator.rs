@@ -13,7 +13,7 @@ use crate::types::{FieldLayout, FlowField, Frame};
 
 /// Largest standard deviation of the noise in single precision, grey levels: squares of larger ones times
 /// counts do not fit.
-const MOST_NOISE: f64 = 1e12;
+const MAX_SINGLE_NOISE: f64 = 1e12;
 
 /// A method made ready: options checked, stencils and kernels computed.
 ///
@@ -32,7 +32,7 @@ const MOST_NOISE: f64 = 1e12;
 pub struct Estimator {
     engine: Engine,
     method: Method,
-    common: EstimatorOptions,
+    options: EstimatorOptions,
 }
 
 #[derive(Debug)]
@@ -49,16 +49,16 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option that cannot be used.
-    pub fn new(method: Method, common: EstimatorOptions) -> Result<Self> {
-        common.check()?;
+    pub fn new(method: Method, options: EstimatorOptions) -> Result<Self> {
+        options.check()?;
         let engine = match &method {
             Method::CoarseToFine(o) => Engine::CoarseToFine(CoarseToFine::new(o)?),
-            Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &common)?)),
-            Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o, &common)?)),
-            Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &common)?),
-            Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &common)?),
+            Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &options)?)),
+            Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o, &options)?)),
+            Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &options)?),
+            Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &options)?),
         };
-        Ok(Self { engine, method, common })
+        Ok(Self { engine, method, options })
     }
 
     /// The method with its options.
@@ -66,8 +66,8 @@ impl Estimator {
         &self.method
     }
     /// The shared options.
-    pub fn common(&self) -> &EstimatorOptions {
-        &self.common
+    pub fn options(&self) -> &EstimatorOptions {
+        &self.options
     }
 
     /// Frames that one field is estimated from: 3, or 2 for a baseline that differences a pair.
@@ -109,7 +109,7 @@ impl Estimator {
     /// naming `mask`, `region` or `points` when those do not fit the frames.
     pub fn estimate<T: SimdReal>(&self, frames: &[&Frame<T>], first_index: usize) -> Result<FlowField<T>> {
         self.check(frames)?;
-        let mut field = FlowField::unwritten(self.layout(frames[0].size(), first_index), self.common.covariance)?;
+        let mut field = FlowField::unwritten(self.layout(frames[0].size(), first_index), self.options.covariance)?;
         self.fill(frames, &mut field)?;
         Ok(field)
     }
@@ -129,7 +129,7 @@ impl Estimator {
         let layout = self.layout(frames[0].size(), first_index);
         let shape = layout.sites.shape(layout.frame_size)?;
         let (n, p) = (shape.0 * shape.1, layout.parameters.len());
-        let covariance = if self.common.covariance { Some(p * (p + 1) / 2 * n) } else { None };
+        let covariance = if self.options.covariance { Some(p * (p + 1) / 2 * n) } else { None };
         let fits = (field.width, field.height) == shape
             && field.motion.len() == p * n
             && field.status.len() == n
@@ -137,7 +137,7 @@ impl Estimator {
         if fits {
             field.layout = layout;
         } else {
-            *field = FlowField::unwritten(layout, self.common.covariance)?;
+            *field = FlowField::unwritten(layout, self.options.covariance)?;
         }
         self.fill(frames, field)
     }
@@ -147,11 +147,11 @@ impl Estimator {
         let model = self.model();
         FieldLayout {
             frame_size,
-            sites: self.common.sites.clone(),
+            sites: self.options.sites.clone(),
             model: model.name().into(),
             parameters: model.parameters().iter().map(|p| p.name.to_string()).collect(),
-            frame_period: self.common.frame_period,
-            pixel_pitch: self.common.pixel_pitch,
+            frame_period: self.options.frame_period,
+            pixel_pitch: self.options.pixel_pitch,
             frame_index: first_index + self.reference_frame(),
             correlation_length: self.method.correlation_length(),
         }
@@ -170,13 +170,14 @@ impl Estimator {
         if w < 3 || h < 3 {
             return Err(Error::argument("frames", "at least 3 x 3 pixels", format!("{w} x {h}")));
         }
-        if let Some(mask) = self.common.mask.as_ref().filter(|m| m.size() != (w, h)) {
+        if let Some(mask) = self.options.mask.as_ref().filter(|m| m.size() != (w, h)) {
             let got = format!("{} x {}", mask.width(), mask.height());
             return Err(Error::argument("mask", format!("the size of the frames, {w} x {h}"), got));
         }
-        if let Some(noise) = self.common.noise.filter(|noise| *noise > MOST_NOISE && size_of::<T>() == size_of::<f32>())
+        if let Some(noise) =
+            self.options.noise.filter(|noise| *noise > MAX_SINGLE_NOISE && size_of::<T>() == size_of::<f32>())
         {
-            let expected = format!("at most {MOST_NOISE:e} grey levels in single precision");
+            let expected = format!("at most {MAX_SINGLE_NOISE:e} grey levels in single precision");
             return Err(Error::argument("noise", expected, noise));
         }
         Ok(())
@@ -206,7 +207,7 @@ impl Estimator {
 
     fn fill_with<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
         let n = field.len();
-        if self.common.diagnostics {
+        if self.options.diagnostics {
             field.residual.get_or_insert_default().resize(n, T::nan());
             field.condition.get_or_insert_default().resize(n, T::nan());
             field.rank.get_or_insert_default().resize(n, 0);
@@ -214,12 +215,12 @@ impl Estimator {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
         let info = self.method.info();
-        field.window = (self.common.diagnostics && info.chooses_window).then(|| {
+        field.window = (self.options.diagnostics && info.chooses_window).then(|| {
             let mut plane = field.window.take().unwrap_or_default();
             plane.resize(n, T::nan());
             plane
         });
-        let has_systematic = self.common.covariance && self.common.systematic && info.has_systematic;
+        let has_systematic = self.options.covariance && self.options.systematic && info.has_systematic;
         let entries = field.covariance.as_ref().map_or(0, Vec::len);
         field.systematic = has_systematic.then(|| {
             let mut planes = field.systematic.take().unwrap_or_default();
@@ -227,15 +228,15 @@ impl Estimator {
             planes
         });
         match (&self.engine, frames) {
-            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.common, field),
+            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.options, field),
             (Engine::Instantaneous(_), _) => {}
-            (Engine::CoarseToFine(e), _) => e.estimate_into(frames, &self.common, field),
-            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.common, field),
-            (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.common, field)?,
-            (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.common, field)?,
+            (Engine::CoarseToFine(e), _) => e.estimate_into(frames, &self.options, field),
+            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.options, field),
+            (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.options, field)?,
+            (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.options, field)?,
         }
-        if self.common.pixel_pitch != (1.0, 1.0) {
-            to_pitch(field, self.model().parameters(), self.common.pixel_pitch);
+        if self.options.pixel_pitch != (1.0, 1.0) {
+            to_pitch(field, self.model().parameters(), self.options.pixel_pitch);
         }
         Ok(())
     }

@@ -46,7 +46,7 @@ impl Default for LucasKanadeOptions {
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Least share of the window's weight that must lie inside the frame; that of the windowed method.
-const LEAST_WEIGHT: f64 = 0.1;
+const MIN_USABLE_WEIGHT: f64 = 0.1;
 
 /// The estimator behind the options.
 #[derive(Debug)]
@@ -129,7 +129,7 @@ impl LucasKanade {
         };
         let obstacle = |at: (usize, usize)| {
             let rim = Reach { left: 1, right: 1, up: 1, down: 1 };
-            if !rim.fits(at, (w, h)) || self.share(at, (w, h)) < LEAST_WEIGHT {
+            if !rim.fits(at, (w, h)) || self.share(at, (w, h)) < MIN_USABLE_WEIGHT {
                 return Some(Status::Border);
             }
             counts.as_ref().is_some_and(|c| c.touches(at, self.reach(at, (w, h)))).then_some(Status::Masked)

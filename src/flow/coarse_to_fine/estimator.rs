@@ -8,7 +8,6 @@ use super::estimate::Estimate;
 use super::options::CoarseToFineOptions;
 use super::output;
 use super::peak_locking::PeakLocking;
-use super::planes::Planes;
 use super::pyramid::ComparedFrames;
 use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::schedule::Schedule;

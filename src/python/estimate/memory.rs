@@ -38,7 +38,7 @@ impl<T: SimdReal> Ring<T> {
             return Err(crate::Error::argument("frames", expected, format!("one of {}", text(frame.size()))));
         }
         let needed = estimator.frames_needed();
-        let frame = estimator.common().threads.install(|| Ok(preprocess.apply(real(frame)?)))?;
+        let frame = estimator.options().threads.install(|| Ok(preprocess.apply(real(frame)?)))?;
         self.frames.push_back(frame);
         if self.frames.len() > needed
             && let Some(oldest) = self.frames.pop_front()
@@ -108,7 +108,7 @@ fn converted<S: Sample, T: Real>(mut frame: Frame<S>) -> Result<Frame<T>> {
 
 /// As [`Estimator::estimate`], in the memory of an earlier field where there is one that fits.
 fn estimate<T: SimdReal>(estimator: &Estimator, frames: &[&Frame<T>], first_index: usize) -> Result<FlowField<T>> {
-    let common = estimator.common();
+    let common = estimator.options();
     let frame_size = match frames.first() {
         // Other methods take long enough for a fresh field not to matter.
         Some(frame) if matches!(estimator.method(), Method::Instantaneous(_) | Method::CoarseToFine(_)) => frame.size(),

@@ -71,7 +71,7 @@ impl<T: SimdReal> RecursiveFusion<T> {
             let expected = "one of affine flow, for what is recursive (windowed, coarse_to_fine or instantaneous)";
             return Err(Error::argument("method", expected, format!("{method}, whose model is {model}")));
         }
-        let common = estimator.common();
+        let common = estimator.options();
         if !common.covariance {
             return Err(Error::argument("covariance", "a covariance, by which estimates are weighed", "none"));
         }

@@ -16,6 +16,7 @@ use super::pyramid::ComparedFrames;
 use super::refine::{PITCH, RefineOptions, WindowStatistics, refine};
 use super::workspace::Workspace;
 use crate::flow::coarse_to_fine::descent::comparison::Comparison;
+use crate::math::median;
 use crate::simd::SimdReal;
 
 /// Rounds of iterative reweighting.
@@ -189,8 +190,7 @@ fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
         if rests.is_empty() || square <= f64::MIN_POSITIVE {
             return 0.0;
         }
-        let middle = rests.len() / 2;
-        typical = rests.select_nth_unstable_by(middle, f64::total_cmp).1.max(f64::MIN_POSITIVE);
+        typical = median(&mut rests).unwrap_or(0.0).max(f64::MIN_POSITIVE);
         share = (product / square).clamp(0.0, 1.0);
     }
     share

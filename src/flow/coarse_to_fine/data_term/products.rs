@@ -11,13 +11,13 @@ use crate::simd::{Lanes, SimdReal};
 pub(super) fn vertical_stencils<V: Lanes>(columns: &Columns, rows: [&[V::Scalar]; 3], out: &mut [V::Scalar]) {
     let n = columns.count;
     for h in 0..2 {
-        let [a0, a1, a2] = rows.map(|row| &row[columns.range(0, h)][..n]);
-        let [r0, r1, r2] = rows.map(|row| &row[columns.range(1, h)][..n]);
+        let [a0, a1, a2] = rows.map(|row| &row[columns.samples(0, h)][..n]);
+        let [r0, r1, r2] = rows.map(|row| &row[columns.samples(1, h)][..n]);
         let (ab, rest) = out.split_at_mut(columns.row(1));
         let (ad, rest) = rest.split_at_mut(columns.row(1));
         let (as_, rest) = rest.split_at_mut(columns.row(1));
         let (rb, rd) = rest.split_at_mut(columns.row(1));
-        let [ab, ad, as_, rb, rd] = [ab, ad, as_, rb, rd].map(|plane| &mut plane[columns.range(0, h)][..n]);
+        let [ab, ad, as_, rb, rd] = [ab, ad, as_, rb, rd].map(|plane| &mut plane[columns.samples(0, h)][..n]);
         let (half, sixth) = (V::constant(0.5), V::constant(1.0 / 6.0));
         let mut at = 0;
         while at + V::LANES <= n {
@@ -69,7 +69,7 @@ pub(super) fn products_row<T: SimdReal, V: Lanes<Scalar = T>>(
         [even, even + 1, odd - 1, odd].map(|start| &row[start..start + n])
     });
     let motion: [[&[T]; 3]; 2] =
-        std::array::from_fn(|h| [2, 3, 4].map(|k| &image[..columns.row(IMAGE)][columns.range(k, h)][..n]));
+        std::array::from_fn(|h| [2, 3, 4].map(|k| &image[..columns.row(IMAGE)][columns.samples(k, h)][..n]));
     let places = places(columns, out);
     let mut at = 0;
     while at + V::LANES <= n {
@@ -139,7 +139,7 @@ fn products<V: Lanes>(near: [[V; 3]; 5], [u, v, valid]: [V; 3], weights: Weights
 #[inline(always)]
 pub(super) fn residuals<T: SimdReal>(columns: &Columns, stencil: &[T], image: &[T], out: &mut Vec<T>) {
     let (even, odd) = (columns.row(3) + LEFT, columns.row(3) + columns.half + LEFT);
-    let valid = columns.range(4, 0).start;
+    let valid = columns.samples(4, 0).start;
     for site in (columns.from.next_multiple_of(2)..columns.to).step_by(2) {
         let i = site - columns.first;
         if image[valid + i] > T::from_f64(0.0) {

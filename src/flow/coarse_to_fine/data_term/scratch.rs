@@ -43,7 +43,7 @@ impl Columns {
 
     /// The samples of half `h` of plane `k` of a row.
     #[inline(always)]
-    pub fn range(&self, k: usize, h: usize) -> std::ops::Range<usize> {
+    pub fn samples(&self, k: usize, h: usize) -> std::ops::Range<usize> {
         let start = (2 * k + h) * self.half + LEFT;
         start..start + self.count
     }
@@ -121,7 +121,7 @@ impl<T: SimdReal> Scratch<T> {
         self.vertical.clear(columns.row(VERTICAL));
         let frame = self.frame.all();
         for h in 0..2 {
-            let (number, inside) = (columns.range(0, h).start, columns.range(1, h).start);
+            let (number, inside) = (columns.samples(0, h).start, columns.samples(1, h).start);
             for i in 0..columns.count {
                 let x = 2 * (columns.first + i) + h;
                 frame[number + i] = T::from_f64(x as f64);

@@ -25,7 +25,7 @@ pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     let (right, low) = (V::constant(width as f64 - 2.0), V::constant(height as f64 - 2.0));
     for h in 0..2 {
         let n = columns.count;
-        let (number, inside) = (&frame[columns.range(0, h)][..n], &frame[columns.range(1, h)][..n]);
+        let (number, inside) = (&frame[columns.samples(0, h)][..n], &frame[columns.samples(1, h)][..n]);
         let [mean, rate, u, v, valid] = planes(columns, h, image);
         let mut at = 0;
         while at + V::LANES <= n {
@@ -58,7 +58,7 @@ fn planes<'a, T>(columns: &Columns, h: usize, image: &'a mut [T]) -> [&'a mut [T
     std::array::from_fn(|_| {
         let (plane, after) = std::mem::take(&mut rest).split_at_mut(columns.row(1));
         rest = after;
-        &mut plane[columns.range(0, h)][..columns.count]
+        &mut plane[columns.samples(0, h)][..columns.count]
     })
 }
 

@@ -4,6 +4,7 @@ use crate::flow::coarse_to_fine::data_term::{COUNT, DataOptions, DataTerm, ERROR
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
+use crate::math::median;
 use crate::simd::{Level, SimdReal};
 
 /// Minimum ratio of residual energies, the typical energy added to both: smaller differences are chance.
@@ -30,7 +31,8 @@ impl<T: SimdReal> Comparison<'_, T> {
     /// sites.
     pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
         let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
-        let typical = median(known.iter().copied().filter(|residual_energies| !residual_energies.is_nan()).collect());
+        let mut sorted: Vec<f64> = known.iter().copied().filter(|energy| !energy.is_nan()).collect();
+        let typical = median(&mut sorted).unwrap_or(0.0);
         let size = (motion.width, motion.height);
         let distance = |n: usize| {
             let [u, v] =
@@ -70,11 +72,6 @@ impl<T: SimdReal> Comparison<'_, T> {
         self.space.keep_small(data);
         residual_energies
     }
-}
-
-/// The upper median; 0 of an empty list.
-fn median(mut values: Vec<f64>) -> f64 {
-    crate::math::median(&mut values).unwrap_or(0.0)
 }
 
 /// Weighted share of winning sites around one; half of the weight along each axis is its own.
@@ -141,7 +138,5 @@ mod tests {
         let share = |x, y| share_around(&wins, (4, 3), (x, y));
         assert_eq!([share(1, 1), share(0, 1), share(2, 2), share(3, 1)], [0.25, 0.125, 0.0625, 0.0]);
         assert_eq!(share_around(&[true], (1, 1), (0, 0)), 1.0);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(Vec::new()), 0.0);
     }
 }

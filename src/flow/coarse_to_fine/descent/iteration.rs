@@ -8,6 +8,7 @@ use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
 use crate::flow::coarse_to_fine::regularize::{RegularizeScratch, Smoothness, regularize};
 use crate::flow::coarse_to_fine::resample::rederive;
+use crate::math::robust_std;
 use crate::simd::SimdReal;
 use std::ops::Range;
 
@@ -109,15 +110,11 @@ impl<T: SimdReal> Iteration<'_, T> {
         regularize(self.plan.simd, self.data, motion, smoothness, floor, self.scratch)
     }
 
-    /// Robust standard deviation from the absolute values of residuals (1.4826 times the median).
+    /// Robust standard deviation from the absolute values of residuals.
     fn residual_std(&self, mut residuals: Vec<T>) -> Option<T> {
-        if residuals.is_empty() {
-            return None;
-        }
-        let middle = residuals.len() / 2;
-        residuals.select_nth_unstable_by(middle, |a, b| a.to_f64().total_cmp(&b.to_f64()));
+        let std = robust_std(&mut residuals)?;
         let floor = (MIN_RESIDUAL_SHARE * self.plan.brightness.contrast).max(f64::from(f32::MIN_POSITIVE));
-        Some(T::from_f64(1.4826 * residuals[middle].to_f64() + floor))
+        Some(T::from_f64(std + floor))
     }
 }
 
