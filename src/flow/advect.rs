@@ -7,12 +7,12 @@ use crate::types::{FlowField, MOTION_NAMES, Rect, SamplingGrid};
 /// A covariance matrix of a point, px^2, rows and columns x, y.
 pub type PointCovariance = [[f64; 2]; 2];
 
-/// Where points went.
+/// Moved points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Advected {
-    /// The points one frame later, `(x, y)` px; NaN where the field does not say.
+    /// The points one frame later, `(x, y)` px; NaN where the field has no estimate.
     pub points: Vec<[f64; 2]>,
-    /// Their covariance, px^2, where the points came with one; NaN with the point.
+    /// Their covariance, px^2, if the points have one; NaN with the point.
     pub covariances: Option<Vec<PointCovariance>>,
 }
 
@@ -28,24 +28,22 @@ struct Between {
 
 /// Moves points by a field: `p' = p + f(p)`, the motion of one frame.
 ///
-/// Between sites the flow is bilinear in what the four sites about the point say of it, each by its own
-/// affine motion: `f(p) = sum_k w_k (f_k + M_k (p - s_k))` with bilinear weights `w_k`; at a site it is the
-/// site's flow, and an affine field is exact everywhere.
+/// Between sites the flow is the bilinear mean of the affine motions of the four sites around the point,
+/// `f(p) = sum_k w_k (f_k + M_k (p - s_k))` with bilinear weights `w_k`; at a site it is the site's flow, and
+/// an affine field is exact everywhere.
 ///
-/// A covariance `C` becomes `(I + M) C (I + M)^T + C_f`: the error of the point, deformed as its surroundings
-/// are, and that of the flow itself, taken as independent. `M = sum_k w_k M_k`, or the slope of the
-/// interpolated flow for a model without derivatives. `C_f = sum_k w_k A_k C_k A_k^T` with the sites'
-/// covariances `C_k` of `(u, v, u_x, v_x, u_y, v_y)` and `A_k` the derivative of `f_k + M_k (p - s_k)` by
-/// them: exact where what the four sites say of the point errs alike, as that of neighbours does whose
-/// windows overlap, and too large, never too small, where it does not. It is zero for a field without
-/// covariance.
+/// A covariance `C` becomes `(I + M) C (I + M)^T + C_f`: the error of the point, deformed by the flow, and
+/// that of the flow itself, taken as independent. `M = sum_k w_k M_k`, or the slope of the interpolated flow
+/// for a model without derivatives. `C_f = sum_k w_k A_k C_k A_k^T` with the sites' covariances `C_k` of `(u,
+/// v, u_x, v_x, u_y, v_y)` and `A_k` the derivative of `f_k + M_k (p - s_k)` by them: exact if the four sites
+/// have the same error, as neighbours with overlapping windows do, else an upper bound. It is zero for a
+/// field without covariance.
 ///
-/// A point is NaN where it is outside the rectangle of sites (nothing is extrapolated), where a site that has
-/// a weight has no valid estimate, and where it was NaN.
+/// A point is NaN if it is outside the rectangle of sites (nothing is extrapolated), if a site with a weight
+/// has no valid estimate, and if it was NaN.
 ///
-/// # Errors
-/// [`Error::Argument`] naming `field` for a list of points instead of a grid, `pixel_pitch` unless a pixel is
-/// one unit in both directions, `covariance` for another number of matrices than of points.
+/// # Errors [`Error::Argument`] naming `field` for a list of points instead of a grid, `pixel_pitch` unless a
+/// pixel is one unit in both directions, `covariance` for another number of matrices than of points.
 pub fn advect<T: Real>(
     field: &FlowField<T>,
     points: &[[f64; 2]],
@@ -105,7 +103,7 @@ impl Lattice {
         Ok(Self { origin: [x as f64, y as f64], stride: *stride as f64, has_slopes })
     }
 
-    /// The flow at a point; nothing outside the sites or where one that is needed is not valid.
+    /// The flow at a point; `None` outside the sites or if a needed site is not valid.
     fn at<T: Real>(&self, field: &FlowField<T>, point: [f64; 2]) -> Option<Between> {
         let place: [f64; 2] = std::array::from_fn(|c| (point[c] - self.origin[c]) / self.stride);
         let (column, fx) = cell(place[0], field.width)?;
@@ -156,7 +154,7 @@ impl Lattice {
 }
 
 impl Between {
-    /// Adds what one site says at an `offset` from it, px; nothing when it has no valid estimate.
+    /// Adds the affine motion of one site at an `offset` from it, px; `None` if it has no valid estimate.
     fn add<T: Real>(&mut self, field: &FlowField<T>, site: usize, offset: [f64; 2], weight: f64) -> Option<()> {
         let m = field.affine(site).to_array().map(T::to_f64);
         if !field.status[site].is_valid() || !m.iter().all(|value| value.is_finite()) {
@@ -183,8 +181,8 @@ impl Between {
     }
 }
 
-/// The site at or before a place on an axis of `count` sites, and the rest; the last site belongs to the cell
-/// before it, so that it is reached from within.
+/// The site at or before a position on an axis of `count` sites, and the remainder; the last site belongs to
+/// the cell before it.
 fn cell(place: f64, count: usize) -> Option<(usize, f64)> {
     if count == 0 || !(place >= 0.0 && place <= (count - 1) as f64) {
         return None;

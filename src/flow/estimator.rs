@@ -1,4 +1,4 @@
-//! One door to all methods.
+//! Entry point of all methods.
 
 use super::baseline::{HornSchunck, LucasKanade};
 use super::coarse_to_fine::CoarseToFine;
@@ -11,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::simd::{SimdReal, same, same_mut};
 use crate::types::{FieldLayout, FlowField, Frame};
 
-/// Largest standard deviation of the noise in single precision, grey levels: squares of larger ones times
-/// counts do not fit.
+/// Maximum standard deviation of the noise in single precision, grey levels: beyond it, its square times
+/// counts overflows.
 const MAX_SINGLE_NOISE: f64 = 1e12;
 
 /// A method made ready: options checked, stencils and kernels computed.
@@ -22,7 +22,10 @@ const MAX_SINGLE_NOISE: f64 = 1e12;
 /// use jacoflow::types::Frame;
 /// let estimator = Estimator::new(Method::parse("instantaneous")?, EstimatorOptions::default())?;
 /// let frames: Vec<Frame<f64>> = (0..3)
-///     .map(|t| Frame::from_fn(8, 8, |x, y| ((x as f64 - 0.25 * t as f64) * 0.7).sin() * 50.0 + ((y as f64) * 0.4).cos() * 40.0))
+///     .map(|t| {
+///         let wave = |x: f64, y: f64| (0.7 * x).sin() * 50.0 + (0.4 * y).cos() * 40.0;
+///         Frame::from_fn(8, 8, |x, y| wave(x as f64 - 0.25 * t as f64, y as f64))
+///     })
 ///     .collect();
 /// let field = estimator.estimate(&[&frames[0], &frames[1], &frames[2]], 0)?;
 /// assert_eq!((field.width, field.height, field.layout.frame_index), (8, 8, 1));
@@ -114,11 +117,9 @@ impl Estimator {
         Ok(field)
     }
 
-    /// As [`Estimator::estimate`], into a field that an earlier call made: nothing is allocated when its size
-    /// fits, else it is replaced.
+    /// As [`Estimator::estimate`], into an existing field: nothing is allocated if its size fits.
     ///
-    /// # Errors
-    /// As [`Estimator::estimate`]; the field's values are then unspecified.
+    /// # Errors As [`Estimator::estimate`]; the field's values are then unspecified.
     pub fn estimate_into<T: SimdReal>(
         &self,
         frames: &[&Frame<T>],
@@ -142,7 +143,7 @@ impl Estimator {
         self.fill(frames, field)
     }
 
-    /// What a field from these frames holds.
+    /// The layout of a field from these frames.
     pub(crate) fn layout(&self, frame_size: (usize, usize), first_index: usize) -> FieldLayout {
         let model = self.model();
         FieldLayout {
@@ -183,8 +184,8 @@ impl Estimator {
         Ok(())
     }
 
-    /// Hands over to the instance for the precision at hand. Both are compiled here, once, and not again in
-    /// every crate that calls this door.
+    /// Calls the instance for the precision. Both are compiled here, once, and not again in every crate that
+    /// calls this function.
     fn fill<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
         if let Some(field) = same_mut::<_, FlowField<f32>>(field) {
             self.fill_single(&frames.iter().filter_map(|f| same(*f)).collect::<Vec<_>>(), field)

@@ -1,14 +1,14 @@
 //! Small dense least squares in double precision, without allocation: Householder QR, then a one-sided Jacobi
 //! singular value decomposition of R.
 //!
-//! The careful path of the per-pixel estimators. Normal equations square the condition number; this does not.
-//! (G. Golub, C. Van Loan, "Matrix Computations", 4th ed., 5.2 and 8.6; J. Demmel, K. Veselic 1992 for the
-//! relative accuracy of Jacobi.)
+//! For ill-conditioned pixels of the per-pixel estimators: normal equations square the condition number, this
+//! does not. (G. Golub, C. Van Loan, "Matrix Computations", 4th ed., 5.2 and 8.6; J. Demmel, K. Veselic 1992
+//! for the relative accuracy of Jacobi.)
 
 /// Smallest singular value of the column-scaled system, relative to the largest, that counts as rank.
 pub(super) const RANK_TOLERANCE: f64 = 1e-9;
 
-/// What is known of the least-squares solution of `A x = b`, A of N rows and P columns.
+/// Least-squares solution of `A x = b`, A of N rows and P columns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solution<const N: usize, const P: usize> {
     /// The solution: unique where `rank == P`, else the one of least norm.

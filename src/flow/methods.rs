@@ -7,12 +7,14 @@
 //!
 //! ```
 //! use jacoflow::flow::{METHODS, MethodInfo, MethodSettings};
-//! let settings = MethodSettings { method: "windowed".into(), window_sigma: Some(3.0), ..Default::default() };
+//! let windowed = MethodSettings { method: "windowed".into(), ..Default::default() };
+//! let settings = MethodSettings { window_sigma: Some(3.0), ..windowed.clone() };
 //! let method = settings.method()?;
 //! assert!(method.info().smooths_frames && method.info().takes_pairs());
 //! // An option of another method is an error that names the option and its methods.
-//! let wrong = MethodSettings { method: "windowed".into(), levels: Some(4), ..Default::default() };
-//! assert_eq!(wrong.method().unwrap_err().to_string(), "levels: expected method coarse_to_fine, got windowed");
+//! let wrong = MethodSettings { levels: Some(4), ..windowed };
+//! let message = wrong.method().unwrap_err().to_string();
+//! assert_eq!(message, "levels: expected method coarse_to_fine, got windowed");
 //! // The table itself: names, options, time schemes (the first is the default), models.
 //! assert_eq!(METHODS[0].name, "coarse_to_fine");
 //! assert!(MethodInfo::named("instantaneous")?.models.len() > 1);

@@ -1,19 +1,20 @@
 //! Flow and its Jacobian from two or three frames.
 //!
-//! [`Estimator`] is the one door: a [`Method`] with its options, [`EstimatorOptions`] options, frames in, a
-//! [`FlowField`](crate::types::FlowField) out.
+//! Frames go through [`Estimator`]: a [`Method`] with its options and [`EstimatorOptions`]; the result is a
+//! [`FlowField`](crate::types::FlowField). [`METHODS`] is the table of the methods, their options and what
+//! each can do.
 //!
-//! * [`instantaneous`]: per pixel, WO2010/098160 (34): flow and Jacobian from nothing but a 3x3x3 block of
-//!   brightness. Its domain is images that are locally quadratic and motion that makes them observable; on
-//!   busy 8-bit texture use the windowed form.
-//! * [`coarse_to_fine`]: affine flow with a pyramid, warping and robust coupling: the one for everyday
-//!   frames.
-//! * [`windowed`]: the same equations over a window in which the motion is affine.
+//! * [`coarse_to_fine`]: affine flow with a pyramid, warping and robust regularisation; the default for
+//!   everyday frames.
+//! * [`windowed`]: the equations of [`model`] over a window in which the motion is affine.
+//! * [`instantaneous`]: per pixel, WO2010/098160 (34), from a 3x3x3 block of brightness; for locally
+//!   quadratic images.
 //! * [`baseline`]: Lucas-Kanade and Horn-Schunck, for comparison.
 //! * [`model`]: the motion models; one file and one line each.
-//! * [`points`]: at single points of two frames, by gradient steps on a pyramid.
+//! * [`points`]: flow at single points of two frames, by gradient steps on a pyramid.
 //! * [`observability`]: which condition of theorem 1 holds at each pixel.
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
+//! * [`advect`]: points moved by a field.
 
 mod advect;
 pub mod baseline;

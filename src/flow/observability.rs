@@ -42,7 +42,7 @@ impl Condition {
     }
 }
 
-/// What theorem 1 says of one pixel.
+/// Theorem 1 at one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observability {
     /// The condition that holds.
@@ -101,7 +101,7 @@ pub struct ObservabilityMap {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// What holds at each pixel, row-major; `None` at the border and where a sample is not finite.
+    /// Observability of each pixel, row-major; `None` at the border and where a sample is not finite.
     pub pixels: Vec<Option<Observability>>,
 }
 

@@ -5,7 +5,7 @@ use crate::parallel::Threads;
 use crate::simd::Level;
 use crate::types::{Mask, SamplingGrid};
 
-/// What to report where the equations do not determine every unknown.
+/// Report where the equations do not determine every unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RankPolicy {
     /// NaN, and status `Unobservable`.
@@ -40,7 +40,7 @@ impl RankPolicy {
 /// Options that all methods share.
 #[derive(Debug, Clone)]
 pub struct EstimatorOptions {
-    /// Where estimates are wanted. Default: every pixel. Nothing else is computed.
+    /// Pixels to estimate at. Default: all. Nothing else is computed.
     pub sites: SamplingGrid,
     /// Pixels that may be used (`true`), of the frames' size. Default: all.
     pub mask: Option<Mask>,
@@ -50,7 +50,7 @@ pub struct EstimatorOptions {
     pub frame_period: Option<f64>,
     /// Whether to compute the covariance of the parameters. Default: no.
     pub covariance: bool,
-    /// Whether to tell the systematic part of the covariance apart, where the method can
+    /// Whether to report the systematic part of the covariance, if the method has one
     /// ([`FlowField::systematic`](crate::types::FlowField)). Default: no.
     pub systematic: bool,
     /// Whether to report residual, rank and condition number of each site. Default: no.
@@ -82,8 +82,8 @@ impl Default for EstimatorOptions {
 }
 
 impl EstimatorOptions {
-    /// Refuses lengths, times and noise levels that are not positive and finite, naming the field, and a
-    /// useless environment where that decides.
+    /// Checks that lengths, times and noise levels are positive and finite, and the environment if it
+    /// decides.
     pub(super) fn check(&self) -> Result<()> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let (dx, dy) = self.pixel_pitch;

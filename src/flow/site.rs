@@ -1,4 +1,4 @@
-//! The sites of a field as independent bands, and the mask's share in their status.
+//! Sites of a field as independent bands, and a fast test for masked pixels.
 
 use crate::jet::Reach;
 use crate::parallel::BAND_ROWS;
@@ -30,8 +30,8 @@ pub(super) struct FieldBand<'a, T> {
     pub window: Option<&'a mut [T]>,
 }
 
-/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), never depending on
-/// the number of threads.
+/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), independent of the
+/// number of threads.
 pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
     let n = field.width * field.height;
     if n == 0 {
@@ -66,7 +66,7 @@ pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
         .collect()
 }
 
-/// Answers in constant time whether a rectangle of pixels holds a masked one.
+/// Tests in constant time whether a rectangle of pixels contains a masked one.
 pub(super) struct MaskCounts {
     width: usize,
     /// Masked pixels above and to the left of each corner; `width + 1` values a row.

@@ -1,4 +1,4 @@
-//! From brightness to the filter's measurement: the fitted jet of each site, and what the fit leaves.
+//! Measurement from brightness: the fitted jet of each site and the residual of the fit.
 
 use super::kernel::BLOCK;
 use super::kernel::update::MEASURED;
@@ -15,7 +15,7 @@ pub(super) struct Fit<T> {
     weights: Vec<[T; 6]>,
     /// Row of the design matrix for each pixel.
     design: Vec<[T; 6]>,
-    /// Expected sum of squared residuals for unit noise; zero when nothing is left over.
+    /// Expected sum of squared residuals for unit noise; zero if the fit has no degrees of freedom left.
     freedom: f64,
 }
 
@@ -44,11 +44,11 @@ pub(super) struct Measure<'a, T> {
     /// Index of each site's pixel in the frame, `BLOCK` for each block; neighbourhoods lie inside the frame.
     pub pixels: &'a [usize],
     pub fit: &'a Fit<T>,
-    /// What a sample is multiplied by to be in grey levels.
+    /// Factor from samples to grey levels.
     pub scale: T,
     /// Receives `MEASURED` rows of `BLOCK` for each block.
     pub measured: &'a mut [T],
-    /// Receives the root mean square residual of each site, where it is wanted.
+    /// Receives the root mean square residual of each site, if requested.
     pub residual: Option<&'a mut [T]>,
 }
 
@@ -61,11 +61,11 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
         let inverse = if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN };
         for (b, pixels) in self.pixels.chunks_exact(BLOCK).enumerate() {
             let measured = &mut self.measured[b * MEASURED * BLOCK..(b + 1) * MEASURED * BLOCK];
-            // The last block of a narrow frame repeats its last pixel: both ends alone would not tell.
+            // The last block of a narrow frame repeats its last pixel: both ends alone are not enough.
             let neighbours = pixels.windows(2).all(|pair| pair[1] == pair[0] + 1);
             for at in (0..BLOCK).step_by(V::LANES) {
                 let pixels = &pixels[at..at + V::LANES];
-                // Derivatives do not see a constant: differences from one sample keep every digit of theirs.
+                // Derivatives do not depend on a constant: differences from one sample keep all their digits.
                 let base = fetch::<V>(samples, pixels, self.fit.offsets[0], neighbours);
                 let mut jet = [V::zero(); 6];
                 for (&offset, weights) in self.fit.offsets.iter().zip(&self.fit.weights) {

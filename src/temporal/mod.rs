@@ -1,16 +1,16 @@
-//! Flow filtered in time: the dense filter of WO2010/098160, (44)-(55), one small Kalman filter a pixel.
+//! Flow filtered in time.
 //!
-//! [`recursive`] fuses the estimates of [`flow`](crate::flow) over time.
-//!
-//! [`dynamics`] is the dynamical system itself, for one pixel; [`FlowFilter`] runs it for every site of a
-//! frame, many pixels at once.
+//! * [`FlowFilter`], the dense filter of WO2010/098160, (44)-(55): one small Kalman filter a pixel. A frame
+//!   passes `measurement` (jets of the frame), `kernel` (prediction and update of many pixels at once) and
+//!   `flow_filter` (the field); `store` holds the states, `persist` saves them.
+//! * [`recursive`] fuses the estimates of [`flow`](crate::flow) over time.
+//! * [`dynamics`] is the dynamical system of one pixel, the reference of the kernels.
 
 pub mod dynamics;
 mod flow_filter;
 mod kernel;
 mod measurement;
 mod options;
-mod pass;
 mod persist;
 pub mod recursive;
 mod store;

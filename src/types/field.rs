@@ -21,9 +21,8 @@ pub struct FieldLayout {
     pub pixel_pitch: (f64, f64),
     /// Index of the frame the estimate belongs to, counted from the first frame of the sequence.
     pub frame_index: usize,
-    /// How far errors of neighbouring estimates go together, px: about `exp(-d^2 / (4 l^2))` at distance `d`,
-    /// as with estimates from Gaussian windows of standard deviation `l` that overlap. 0: independent, or not
-    /// known.
+    /// Length `l`, px, of the correlation of neighbouring errors: about `exp(-d^2 / (4 l^2))` at distance
+    /// `d`, as for overlapping Gaussian windows of standard deviation `l`. 0: independent or unknown.
     pub correlation_length: f64,
 }
 
@@ -43,9 +42,9 @@ pub struct FlowField<T> {
     pub motion: Vec<T>,
     /// `P (P + 1) / 2` planes: the upper triangle of the covariance, row by row (0,0), (0,1), ... (1,1) ...
     pub covariance: Option<Vec<T>>,
-    /// The part of `covariance` that repeats itself from one time to the next (biases, misfit) and does not
-    /// average out; planes in the same order. Only where the method tells it apart and
-    /// `EstimatorOptions::systematic` asks for it.
+    /// The part of `covariance` that repeats from one time to the next (biases, misfit) and does not average
+    /// out; planes in the same order. `None` unless the method separates it and
+    /// `EstimatorOptions::systematic` is set.
     pub systematic: Option<Vec<T>>,
     /// Status of each site.
     pub status: Vec<Status>,
@@ -55,8 +54,7 @@ pub struct FlowField<T> {
     pub rank: Option<Vec<u8>>,
     /// Condition number of the (column-scaled) equations: largest over smallest singular value.
     pub condition: Option<Vec<T>>,
-    /// Standard deviation, px, of the Gaussian window that the slopes rest on; only where the method chooses
-    /// one at each site.
+    /// Standard deviation, px, of the Gaussian window of the slopes, if the method chooses one at each site.
     pub window: Option<Vec<T>>,
 }
 
@@ -69,8 +67,7 @@ impl<T: Real> FlowField<T> {
         Self::of(layout, covariance, T::nan())
     }
 
-    /// The same of zeros, for an estimator that writes every site: memory that is not written yet need not be
-    /// there yet.
+    /// The same of zeros, for an estimator that writes every site: memory is allocated but not touched.
     pub(crate) fn unwritten(layout: FieldLayout, covariance: bool) -> Result<Self> {
         Self::of(layout, covariance, T::from_f64(0.0))
     }

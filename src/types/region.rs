@@ -1,4 +1,4 @@
-//! Where estimates are wanted.
+//! Pixels at which estimates are made.
 
 use crate::error::{Error, Result};
 

@@ -15,16 +15,16 @@ pub enum Status {
     Masked = 3,
     /// The equations do not determine every unknown (theorem 1 of the patent fails here).
     Unobservable = 4,
-    /// Unobservable, and the minimum-norm solution was asked for: values are finite but not unique.
+    /// Unobservable, and `rank_deficient="min_norm"`: values are finite but not unique.
     MinNorm = 5,
     /// A filter lost its positive-definite covariance and was restarted here.
     Repaired = 6,
-    /// No estimate at this time: what the estimates before say, with a covariance that grows until the next
-    /// one.
+    /// No estimate at this time: the prediction from earlier ones, with a covariance that grows until the
+    /// next one.
     Predicted = 7,
-    /// A full estimate that the frames contradict: along it brightness changes by far more than usual. What
-    /// is seen is hidden in another frame (occlusion), has changed, or moves otherwise; the covariance does
-    /// not know.
+    /// A full estimate that the frames contradict: brightness changes along it by far more than usual. The
+    /// pixel is occluded in another frame, has changed, or moves differently; the covariance does not include
+    /// this.
     Inconsistent = 8,
 }
 
@@ -62,7 +62,7 @@ impl Status {
         Self::ALL.get(code as usize).copied()
     }
 
-    /// A unique, complete estimate, for better or worse.
+    /// Whether the estimate is unique and complete.
     pub fn is_valid(self) -> bool {
         matches!(self, Self::Ok | Self::Repaired | Self::Predicted | Self::Inconsistent)
     }

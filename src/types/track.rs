@@ -1,4 +1,4 @@
-//! What a tracker says of its target, frame by frame.
+//! State of a tracked target, frame by frame.
 
 /// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that
 /// its centre is `(x + width / 2, y + height / 2)`.
@@ -35,7 +35,7 @@ impl TargetBox {
     }
 }
 
-/// How well the target is in hand.
+/// Status of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -43,13 +43,13 @@ pub enum TrackStatus {
     /// Seen and measured.
     #[default]
     Tracking = 0,
-    /// Seen in part: something covers or touches it. Nothing is learnt.
+    /// Partly visible: occluded or touched by another object. The template is not updated.
     Occluded = 1,
-    /// Not seen: the filter goes on by itself.
+    /// Not visible: predicted by the filter.
     Coasting = 2,
     /// Beyond the border of the picture.
     Out = 3,
-    /// Not seen for so long that it counts as lost; it is still looked for.
+    /// Not visible for so long that it counts as lost; the search continues.
     Lost = 4,
 }
 
@@ -74,17 +74,17 @@ impl TrackStatus {
     }
 }
 
-/// The target at one frame. Lengths in px, times in frames, x right, y down; what a method does not tell is
-/// NaN or `None`.
+/// The target at one frame. Lengths in px, times in frames, x right, y down; values that a method does not
+/// provide are NaN or `None`.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrackState {
     /// Which frame, counted from the one the tracker began with (0).
     pub frame: usize,
-    /// How well the target is in hand.
+    /// Status of the target.
     pub status: TrackStatus,
-    /// Why the status is what it is, in a few words; empty where there is nothing to be said.
-    /// Not part of a serialised state: these are words of the program.
+    /// Reason for the status, in a few words; may be empty. Not part of a serialised state: these are words
+    /// of the program.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub reason: &'static str,
     /// Whether this is the first measurement after the target was lost or out of the picture.
@@ -97,11 +97,11 @@ pub struct TrackState {
     pub acceleration: [f64; 2],
     /// Velocity relative to the scene, px/frame.
     pub scene_velocity: [f64; 2],
-    /// How far the picture of the still scene moved since the frame before, px; zero for a camera at rest.
+    /// Displacement of the static background since the frame before, px; zero for a static camera.
     pub camera_motion: [f64; 2],
     /// Covariance of (position, velocity, acceleration) along x and along y.
     pub covariance: [[[f64; 3]; 3]; 2],
-    /// Measured step since the frame before, unfiltered, px; NaN where nothing was measured.
+    /// Measured displacement since the frame before, unfiltered, px; NaN without a measurement.
     pub displacement: [f64; 2],
     /// The target's box, upright.
     pub bounds: TargetBox,
@@ -109,11 +109,11 @@ pub struct TrackState {
     pub scale: f64,
     /// Angle turned since the beginning, rad, from x towards y (clockwise on the screen), not wrapped.
     pub rotation: f64,
-    /// Whether the target's picture tells its rotation.
+    /// Whether the target's picture determines its rotation.
     pub rotation_observable: bool,
-    /// Share of the target that is seen, 0 to 1.
+    /// Visible share of the target, 0 to 1.
     pub visibility: f64,
-    /// Normalised innovation squared of the position, both axes together; NaN where nothing was measured.
+    /// Normalised innovation squared of the position, both axes together; NaN without a measurement.
     pub innovation: f64,
     /// Brightness of the target over that at the beginning.
     pub gain: f64,

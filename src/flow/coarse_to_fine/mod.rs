@@ -17,8 +17,8 @@
 //! stages leave for covariance and output. [`planes`], [`plane_pool`] and [`workspace`] hold the memory.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
-//! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves by
-//! more than its grain on every level may not be found. The covariance includes neither motions that were not
+//! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves
+//! by more than its grain on every level may not be found. The covariance includes neither motions that were not
 //! found nor errors at motion boundaries. `docs/flow.md` has the equations, `docs/design/coarse_to_fine.md`
 //! the origin of the constants.
 
@@ -44,9 +44,9 @@ mod workspace;
 pub(super) use estimator::CoarseToFine;
 pub use options::{CoarseToFineOptions, MIN_LEVEL_SIDE, Preset};
 
-/// Distance, px, over which errors of neighbouring estimates from `frames` frames are correlated: that of wide
-/// windows, so that means over regions are not given too small a standard deviation. Three frames have more,
-/// since their windows are chosen a second time in a motion that is already smooth.
+/// Distance, px, over which errors of neighbouring estimates from `frames` frames are correlated: that of
+/// wide windows, so that means over regions are not given too small a standard deviation. Three frames have a
+/// longer one, since their windows are chosen a second time in a motion that is already smooth.
 pub(super) fn correlation_length(frames: usize) -> f64 {
     if frames == 3 { 17.0 } else { 8.0 }
 }

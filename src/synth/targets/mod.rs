@@ -9,7 +9,8 @@
 //! ```
 //! use jacoflow::synth::targets::{TargetScene, TargetSceneOptions};
 //! # fn main() -> jacoflow::Result<()> {
-//! let scene = TargetScene::new("people_static", TargetSceneOptions { scale: 0.25, ..TargetSceneOptions::default() })?;
+//! let options = TargetSceneOptions { scale: 0.25, ..TargetSceneOptions::default() };
+//! let scene = TargetScene::new("people_static", options)?;
 //! assert_eq!((scene.size(), scene.frame_count(), scene.target_count()), ((180, 120), 110, 2));
 //! assert_eq!(scene.frame(3).size(), scene.size());
 //! # Ok(())

@@ -28,7 +28,10 @@ const TASK_BLOCKS: usize = 64;
 /// let estimator = Estimator::new(Method::parse("windowed")?, common)?;
 /// let mut fusion = RecursiveFusion::<f64>::new(&estimator, RecursiveOptions::default())?;
 /// let frames: Vec<Frame<f64>> = (0..6)
-///     .map(|t| Frame::from_fn(40, 40, |x, y| ((x as f64 - 0.3 * t as f64) * 0.7).sin() * 50.0 + ((y as f64) * 0.6).cos() * 40.0))
+///     .map(|t| {
+///         let wave = |x: f64, y: f64| (0.7 * x).sin() * 50.0 + (0.6 * y).cos() * 40.0;
+///         Frame::from_fn(40, 40, |x, y| wave(x as f64 - 0.3 * t as f64, y as f64))
+///     })
 ///     .collect();
 /// for (first, triple) in frames.windows(3).enumerate() {
 ///     let mut field = estimator.estimate(&[&triple[0], &triple[1], &triple[2]], first)?;
@@ -48,7 +51,7 @@ pub struct RecursiveFusion<T> {
     blocks: Vec<T>,
 }
 
-/// What a block of sites reads and writes in the field.
+/// Values that a block of sites reads and writes in the field.
 struct Task<'a, T> {
     state: &'a mut [T],
     motion: Vec<&'a mut [T]>,
@@ -88,16 +91,14 @@ impl<T: SimdReal> RecursiveFusion<T> {
         (self.sites, self.blocks) = (0, Vec::new());
     }
 
-    /// Number of sites, 0 before the first field, and the states of all: for those who keep them, with
-    /// [`restore`](Self::restore).
+    /// Number of sites, 0 before the first field, and the states of all, for [`restore`](Self::restore).
     pub fn state(&self) -> (usize, &[T]) {
         (self.sites, &self.blocks)
     }
 
-    /// Goes on from a state that [`state`](Self::state) gave.
+    /// Continues from a state that [`state`](Self::state) returned.
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming `state` for numbers that are not those of so many sites.
+    /// # Errors [`Error::Argument`] naming `state` for a wrong number of values.
     pub fn restore(&mut self, sites: usize, blocks: Vec<T>) -> Result<()> {
         let needed = sites.div_ceil(BLOCK).checked_mul(ROWS * BLOCK);
         if needed != Some(blocks.len()) {
@@ -108,12 +109,11 @@ impl<T: SimdReal> RecursiveFusion<T> {
         Ok(())
     }
 
-    /// Takes in the next field and puts the fused motion and covariance in its place. Sites without an
+    /// Fuses the next field and replaces its motion and covariance by the fused ones. Sites without an
     /// estimate get the prediction, once there is one.
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming `field` when it is of another size than the first, not affine or without
-    /// covariance.
+    /// # Errors [`Error::Argument`] naming `field` when it is of another size than the first, not affine or
+    /// without covariance.
     pub fn fuse(&mut self, field: &mut FlowField<T>) -> Result<()> {
         let n = field.len();
         let known = field.covariance.as_ref().map(Vec::len);
@@ -190,7 +190,7 @@ impl<T: SimdReal> Task<'_, T> {
         }
     }
 
-    /// Copies a block of sites; where there is no usable estimate, one that does no harm.
+    /// Copies a block of sites; a harmless estimate where there is no usable one.
     fn read(&self, sites: Range<usize>, input: &mut [T]) {
         let mut usable = [false; BLOCK];
         usable.iter_mut().zip(&self.status[sites.clone()]).for_each(|(usable, status)| *usable = status.is_valid());
@@ -223,7 +223,7 @@ impl<T: SimdReal> Task<'_, T> {
         }
     }
 
-    /// Copies a block back; sites that have never been estimated stay what they are.
+    /// Copies a block back; sites that have never been estimated stay unchanged.
     fn write(&mut self, sites: Range<usize>, (input, output): (&[T], &[T]), state: &[T]) {
         let known = |row: &[T], c: usize| row[c] != T::default();
         let (started, present) = (&state[RATIO * BLOCK..][..BLOCK], &input[PRESENT * BLOCK..][..BLOCK]);

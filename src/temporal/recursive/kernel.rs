@@ -6,21 +6,21 @@ use crate::simd::{Kernel, Lanes, SimdReal};
 /// Sites of a block.
 pub(super) const BLOCK: usize = 16;
 
-/// Normalised innovations squared beyond this start a pixel anew: chi-square with six degrees of freedom, one
-/// in ten thousand.
+/// Normalised innovation squared beyond which a pixel starts anew: chi-square with six degrees of freedom,
+/// one in ten thousand.
 pub const RESTART: f64 = 27.86;
-/// Normalised mean innovations squared beyond this shorten the memory; six are expected, one in sixteen is
-/// larger.
+/// Normalised mean innovation squared beyond which the memory is shortened; six are expected, one in sixteen
+/// is larger.
 pub const FADE: f64 = 12.0;
-/// Share of the covariance that is taken for systematic where the method does not tell: measured on the
-/// coarse-to-fine estimate of textures with 4 grey levels of noise.
+/// Systematic share of the covariance for methods that do not report it: measured on the coarse-to-fine
+/// estimate of textures with 4 grey levels of noise.
 pub const SHARE: f64 = 0.3;
-/// Normalised mean innovations squared below this are chance, and no lag.
+/// Normalised mean innovation squared below which there is no lag, only chance.
 const LAG: f64 = 8.0;
-/// The mean innovation keeps this share of itself each frame.
+/// Share of itself that the mean innovation keeps each frame.
 const MEAN: f64 = 0.875;
-/// The memory is never shortened by more than this at once without starting anew.
-const LEAST_FADE: f64 = 1e-3;
+/// Minimum factor of one shortening of the memory; below it the pixel starts anew.
+const MIN_FADE: f64 = 1e-3;
 
 /// Rows of a state: motion, `P`, `B`, `V`, `V / g` (0 before the start), mean innovation.
 pub(super) const P: usize = 6;
@@ -42,7 +42,7 @@ pub(super) const OUTPUT: usize = 6 + ENTRIES;
 pub(super) struct Step<'a, T> {
     /// `ROWS` rows of `BLOCK` numbers.
     pub state: &'a mut [T],
-    /// `INPUT` rows; finite everywhere, and definite, where there is no estimate too.
+    /// `INPUT` rows; finite everywhere, and definite also where there is no estimate.
     pub input: &'a [T],
     /// `OUTPUT` rows.
     pub output: &'a mut [T],
@@ -94,7 +94,7 @@ impl<T: SimdReal> Step<'_, T> {
         let single = dot(&innovation, &spread.solve(&innovation));
         let lasting = dot(&mean, &spread.solve(&mean)) * V::constant((1.0 + MEAN) / (1.0 - MEAN));
         let fade = (V::constant(FADE) / lasting).min(one);
-        let fade = (fade * fade).max(V::constant(LEAST_FADE));
+        let fade = (fade * fade).max(V::constant(MIN_FADE));
         // Update, in the form that keeps covariances definite (Joseph's).
         let mut prior_left = prior;
         for k in 0..ENTRIES {
@@ -122,7 +122,7 @@ impl<T: SimdReal> Step<'_, T> {
         let new_left = (rest * rest).mul_add(left, g * g);
         let new_ratio = new_left / g;
         let beyond_chance = (one - V::constant(LAG) / lasting).max(zero).sqrt() * rest;
-        // Which of the three it is: no estimate, a start, an update.
+        // Whether there is no estimate, a start or an update.
         let present = half.lt(rows::<V, 1>(input, PRESENT, c)[0]);
         let goes_on = V::select(single.lt(V::constant(RESTART)), V::select(zero.lt(ratio), one, zero), zero);
         let goes_on = half.lt(goes_on);
@@ -171,7 +171,7 @@ fn rows<V: Lanes, const N: usize>(block: &[V::Scalar], first: usize, c: usize) -
     rows
 }
 
-/// Which of three a site goes through: no estimate, a start, an update.
+/// Whether a site has no estimate, a start or an update.
 struct Which<V: Lanes> {
     present: V::Mask,
     goes_on: V::Mask,

@@ -9,7 +9,7 @@
 //! The first estimate starts it, so there is nothing to converge. (A. Gelb, ed., "Applied Optimal
 //! Estimation", 1974, section 4.3, for information; section 8.3 for forgetting.)
 //!
-//! # How far the result can be trusted
+//! # Uncertainty
 //! With the gain `g = tr(K) / 6` the share of one estimate's noise that is left is `V_k = (1 - g)^2 V_{k-1} +
 //! g^2`, that is 1/k without forgetting and (1 - f) / (1 + f) at last. What estimates have in common does not
 //! average out: with `B` the systematic part of their covariance (misfit, bias), averaged with the same
@@ -18,12 +18,12 @@
 //! `Cov(x) = (V / g) P + (1 - V) B + d d^T`,
 //!
 //! which for equal `C = N + B` is `V N + B`: noise falls, and `B` is the floor. Windowed and coarse-to-fine
-//! estimates tell `B`; of others [`SHARE`] of the covariance is taken for it.
+//! estimates report `B`; for others it is [`SHARE`] of the covariance.
 //!
 //! Noise of consecutive estimates counts as independent. It is not: a pair shares one frame with the next, a
 //! triple two. But shared frames enter with opposite signs (a difference's older frame is the newer one of
-//! the difference before), so that errors are correlated negatively and their mean is better than told, never
-//! worse: `tests/recursive.rs` prints the correlations, down to -1/2.
+//! the difference before), so that errors are correlated negatively, and the mean is better
+//! than its covariance says, never worse: `tests/recursive.rs` prints the correlations, down to -1/2.
 //!
 //! # Motion that changes
 //! *Innovation test.* `n = m_k - x_{k-1}` normalised by its covariance, `n^T S^-1 n`, has six degrees of

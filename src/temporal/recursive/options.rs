@@ -1,13 +1,13 @@
-//! What the recursive fusion may be told.
+//! Options of the recursive fusion.
 
 use crate::error::{Error, Result};
 
 /// Options of [`RecursiveFusion`](super::RecursiveFusion).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecursiveOptions {
-    /// By what the information of the past is multiplied each frame, above 0 and at most 1 (no unit). The
-    /// memory is `1 / (1 - forgetting)` frames; 1 never forgets, and is right only for motion that is steady
-    /// for ever. Default 0.95: 20 frames.
+    /// Factor of the past information each frame, above 0 and at most 1 (no unit). The memory is `1 / (1 -
+    /// forgetting)` frames; 1 never forgets, which suits only motion that is steady for ever. Default 0.95:
+    /// 20 frames.
     pub forgetting: f64,
 }
 
@@ -18,12 +18,11 @@ impl Default for RecursiveOptions {
 }
 
 impl RecursiveOptions {
-    /// The options that a user's words mean: `temporal` is `none` (the default) or `recursive`, `forgetting`
-    /// its factor.
+    /// The options from a user's words: `temporal` is `none` (the default) or `recursive`, `forgetting` its
+    /// factor.
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming `temporal` for another word, and `forgetting` without recursion or out of
-    /// range.
+    /// # Errors [`Error::Argument`] naming `temporal` for another word, and `forgetting` without recursion or
+    /// out of range.
     pub fn parse(temporal: Option<&str>, forgetting: Option<f64>) -> Result<Option<Self>> {
         match temporal.unwrap_or("none") {
             "none" => match forgetting {
@@ -39,10 +38,9 @@ impl RecursiveOptions {
         }
     }
 
-    /// Refuses what is no forgetting factor.
+    /// Checks the range.
     ///
-    /// # Errors
-    /// [`Error::Argument`] naming `forgetting`.
+    /// # Errors [`Error::Argument`] naming `forgetting`.
     pub fn check(&self) -> Result<()> {
         if self.forgetting > 0.0 && self.forgetting <= 1.0 {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Fusion of made estimates, whose noise and systematic error are known.
+//! Fusion of synthetic estimates with known noise and systematic error.
 
 use super::fusion::RecursiveFusion;
 use super::options::RecursiveOptions;
@@ -20,7 +20,7 @@ fn fusion<T: SimdReal>(forgetting: f64, threads: usize, simd: Option<Level>) -> 
     RecursiveFusion::new(&estimator, RecursiveOptions { forgetting }).unwrap()
 }
 
-/// What estimates are made of: covariance `N + B`, `B` being that of an error which every time has.
+/// Source of estimates: covariance `N + B`, `B` that of an error common to all times.
 struct Estimates {
     truth: Vector6<f64>,
     noise: Matrix6<f64>,
@@ -29,7 +29,7 @@ struct Estimates {
 
 impl Estimates {
     fn new(systematic: f64) -> Self {
-        // Deviations of the size that windowed estimates have, and some correlation.
+        // Standard deviations of the size of windowed estimates, and some correlation.
         let unit = Matrix6::from_diagonal(&[2e-2, 3e-2, 3e-3, 2e-3, 4e-3, 3e-3].into());
         let mix = Matrix6::from_fn(|i, j| if i == j { 1.0 } else { 0.4 * ((i * 7 + j * 7) as f64).sin() });
         let noise = unit * mix * mix.transpose() * unit;
@@ -138,7 +138,7 @@ fn forgetting_stops_the_fall_where_its_memory_ends() {
             first = last.0;
         }
     }
-    // (1 - f) / (1 + f) of the variance; a little more, as now and then chance looks like change.
+    // (1 - f) / (1 + f) of the variance; a little more, as chance sometimes looks like change.
     let ratio = (last.0 / first).powi(2) / (0.1 / 1.9);
     assert!((0.85..1.35).contains(&ratio), "{ratio}");
     assert!((5.0..6.6).contains(&last.1), "{}", last.1);
@@ -181,7 +181,7 @@ fn a_sudden_change_starts_anew_and_a_slow_one_shortens_the_memory() {
             let mut field = made.field(k, &more);
             slow.fuse(&mut field).unwrap();
             let (error, normalised) = made.errors(&field, &more);
-            // Never worse than one estimate, and told to within a factor of two in deviation.
+            // Never worse than one estimate, and its standard deviation right to within a factor of two.
             assert!(error < 1.05 * deviation && normalised < 4.0 * 6.0, "{rate} {k}: {error} {normalised}");
         }
     }
@@ -243,7 +243,7 @@ fn the_kernel_is_the_information_filter() {
             let got = Vector6::from_fn(|i, _| field.motion[i * SITES + site]);
             agree += usize::from((want - got).norm() < 1e-10);
         }
-        // The rest are the few that chance made look like change.
+        // The rest are the few where chance looked like change.
         assert!(agree * 100 > 75 * SITES, "{k}: {agree}");
     }
 }

@@ -1,16 +1,18 @@
 //! The dense flow filter.
 
+mod pass;
+
 use super::kernel::update::Decorrelation;
 use super::kernel::{BLOCK, Constants};
 use super::measurement::Fit;
 use super::options::FlowFilterOptions;
-use super::pass::{self, Mark, PAIRS, Rows};
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
+use pass::{Mark, PAIRS, Rows};
 use rayon::prelude::*;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
@@ -28,7 +30,8 @@ use rayon::prelude::*;
 /// for t in 0..200 {
 ///     // Waves along both axes, moving by (0.5, -0.25) px/frame.
 ///     let (dx, dy) = (0.5 * f64::from(t), -0.25 * f64::from(t));
-///     let frame = Frame::from_fn(16, 16, |x, y| 128.0 + 30.0 * ((x as f64 - dx) * 0.4).sin() + 30.0 * ((y as f64 - dy) * 0.4).sin());
+///     let wave = |x: f64| 30.0 * (0.4 * x).sin();
+///     let frame = Frame::from_fn(16, 16, |x, y| 128.0 + wave(x as f64 - dx) + wave(y as f64 - dy));
 ///     let field = filter.push(&frame)?;
 ///     assert_eq!(field.layout.frame_index, t as usize);
 /// }

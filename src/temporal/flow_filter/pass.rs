@@ -1,14 +1,14 @@
-//! One frame through the kernels: which blocks go together, and what is kept of them.
+//! One frame through the kernels, block by block.
 
-use super::flow_filter::FlowFilter;
-use super::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
-use super::kernel::transition::{Exact, Rk4, Step};
-use super::kernel::update::{Decorrelation, MEASURED, Update};
-use super::kernel::{BLOCK, Constants, N, PLANES, packed};
-use super::measurement::{Fit, Measure};
-use super::options::{FilterForm, Transition};
+use super::FlowFilter;
 use crate::error::{Error, Result};
 use crate::simd::{Level, SimdReal, dispatch};
+use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
+use crate::temporal::kernel::transition::{Exact, Rk4, Step};
+use crate::temporal::kernel::update::{Decorrelation, MEASURED, Update};
+use crate::temporal::kernel::{BLOCK, Constants, N, PLANES, packed};
+use crate::temporal::measurement::{Fit, Measure};
+use crate::temporal::options::{FilterForm, Transition};
 use crate::types::Frame;
 use rayon::prelude::*;
 use std::any::Any;
@@ -16,13 +16,13 @@ use std::marker::PhantomData;
 
 /// Blocks of one task: fixed, so that results do not depend on the number of threads.
 const TASK_BLOCKS: usize = 32;
-/// Blocks that go through the three passes together: few, so that their states stay in the first-level cache.
+/// Blocks that pass the three kernels together: few, so that their states stay in the first-level cache.
 const PASS_BLOCKS: usize = 2;
 
-/// Takes every block through measurement, prediction and update.
+/// Passes every block through measurement, prediction and update.
 ///
 /// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence
-/// functions that are not generic, and the detour through [`Any`].
+/// functions that are not generic, with [`Any`] between them.
 #[allow(clippy::ptr_arg)] // A slice is no `Any`.
 pub(super) fn run<T: SimdReal>(
     filter: &mut FlowFilter<T>,
@@ -55,7 +55,7 @@ fn double_precision(filter: &mut FlowFilter<f64>, frame: &Frame<f64>, marks: &mu
     every_block(filter, frame, marks, results);
 }
 
-/// Every block through its three passes; results are copied out while they are near.
+/// Every block through its three passes; results are copied out while in the cache.
 fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
     let rows = filter.rows();
     let FlowFilter { options, store, constants, decorrelation, fit, .. } = filter;
@@ -86,8 +86,7 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
     });
 }
 
-/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual where they are
-/// wanted.
+/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual if requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows {
     pub covariance: usize,
@@ -111,7 +110,7 @@ pub(super) const PAIRS: [(usize, usize); 21] = {
     pairs
 };
 
-/// What the blocks of a frame have in common.
+/// Inputs that the blocks of a frame share.
 struct Pass<'a, T> {
     frame: &'a Frame<T>,
     fit: &'a Fit<T>,
@@ -125,7 +124,7 @@ struct Pass<'a, T> {
 }
 
 impl<T: SimdReal> Pass<'_, T> {
-    /// Measurement, prediction, update of a few blocks.
+    /// Measurement, prediction and update of a few blocks.
     fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
         let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
         let zero = T::from_f64(0.0);
@@ -160,7 +159,7 @@ impl<T: SimdReal> Pass<'_, T> {
     }
 }
 
-/// What happened to the pixels of a block.
+/// Events at the pixels of a block.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Mark {
     pub repaired: [u8; BLOCK],
