@@ -53,8 +53,9 @@ install: wheel
 	$(BIN)/python -m pip install -q --force-reinstall --no-deps $(WHEELS)/jacoflow-*.whl
 	$(BIN)/python -m pip install -q "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 
+# One process for each core; files stay whole, so that what a file's tests share is made once.
 pytest: install
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
