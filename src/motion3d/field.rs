@@ -7,7 +7,7 @@ use crate::types::{FlowField, Rect, SamplingGrid, Status};
 use nalgebra::Matrix2;
 
 /// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of them
-/// goes together still (`benchmarks/motion3d_drive.py`), which the motion's covariance sums (`together`): a
+/// goes together still (`benchmarks/tables/motion3d_drive.py`), which the motion's covariance sums (`together`): a
 /// residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 

@@ -1,4 +1,4 @@
-"""Writes flow_filter.json: the reference experiment run by filterpy (benchmarks/reference_filter.py), means at some frames.
+"""Writes flow_filter.json: the reference experiment run by filterpy (benchmarks/rivals/flow_filter.py), means at some frames.
 
     python tests/golden/flow_filter.py
 """

@@ -80,7 +80,7 @@ MOTIONS = {
 @pytest.mark.parametrize("carrier", ["noise", "speckle", "particles"])
 def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames):
     """95 % intervals over three motions and two noise levels together: .92 to .97 is asked. One texture has few independent errors, since windows reach over
-    20 px, and those of pairs and of affine motion are told on the wide side (benchmarks/coverage.py), most of all noise textures in three frames (.99): .90 to .995 is allowed here.
+    20 px, and those of pairs and of affine motion are told on the wide side (benchmarks/tables/coverage.py), most of all noise textures in three frames (.99): .90 to .995 is allowed here.
     """
     times = (0.0, 1.0) if frames == 2 else (-1.0, 0.0, 1.0)
     held = {name: [] for name in ("u", "v", "divergence", "curl")}

@@ -1,4 +1,4 @@
-"""The covariances of motions of flow fields of rendered rooms: benchmarks/motion3d_fields.py in small."""
+"""The covariances of motions of flow fields of rendered rooms: benchmarks/tables/motion3d_fields.py in small."""
 
 import numpy as np
 import pytest

@@ -65,7 +65,7 @@ def corrected_residual(weights, uniforms):
 
 # Bars of the specification, which measured 7.8 sd / sqrt(ESS), 8.9 %, 0.14 in the worst step of 3 seeds.
 # Motions that begin far from the prior's mean exceed them with any bootstrap filter:
-# benchmarks/particle_filter.py shows the spread, with a NumPy filter beside.
+# benchmarks/tables/particle_filter.py shows the spread, with a NumPy filter beside.
 MEAN_BAR, VARIANCE_BAR, EVIDENCE_BAR = 10.0, 0.15, 0.25
 
 

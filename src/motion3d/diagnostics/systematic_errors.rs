@@ -27,7 +27,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, RowVector2, SMatrix, SVector, Vector
 
 /// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of
 /// windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it
-/// (`benchmarks/motion3d_fields.py --errors`).
+/// (`benchmarks/tables/motion3d_fields.py --only errors`).
 const SHARE: f64 = 0.4;
 
 /// The share of the points whose errors tell how far the factor is off: others have covariances for lack of

@@ -97,14 +97,14 @@ macro_rules! define_estimate {
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
         ///     "coarse_to_fine" (default): the transported equations with a pyramid, warping and robust
         ///     coupling of neighbours, for motions of many pixels, edges and untextured areas; its deviations
-        ///     hold on made scenes and are too small on many recordings (docs/theory.md). "windowed": least
+        ///     hold on made scenes and are too small on many recordings (docs/flow.md). "windowed": least
         ///     squares of the same equations in one Gaussian window, for texture that moves by a pixel or
         ///     two. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic, nearly noise-free
         ///     images. The others are baselines.
         /// preset : "fast", "balanced" or "accurate"
         ///     Cost against error of "coarse_to_fine"; default "balanced". "fast" finds the motion at half
         ///     the resolution and loses detail of a few px; "accurate" iterates more. `benchmarks/compare.py
-        ///     --only flow accuracy` measures time and error of each.
+        ///     --only flow recordings` measures time and error of each.
         /// levels : int
         ///     Pyramid levels of "coarse_to_fine"; default as many as the frame allows.
         /// model : "affine", "translational" or "accelerating"
