@@ -6,9 +6,9 @@ use crate::math::Real;
 use crate::types::{FlowField, Rect, SamplingGrid, Status};
 use nalgebra::Matrix2;
 
-/// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of them
-/// goes together still (`benchmarks/tables/motion3d_drive.py`), which the motion's covariance sums (`together`): a
-/// residual alone may be judged as if it did not.
+/// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of
+/// them goes together still (`benchmarks/tables/motion3d_drive.py`), which the motion's covariance sums
+/// (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 
 /// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and
