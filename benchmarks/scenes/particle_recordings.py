@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.scenes.recordings import from_corner_1, read_boxes, read_video
+
 try:
     import cv2
 except ImportError:
@@ -50,13 +52,13 @@ def campus(data: Path) -> Sequence | None:
     folder = data / "track_mot15" / CAMPUS
     if cv2 is None or not (folder / "gt" / "gt.txt").exists():
         return None
-    frames = _read_video(folder / f"{CAMPUS}.mp4")
+    frames = np.ascontiguousarray(read_video(folder / f"{CAMPUS}.mp4")[..., ::-1])
     with (folder / "gt" / "gt.txt").open(newline="") as file:
         lines = [[float(each) for each in row[:6]] for row in csv.reader(file)]
     boxes = np.full((len(frames), int(max(line[1] for line in lines)), 4), np.nan)
     for frame, target, *box in lines:
         boxes[int(frame) - 1, int(target) - 1] = box
-    return Sequence(CAMPUS, frames, _from_corner_1(boxes))
+    return Sequence(CAMPUS, frames, from_corner_1(boxes))
 
 
 def halved(sequence: Sequence) -> Sequence:
@@ -77,36 +79,12 @@ def single(data: Path) -> Iterator[Sequence]:
         return
     for folder in sorted(data.glob(f"{OTB}/*/")):
         pictures = sorted((folder / "img").glob("[0-9]*.jpg"))
-        tracks = [_read_boxes(path)[: len(pictures)] for path in sorted(folder.glob("groundtruth_rect*.txt"))]
+        tracks = [read_boxes(path)[: len(pictures)] for path in sorted(folder.glob("groundtruth_rect*.txt"))]
         if pictures and tracks:
             frames = np.stack([cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB) for path in pictures])
             count = min(len(frames), *(len(track) for track in tracks))
             yield Sequence(
                 folder.name,
                 frames[:count],
-                _from_corner_1(np.stack([track[:count] for track in tracks], axis=1)),
+                from_corner_1(np.stack([track[:count] for track in tracks], axis=1)),
             )
-
-
-def _read_boxes(path: Path) -> Array:
-    """Lines x, y, width, height, with commas or blanks."""
-    return np.array(
-        [line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()], float
-    )
-
-
-def _from_corner_1(boxes: Array) -> Array:
-    """Boxes whose corner is a pixel counted from 1, as ours: the side of the first pixel is at -0.5."""
-    return boxes - (1.5, 1.5, 0.0, 0.0)
-
-
-def _read_video(path: Path) -> NDArray[np.uint8]:
-    """Colour frames (T, H, W, 3)."""
-    video = cv2.VideoCapture(str(path))
-    frames: list[NDArray[np.uint8]] = []
-    while (read := video.read())[0]:
-        frames.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
-    video.release()
-    if not frames:
-        raise FileNotFoundError(path)
-    return np.stack(frames)

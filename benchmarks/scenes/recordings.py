@@ -133,3 +133,27 @@ def read_all(readers: list[Callable[[Path], Sample]], data: Path) -> tuple[list[
         except (FileNotFoundError, StopIteration, ImportError) as problem:
             missing.append(f"{read.__name__.strip('_')}: {problem!r}")
     return found, missing
+
+
+def read_boxes(path: Path) -> Array:
+    """Lines x, y, width, height, with commas or blanks."""
+    return np.array(
+        [line.replace(",", " ").split() for line in path.read_text().splitlines() if line.strip()], float
+    )
+
+
+def from_corner_1(boxes: Array) -> Array:
+    """Boxes whose corner is a pixel counted from 1, as ours: the side of the first pixel is at -0.5."""
+    return boxes - (1.5, 1.5, 0.0, 0.0)
+
+
+def read_video(path: Path) -> NDArray[np.uint8]:
+    """Colour frames (T, H, W, 3), blue, green and red."""
+    video = cv2.VideoCapture(str(path))
+    frames: list[NDArray[np.uint8]] = []
+    while (read := video.read())[0]:
+        frames.append(read[1])
+    video.release()
+    if not frames:
+        raise FileNotFoundError(path)
+    return np.stack(frames)

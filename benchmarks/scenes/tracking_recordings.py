@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scenes.recordings import read_grey
+from benchmarks.scenes.recordings import from_corner_1, read_boxes, read_grey, read_video
 from benchmarks.scenes.tracking import Truth
 
 try:
@@ -50,14 +50,7 @@ def read_all(data: Path) -> Iterator[Recording | str]:
 def crossing(data: Path) -> Iterator[Recording]:
     """A pedestrian of low contrast: folder `track_otb/Crossing`."""
     folder = data / "track_otb" / "Crossing"
-    boxes = np.array(
-        [
-            line.replace(",", " ").split()
-            for line in (folder / "groundtruth_rect.txt").read_text().split("\n")
-            if line.strip()
-        ],
-        float,
-    )
+    boxes = read_boxes(folder / "groundtruth_rect.txt")
     frames = np.stack([read_grey(folder / "img" / f"{k + 1:04d}.jpg") for k in range(len(boxes))])
     yield Recording("Crossing", frames, _truth(boxes))
 
@@ -70,7 +63,9 @@ def campus(data: Path) -> Iterator[Recording]:
     with (folder / "gt" / "gt.txt").open(newline="") as file:
         for row in csv.reader(file):
             boxes.setdefault(int(row[1]), {})[int(row[0]) - 1] = [float(each) for each in row[2:6]]
-    frames = _read_video(folder / "TUD-Campus.mp4")
+    frames = np.stack(
+        [cv2.cvtColor(each, cv2.COLOR_BGR2GRAY) for each in read_video(folder / "TUD-Campus.mp4")]
+    )
     for target, seen in sorted(boxes.items()):
         if len(seen) >= LONG_ENOUGH:
             first, last = min(seen), max(seen)
@@ -81,17 +76,5 @@ def campus(data: Path) -> Iterator[Recording]:
 def _truth(boxes: NDArray[np.floating]) -> Truth:
     """The truth from boxes (T, 4) whose corner is counted from 1, to the corner of the first pixel; NaN
     where there is none."""
-    ours = boxes - (1.5, 1.5, 0.0, 0.0)
+    ours = from_corner_1(boxes)
     return Truth(ours, np.isfinite(ours).all(axis=1) & (np.arange(len(ours)) > 0))
-
-
-def _read_video(path: Path) -> NDArray[np.uint8]:
-    """Grey frames (T, H, W)."""
-    video = cv2.VideoCapture(str(path))
-    frames: list[NDArray[np.uint8]] = []
-    while (read := video.read())[0]:
-        frames.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2GRAY))
-    video.release()
-    if not frames:
-        raise FileNotFoundError(path)
-    return np.stack(frames)
