@@ -25,10 +25,12 @@ pub mod instantaneous;
 mod least_squares;
 mod methods;
 pub mod model;
+mod moment_filter;
 mod observability;
 mod options;
 pub mod points;
 mod site;
+pub(crate) mod symmetric;
 pub mod windowed;
 
 pub use advect::{Advected, PointCovariance, advect};

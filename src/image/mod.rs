@@ -25,6 +25,7 @@ pub use corners::{CORNER_WINDOW, CornerOptions, corner_score, corner_score_into,
 pub use luminance::luminance;
 pub use preprocess::Preprocess;
 pub use quantise::Quantiser;
+pub(crate) use quantise::are_rounded;
 pub use sample::Interpolation;
 pub use smooth::GaussianSmoother;
 

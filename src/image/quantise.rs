@@ -43,6 +43,24 @@ impl Quantiser {
     }
 }
 
+/// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them:
+/// rounding is then the least noise they can have.
+pub(crate) fn are_rounded<T: Real>(frames: &[&Frame<T>]) -> bool {
+    const STEPS: f64 = 8.0;
+    let range = |frame: &&Frame<T>| {
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite()) {
+            if value.fract() != 0.0 {
+                return None;
+            }
+            (least, most) = (least.min(value), most.max(value));
+        }
+        Some((least, most))
+    };
+    let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
+    ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

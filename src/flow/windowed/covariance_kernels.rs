@@ -3,9 +3,9 @@
 use super::noise::{columns, pulled_back};
 use super::noise_setting::NoiseSetting;
 use super::rows::Plan;
-use super::solve::{ENTRIES, upper};
 use super::tile::{JetTile, Planes};
-use super::window::filter;
+use crate::flow::moment_filter::filter;
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
 /// Weights of the jet's components in `A^T r`, for one row of pixels; `ROWS` equations a pixel, of which

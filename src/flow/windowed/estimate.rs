@@ -2,10 +2,11 @@
 
 use super::floor;
 use super::rows::Plan;
-use super::solve::{Deficient, ENTRIES, MomentRow, decompose, factor, normal_matrix, right_side};
+use super::solve::{Deficient, MomentRow, decompose, normal_matrix, right_side};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
 use super::window::Window;
 use crate::flow::RankPolicy;
+use crate::flow::symmetric::{ENTRIES, factor};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Status;
 use rayon::prelude::*;

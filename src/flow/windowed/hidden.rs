@@ -9,8 +9,8 @@
 use super::covariance::{PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
 use super::sandwich::noise_entry;
-use super::solve::{ENTRIES, upper};
 use super::tile::TILE_COLUMNS;
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use nalgebra::{Matrix6, SymmetricEigen};
 

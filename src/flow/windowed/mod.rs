@@ -65,13 +65,13 @@ mod noise_setting;
 mod options;
 mod results;
 mod rows;
-pub(in crate::flow) mod run;
+mod run;
 mod sandwich;
-pub(crate) mod solve;
+mod solve;
 mod sound;
 mod support;
 mod tile;
-pub(in crate::flow) mod window;
+mod window;
 
 pub use options::{RowSet, WindowedOptions};
 pub(super) use run::Windowed;

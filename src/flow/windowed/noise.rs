@@ -6,8 +6,8 @@
 
 use super::combine::Combination;
 use super::misfit::{DERIVATIVES, Truncation};
-use super::solve::{ENTRIES, upper};
-use super::window::weights;
+use crate::flow::moment_filter::weights;
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::jet::JetStencil;
 use crate::simd::Lanes;
 

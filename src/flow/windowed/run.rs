@@ -13,7 +13,7 @@ use super::window::Window;
 use crate::error::Result;
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::bands;
-use crate::image::GaussianSmoother;
+use crate::image::{GaussianSmoother, are_rounded};
 use crate::jet::{JetRows, JetStencil};
 use crate::parallel::BAND_ROWS;
 use crate::simd::SimdReal;
@@ -215,24 +215,6 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let planes = noise.covariance((&source, self.detail.as_ref()), &strip, rows, &columns);
         Results { strip, covariance: Some(Covariance { planes, rows: rows.to_vec(), columns }) }
     }
-}
-
-/// Whether the frames hold whole numbers of a scale with more than a few steps, as cameras give them:
-/// rounding is then the least noise they can have.
-pub(in crate::flow) fn are_rounded<T: SimdReal>(frames: &[&Frame<T>]) -> bool {
-    const STEPS: f64 = 8.0;
-    let range = |frame: &&Frame<T>| {
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        for value in frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite()) {
-            if value.fract() != 0.0 {
-                return None;
-            }
-            (least, most) = (least.min(value), most.max(value));
-        }
-        Some((least, most))
-    };
-    let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
-    ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
 }
 
 /// The rectangle with a margin, inside the frame; the whole frame where little would be saved.

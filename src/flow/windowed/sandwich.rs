@@ -3,8 +3,9 @@
 use super::covariance::{PIXEL_MISFIT, PIXEL_NOISE, PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
 use super::noise_setting::NoiseSetting;
-use super::solve::{ENTRIES, MomentRow, normal_matrix, upper};
+use super::solve::{MomentRow, normal_matrix};
 use super::tile::TILE_COLUMNS;
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
 /// Fixed-point steps towards the true motion in the pull of the noise.

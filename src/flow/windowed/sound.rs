@@ -2,8 +2,8 @@
 //! almost singular matrix are not.
 
 use super::covariance::PIXEL_RESULT;
-use super::solve::{ENTRIES, upper};
 use super::tile::TILE_COLUMNS;
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use nalgebra::{Matrix6, SymmetricEigen};
 

@@ -3,7 +3,8 @@
 use super::combine::Combination;
 use super::rows::{Jets, Plan, moments, products};
 use super::support::Support;
-use super::window::{CHUNK, Window, filter};
+use super::window::Window;
+use crate::flow::moment_filter::{CHUNK, filter};
 use crate::jet::{JetRows, Reach};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;

@@ -4,7 +4,8 @@
 //! `w y^2`, with `w = g(x) g(y)`: three one-dimensional filters down the columns, and along the rows those of
 //! each result that are still needed.
 
-use crate::simd::{Lanes, SimdReal};
+use crate::flow::moment_filter::weights;
+use crate::simd::SimdReal;
 
 /// Filters of one axis: `taps[k] = [g, g k/s, g (k/s)^2]` for the distances k = 0 ..= radius, s the unit of
 /// length.
@@ -59,13 +60,6 @@ impl<T: SimdReal> Window<T> {
     }
 }
 
-/// Weights at distance 0 ..= radius of the one-dimensional Gaussian whose full sum is 1.
-pub(in crate::flow) fn weights(sigma: f64, radius: usize) -> Vec<f64> {
-    let raw: Vec<f64> = (0..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
-    let sum = raw[0] + 2.0 * raw[1..].iter().rev().sum::<f64>();
-    raw.iter().map(|w| w / sum).collect()
-}
-
 fn cast<T: SimdReal>(half: &[f64], unit: f64) -> Vec<[T; 3]> {
     half.iter()
         .enumerate()
@@ -76,107 +70,9 @@ fn cast<T: SimdReal>(half: &[f64], unit: f64) -> Vec<[T; 3]> {
         .collect()
 }
 
-/// Row lengths are multiples of this many samples, so that no loop below has a tail.
-pub(super) const CHUNK: usize = 32;
-
-/// Filters `len` samples (a multiple of [`CHUNK`]) of `source` from `centre` on with the first `N` filters of
-/// `taps`, neighbours being `stride` apart.
-#[inline(always)]
-pub(in crate::flow) fn filter<V: Lanes, const N: usize>(
-    source: &[V::Scalar],
-    centre: usize,
-    stride: usize,
-    len: usize,
-    taps: &[[V::Scalar; 3]],
-    out: [&mut [V::Scalar]; N],
-) {
-    // Enough sums in flight to hide the latency of an addition, few enough to stay in registers.
-    if N == 3 || V::LANES > 8 {
-        filter_unrolled::<V, N, 2>(source, centre, stride, len, taps, out);
-    } else {
-        filter_unrolled::<V, N, 4>(source, centre, stride, len, taps, out);
-    }
-}
-
-#[inline(always)]
-fn filter_unrolled<V: Lanes, const N: usize, const U: usize>(
-    source: &[V::Scalar],
-    centre: usize,
-    stride: usize,
-    len: usize,
-    taps: &[[V::Scalar; 3]],
-    mut out: [&mut [V::Scalar]; N],
-) {
-    let reach = (taps.len() - 1) * stride;
-    let source = &source[centre - reach..];
-    let mut at = 0;
-    while at < len {
-        let mut sums = [[V::zero(); U]; N];
-        for u in 0..U {
-            sums[0][u] = V::load(&source[reach + at + u * V::LANES..]) * V::splat(taps[0][0]);
-        }
-        let (mut before, mut after) = (reach + at, reach + at);
-        for tap in &taps[1..] {
-            before -= stride;
-            after += stride;
-            let g: [V; N] = std::array::from_fn(|n| V::splat(tap[n]));
-            // Cut to a known length, so that one check serves all loads.
-            let (left, right) = (&source[before..before + U * V::LANES], &source[after..after + U * V::LANES]);
-            for u in 0..U {
-                let (a, b) = (V::load(&left[u * V::LANES..]), V::load(&right[u * V::LANES..]));
-                let sum = a + b;
-                sums[0][u] = sum.mul_add(g[0], sums[0][u]);
-                if N > 1 {
-                    sums[1][u] = (b - a).mul_add(g[1], sums[1][u]);
-                }
-                if N > 2 {
-                    sums[2][u] = sum.mul_add(g[2], sums[2][u]);
-                }
-            }
-        }
-        for (target, sum) in out.iter_mut().zip(&sums) {
-            for u in 0..U {
-                sum[u].store(&mut target[at + u * V::LANES..]);
-            }
-        }
-        at += U * V::LANES;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{Kernel, Level, dispatch};
-
-    struct Once<'a>(&'a [f64], &'a [[f64; 3]], usize, [&'a mut [f64]; 3]);
-    impl Kernel<f64> for Once<'_> {
-        type Output = ();
-        #[inline(always)]
-        fn run<V: Lanes<Scalar = f64>>(self) {
-            filter::<V, 3>(self.0, self.2, 2, CHUNK, self.1, self.3);
-        }
-    }
-
-    #[test]
-    fn filters_are_the_three_moments_at_every_level() {
-        let window = Window::<f64>::gaussian(1.5, 4);
-        let source: Vec<f64> = (0..CHUNK + 16).map(|i| ((i * i) as f64).sin()).collect();
-        for level in Level::available() {
-            let (mut a, mut b, mut c) = (vec![0.0; CHUNK], vec![0.0; CHUNK], vec![0.0; CHUNK]);
-            dispatch(level, Once(&source, &window.taps, 8, [&mut a, &mut b, &mut c]));
-            for i in 0..CHUNK {
-                let mut want = [0.0; 3];
-                for k in -4i32..=4 {
-                    let (z, x) = (source[(8 + i as i32 + 2 * k) as usize], f64::from(k) / 1.5);
-                    let g = window.taps[k.unsigned_abs() as usize][0];
-                    want = [want[0] + g * z, want[1] + g * x * z, want[2] + g * x * x * z];
-                }
-                for (got, want) in [a[i], b[i], c[i]].iter().zip(want) {
-                    assert!((got - want).abs() < 1e-13, "{level:?}");
-                }
-            }
-        }
-    }
 
     #[test]
     fn partial_sums_are_those_of_the_taps_inside() {

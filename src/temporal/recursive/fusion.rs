@@ -4,7 +4,7 @@ use super::kernel::{B, BLOCK, INPUT, OUTPUT, P, PRESENT, RATIO, ROWS, SHARE, Ste
 use super::options::RecursiveOptions;
 use crate::error::{Error, Result};
 use crate::flow::Estimator;
-use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal, dispatch, same_mut};
 use crate::types::{FlowField, Status};

@@ -1,6 +1,6 @@
 //! One step of the filters of a block of sites, one lane a site.
 
-use crate::flow::windowed::solve::{ENTRIES, factor, upper};
+use crate::flow::symmetric::{ENTRIES, factor, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
 /// Sites of a block.

@@ -2,7 +2,7 @@
 
 use super::fusion::RecursiveFusion;
 use super::options::RecursiveOptions;
-use crate::flow::windowed::solve::upper;
+use crate::flow::symmetric::upper;
 use crate::flow::{Estimator, EstimatorOptions, Method};
 use crate::math::random::CounterRng;
 use crate::parallel::Threads;

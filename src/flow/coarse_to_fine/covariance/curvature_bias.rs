@@ -12,7 +12,7 @@
 use super::{Entries, binomial_mean};
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, TERMS, WindowStatistics};
-use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;

@@ -9,7 +9,7 @@ use super::data_support::DataSupport;
 use super::{Entries, curvature_bias};
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, WindowStatistics};
-use crate::flow::windowed::solve::upper;
+use crate::flow::symmetric::upper;
 use crate::simd::SimdReal;
 use std::f64::consts::FRAC_PI_2;
 
@@ -113,7 +113,7 @@ mod tests {
         let e = Extrapolation { variances: [1.0, 4.0, 9.0, 16.0].map(from) };
         assert_eq!(e.variance(0, 0.0), 0.0);
         assert_eq!((e.variance(0, 4.0), e.variance(1, 8.0), e.variance(0, 1e4)), (0.25, 0.1, 16.0));
-        let mut node = [0.0; crate::flow::windowed::solve::ENTRIES];
+        let mut node = [0.0; crate::flow::symmetric::ENTRIES];
         e.add(&mut node, [f64::INFINITY, 100.0], [3.0, 4.0]);
         assert!(node.iter().all(|entry| *entry < 1e-30));
         e.add(&mut node, [-20.0, 100.0], [3.0, 4.0]);

@@ -7,7 +7,7 @@ use super::Entries;
 use super::map::NodeAxis;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
-use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
 type Square = [[f64; 6]; 6];

@@ -3,7 +3,7 @@
 use super::Entries;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, node_count};
-use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
 /// Distance of the nodes, pixels of the estimate's level.

@@ -30,7 +30,7 @@ mod noise;
 use super::estimate::Estimate;
 use super::peak_locking::PeakLocking;
 use super::planes::Planes;
-use crate::flow::windowed::solve::{ENTRIES, upper};
+use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 pub(super) use map::CovarianceMap;
 pub(super) use noise::Energy;

@@ -13,7 +13,7 @@ use crate::flow::coarse_to_fine::resample::first_frame::at_first_frame;
 use crate::flow::coarse_to_fine::resample::rows::RowReader;
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, bands};
-use crate::flow::windowed::run::are_rounded;
+use crate::image::are_rounded;
 use crate::image::{halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};

@@ -4,7 +4,7 @@ use super::extended::{Continuation, Field, RIM};
 use super::ladder::{EXTRA_PASSES, Scale, TERMS, Taps};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;
-use crate::flow::windowed::window::filter;
+use crate::flow::moment_filter::filter;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
