@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numbers
 from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
 from ._jacoflow import _mixture_dirichlet_densities, _mixture_dirichlet_fit
-from ._mixture_base import Array, PointMixture, _demand, _reals, _seed, _warn_of, _weights
+from ._mixture_base import Array, PointMixture, _reals, _warn_of, _weights
 
 __all__ = ["DirichletProcessGaussianMixture"]
 
@@ -91,6 +90,12 @@ class DirichletProcessGaussianMixture(PointMixture):
     (2, [0.67, 0.33])
     """
 
+    _NUMBERS = ("weight_concentration", "mean_precision", "covariance_floor")
+    _OPTIONAL_NUMBERS = ("degrees_of_freedom", "tol")
+    _WORDS = {"inference": '"map" or "vb"'}
+    _SWITCHES = ("merge",)
+    _compiled_densities = staticmethod(_mixture_dirichlet_densities)
+
     weights_: Array
     means_: Array
     covariances_: Array
@@ -163,26 +168,3 @@ class DirichletProcessGaussianMixture(PointMixture):
         """Log density (N,) of the mixture at points (N, D), natural logarithm; of "vb" the sum of the
         expected densities' logarithms, which is less."""
         return super().score_samples(X)
-
-    def _log_densities(self, points: Array) -> tuple[Array, Array]:
-        sums, shares = _mixture_dirichlet_densities(points, self._state, self.threads)
-        return sums, shares
-
-    def _parameters(self) -> dict[str, Any]:
-        """Checked parameters for the compiled module."""
-        parameters = self.get_params()
-        for name in ("n_components", "max_iter", "n_init"):
-            _demand(name, parameters[name], numbers.Integral, "an integer")
-        for name in ("weight_concentration", "mean_precision", "covariance_floor"):
-            _demand(name, parameters[name], numbers.Real, "a number")
-        for name in ("degrees_of_freedom", "tol"):
-            if parameters[name] is not None:
-                _demand(name, parameters[name], numbers.Real, "a number or None")
-        if self.threads is not None:
-            _demand("threads", self.threads, numbers.Integral, "an integer or None")
-            if self.threads < 1:
-                raise ValueError(f"threads: expected a positive integer, got {self.threads}")
-        _demand("inference", self.inference, str, '"map" or "vb"')
-        if not isinstance(self.merge, bool):
-            raise TypeError(f"merge: expected True or False, got {self.merge!r}")
-        return {**parameters, "random_state": _seed(self.random_state)}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 import numbers
 import warnings
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,13 +47,49 @@ else:
 class PointMixture(_Base):
     """A mixture of Gaussians for weighted points: prediction, scores and checks of points. Subclasses fit, and keep what they fitted in `_state`."""
 
+    _NUMBERS: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are numbers, in their units."""
+    _OPTIONAL_NUMBERS: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are numbers or None, in their units."""
+    _WORDS: ClassVar[dict[str, str]] = {}
+    """Parameters that are words, and which (no unit)."""
+    _SWITCHES: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are True or False (no unit)."""
+    _compiled_densities: ClassVar[Callable[..., tuple[Array, Array]]]
+
     means_: Array
     n_features_in_: int
+    threads: int | None
+    random_state: Any
     _state: dict[str, Any]
 
     def fit(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None, resp: ArrayLike | None = None) -> Self:
         """Fits the mixture to points (N, D) with weights (N,), from responsibilities (N, K) if given."""
         raise NotImplementedError
+
+    def _log_densities(self, points: Array) -> tuple[Array, Array]:
+        return type(self)._compiled_densities(points, self._state, self.threads)
+
+    def _parameters(self) -> dict[str, Any]:
+        """Checked parameters, in their units, for the compiled module."""
+        parameters = self.get_params()
+        for name in ("n_components", "max_iter", "n_init"):
+            _demand(name, parameters[name], numbers.Integral, "an integer")
+        for name in self._NUMBERS:
+            _demand(name, parameters[name], numbers.Real, "a number")
+        for name in self._OPTIONAL_NUMBERS:
+            if parameters[name] is not None:
+                _demand(name, parameters[name], numbers.Real, "a number or None")
+        if self.threads is not None:
+            _demand("threads", self.threads, numbers.Integral, "an integer or None")
+            if self.threads < 1:
+                raise ValueError(f"threads: expected a positive integer, got {self.threads}")
+        for name, words in self._WORDS.items():
+            _demand(name, parameters[name], str, words)
+        for name in self._SWITCHES:
+            if not isinstance(parameters[name], bool):
+                raise TypeError(f"{name}: expected True or False, got {parameters[name]!r}")
+        return {**parameters, "random_state": _seed(self.random_state)}
 
     def fit_predict(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> NDArray[np.int64]:
         """Fits the mixture to points (N, D) and returns the component of each, (N,); `y` as of `fit`."""
@@ -87,10 +124,6 @@ class PointMixture(_Base):
         tags = super().__sklearn_tags__()  # type: ignore[misc]
         tags.estimator_type = "density_estimator"
         return tags
-
-    def _log_densities(self, points: Array) -> tuple[Array, Array]:
-        """Log densities (N,) of checked points (N, D) and responsibilities (N, K)."""
-        raise NotImplementedError
 
     def _densities(self, X: ArrayLike) -> tuple[Array, Array]:
         if not hasattr(self, "_state"):

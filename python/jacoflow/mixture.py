@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from ._dirichlet_mixture import DirichletProcessGaussianMixture
 from ._jacoflow import _mixture_densities, _mixture_fit, _mixture_partial_fit
-from ._mixture_base import Array, PointMixture, _demand, _reals, _seed, _warn_of, _weights
+from ._mixture_base import Array, PointMixture, _demand, _reals, _warn_of, _weights
 
 __all__ = ["DirichletProcessGaussianMixture", "VariationalGaussianMixture"]
 
@@ -31,8 +31,8 @@ class VariationalGaussianMixture(PointMixture):
     """A mixture of Gaussians in D dimensions, fitted to weighted points by variational Bayes.
 
     Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern Recognition and
-    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, whatever the number of threads and, from
-    k-means++ seeds, the order of the points.
+    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, for any number of threads and, from
+    k-means++ seeds, any order of the points.
 
     Parameters
     ----------
@@ -90,6 +90,11 @@ class VariationalGaussianMixture(PointMixture):
         For parameters out of range, points that are not finite or beyond 1e140, weights that are negative, not finite, all zero or so large that sums of squares overflow; each message names the argument. A spread
         below about 1e-152 counts as none.
     """
+
+    _NUMBERS = ("weight_concentration_prior", "mean_precision_prior", "prune_weight")
+    _OPTIONAL_NUMBERS = ("degrees_of_freedom_prior", "tol")
+    _WORDS = {"init": '"kmeans++" or "random"'}
+    _compiled_densities = staticmethod(_mixture_densities)
 
     weights_: Array
     means_: Array
@@ -193,30 +198,9 @@ class VariationalGaussianMixture(PointMixture):
         """
         return self._densities(X)[0]
 
-    def _parameters(self) -> dict[str, Any]:
-        """What the compiled module takes."""
-        parameters = self.get_params()
-        for name in ("n_components", "max_iter", "n_init"):
-            _demand(name, parameters[name], numbers.Integral, "an integer")
-        for name in ("weight_concentration_prior", "mean_precision_prior", "prune_weight"):
-            _demand(name, parameters[name], numbers.Real, "a number")
-        for name in ("degrees_of_freedom_prior", "tol"):
-            if parameters[name] is not None:
-                _demand(name, parameters[name], numbers.Real, "a number or None")
-        if self.threads is not None:
-            _demand("threads", self.threads, numbers.Integral, "an integer or None")
-            if self.threads < 1:
-                raise ValueError(f"threads: expected a positive integer, got {self.threads}")
-        _demand("init", self.init, str, '"kmeans++" or "random"')
-        return {**parameters, "random_state": _seed(self.random_state)}
-
     def _continues(self, points: Array) -> bool:
         """Whether a fit may begin with the components of the last one."""
         return hasattr(self, "_state") and self.n_features_in_ == points.shape[1] and len(self.weights_) <= self.n_components
-
-    def _log_densities(self, points: Array) -> tuple[Array, Array]:
-        sums, shares = _mixture_densities(points, self._state, self.threads)
-        return sums, shares
 
     def _take(self, state: dict[str, Any]) -> None:
         """The attributes that a fit leaves."""

@@ -2,7 +2,7 @@
 //! `jacoflow.mixture.DirichletProcessGaussianMixture`.
 
 use super::arrays;
-use super::mixture::{Sample, count, covariance_prior, entry, numbers, shares};
+use super::mixture::{Sample, count, covariance_prior, densities_and_shares, entry, numbers, shares};
 use crate::error::Error;
 use crate::mixture::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
 use crate::parallel::Threads;
@@ -101,7 +101,5 @@ pub fn mixture_dirichlet_densities<'py>(
     let mixture = mixture(components)?;
     let threads = Threads::new(threads)?;
     let (sums, shares) = py.detach(|| threads.install(|| mixture.log_densities(&sample.points())))?;
-    let shape = [sums.len(), mixture.components()];
-    let shares = arrays::owned(py, &shape, shares)?;
-    Ok((arrays::owned(py, &shape[..1], sums)?.into_any(), shares.into_any()))
+    densities_and_shares(py, sums, shares)
 }

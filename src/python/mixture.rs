@@ -229,7 +229,16 @@ pub fn mixture_densities<'py>(
     let components = posterior(components)?;
     let threads = Threads::new(threads)?;
     let (sums, shares) = py.detach(|| threads.install(|| components.log_densities(&sample.points())))?;
-    let n = sums.len();
-    let shares = arrays::owned(py, &[n, components.components()], shares)?;
-    Ok((arrays::owned(py, &[n], sums)?.into_any(), shares.into_any()))
+    densities_and_shares(py, sums, shares)
+}
+
+/// Log densities (N,) and responsibilities (N, K).
+pub(super) fn densities_and_shares(
+    py: Python<'_>,
+    sums: Vec<f64>,
+    shares: Vec<f64>,
+) -> PyResult<(Bound<'_, PyAny>, Bound<'_, PyAny>)> {
+    let shape = [sums.len(), shares.len() / sums.len().max(1)];
+    let shares = arrays::owned(py, &shape, shares)?;
+    Ok((arrays::owned(py, &shape[..1], sums)?.into_any(), shares.into_any()))
 }

@@ -132,47 +132,81 @@ samples! {
     f64, "float64", 1.0, |value| value;
 }
 
-/// A frame as it came from a file or an array, in its own sample type.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AnyFrame {
-    /// 8-bit samples.
-    U8(Frame<u8>),
-    /// 16-bit samples.
-    U16(Frame<u16>),
-    /// Single precision.
-    F32(Frame<f32>),
-    /// Double precision.
-    F64(Frame<f64>),
-}
+/// A colour image: red, green and blue of each pixel, `[row, col] = [y, x]`.
+pub type ColourFrame<T> = Frame<[T; 3]>;
 
-macro_rules! any_frame {
-    ($self:ident, $frame:ident => $body:expr) => {
+/// Runs an expression on the frame of either enum, whatever its sample type `S` is.
+macro_rules! each_sample {
+    ($self:ident, $frame:ident: $s:ident => $body:expr) => {
         match $self {
-            AnyFrame::U8($frame) => $body,
-            AnyFrame::U16($frame) => $body,
-            AnyFrame::F32($frame) => $body,
-            AnyFrame::F64($frame) => $body,
+            Self::U8($frame) => {
+                type $s = u8;
+                $body
+            }
+            Self::U16($frame) => {
+                type $s = u16;
+                $body
+            }
+            Self::F32($frame) => {
+                type $s = f32;
+                $body
+            }
+            Self::F64($frame) => {
+                type $s = f64;
+                $body
+            }
         }
     };
 }
 
-impl AnyFrame {
-    /// `(width, height)`.
-    pub fn size(&self) -> (usize, usize) {
-        any_frame!(self, frame => frame.size())
-    }
-    /// numpy's name of the sample type.
-    pub fn dtype(&self) -> &'static str {
-        match self {
-            Self::U8(_) => u8::DTYPE,
-            Self::U16(_) => u16::DTYPE,
-            Self::F32(_) => f32::DTYPE,
-            Self::F64(_) => f64::DTYPE,
+/// Frames as they came from a file or an array, in their own sample type.
+macro_rules! any_frame {
+    ($(#[$doc:meta] $name:ident($frame:ident))*) => {$(
+        #[$doc]
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum $name {
+            /// 8-bit samples.
+            U8($frame<u8>),
+            /// 16-bit samples.
+            U16($frame<u16>),
+            /// Single precision.
+            F32($frame<f32>),
+            /// Double precision.
+            F64($frame<f64>),
         }
-    }
+
+        impl $name {
+            /// `(width, height)`.
+            pub fn size(&self) -> (usize, usize) {
+                each_sample!(self, frame: _S => frame.size())
+            }
+
+            /// numpy's name of the sample type.
+            pub fn dtype(&self) -> &'static str {
+                each_sample!(self, _frame: S => S::DTYPE)
+            }
+        }
+    )*};
+}
+any_frame! {
+    /// A grey frame as it came from a file or an array, in its own sample type.
+    AnyFrame(Frame)
+    /// A colour frame as it came from a file or an array, in its own sample type.
+    AnyColourFrame(ColourFrame)
+}
+
+impl AnyFrame {
     /// The frame in working precision; values are not rescaled.
     pub fn to_real<T: Real>(&self) -> Frame<T> {
-        any_frame!(self, frame => frame.map(|s| s.to_real()))
+        each_sample!(self, frame: _S => frame.map(|sample| sample.to_real()))
+    }
+}
+
+impl AnyColourFrame {
+    /// Red, green and blue in single precision, every sample multiplied by `gain`.
+    pub fn scaled(&self, gain: f64) -> ColourFrame<f32> {
+        let gain = gain as f32;
+        each_sample!(self, frame: S => frame.map(|pixel| pixel.map(|sample: S| sample.to_real::<f32>() * gain)))
     }
 }
 
@@ -203,5 +237,12 @@ mod tests {
         let frame = Frame::from_fn(3, 2, |x, y| 10 * y + x);
         assert_eq!(frame.row(1), &[10, 11, 12]);
         assert_eq!(frame.get(2, 1), 12);
+    }
+
+    #[test]
+    fn colour_samples_are_scaled_in_single_precision() {
+        let frame = AnyColourFrame::U16(Frame::new(1, 1, vec![[0, 257, 65535]]).unwrap());
+        assert_eq!((frame.size(), frame.dtype()), ((1, 1), "uint16"));
+        assert_eq!(frame.scaled(1.0 / 257.0).data(), [[0.0, 1.0, 255.0]]);
     }
 }
