@@ -29,8 +29,6 @@ PAPER_SCENES = ("people_handheld", "cars_handheld", "people_static")
 HARD_SCENES = ("slow_cross", "stop_and_go", "pillar")
 PAPER, IMPROVED = ("colour", "velocity", "distance", "foreground"), ("colour", "velocity", "tracks")
 """Factors of the likelihood in each mode."""
-PIECES = ("camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery")
-"""Parts of the improved mode that are no factors of the likelihood."""
 RECORDINGS, RUNS, SEEDS = (10, 11), 3, (0, 1, 2)
 """Seeds of the scenes and runs of the tracker on them, and its seeds on recordings, by default."""
 IMPROVED_MODE, PAPER_MODE = Settings("improved mode", "improved"), Settings("paper mode", "paper")
@@ -56,7 +54,6 @@ READINGS = (
 PARTS = (
     IMPROVED_MODE,
     *(without("improved", IMPROVED, factor) for factor in IMPROVED),
-    *(Settings(f"improved mode without {part}", "improved", {"without": (part,)}) for part in PIECES),
     Settings("improved mode with distance", "improved", {"likelihoods": (*IMPROVED, "distance")}),
     Settings("improved mode with foreground", "improved", {"likelihoods": (*IMPROVED, "foreground")}),
     Settings(

@@ -45,7 +45,6 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     out["scale"] = None if out["scale"] is None else _real("scale", out["scale"])
     out["ess_threshold"] = _real("ess_threshold", out["ess_threshold"])
     out["likelihoods"] = None if out["likelihoods"] is None else _names("likelihoods", out["likelihoods"])
-    out["without"] = _names("without", out["without"])
     out["segmentation"] = _segmentation(out["segmentation"])
     return out
 

@@ -174,8 +174,6 @@ class ParticleTracker:
     likelihoods : sequence of "colour", "velocity", "distance", "tracks", "foreground"
         Factors of a particle's weight; default the mode's: the first two with "tracks" ("improved"), or with
         "distance" and "foreground" ("paper").
-    without : sequence of "camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery"
-        Parts of the improved mode that are left out, to see what each is worth; default none.
     resampling : "multinomial", "stratified", "systematic" or "residual"
         How particles are drawn.
     ess_threshold : float
@@ -224,7 +222,6 @@ class ParticleTracker:
         n_near: int = 2000,
         scale: float | None = None,
         likelihoods: Sequence[str] | None = None,
-        without: Sequence[str] = (),
         resampling: Literal["multinomial", "stratified", "systematic", "residual"] = "multinomial",
         ess_threshold: float = 1.0,
         foreground: Literal["ratio", "posterior", "literal", "affine"] = "ratio",

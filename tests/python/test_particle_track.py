@@ -330,22 +330,13 @@ def test_nothing_shown_for_long_is_lost(apart):
     assert statuses[0] == "coasting" and set(statuses[30:]) <= {"lost", "out"}
 
 
-@pytest.mark.parametrize("options", [{}, {"mode": "paper"}, {"without": ("hidden",)}, {"likelihoods": ("colour", "velocity")}])
+@pytest.mark.parametrize("options", [{}, {"mode": "paper"}, {"likelihoods": ("colour", "velocity")}])
 def test_a_cut_ends_when_the_scene_comes_back(apart, options):
     other = Clip("cars_handheld", 0, 1, seed=4).frames[0]
     tracker = ParticleTracker(apart.frames[0], apart.boxes[0], **FEW, **options)
     for frame in [*apart.frames[1:4], other, *apart.frames[4:]]:
         step = tracker.update(frame)
     assert "coasting" not in step.status
-
-
-def test_parts_can_be_left_out(apart):
-    with pytest.raises(ValueError, match="^without: expected names among camera, labels"):
-        ParticleTracker(apart.frames[0], apart.boxes[0], without=("tracks",))
-    with pytest.raises(ValueError, match="^without: expected a sequence of names"):
-        ParticleTracker(apart.frames[0], apart.boxes[0], without="labels")
-    tracker = ParticleTracker(apart.frames[0], apart.boxes[0], **FEW, without=("labels",))
-    assert all(tracker.update(frame).n_tracks.sum() == 0 for frame in apart.frames[1:3])
 
 
 def panned(clip, count):

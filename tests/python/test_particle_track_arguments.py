@@ -42,7 +42,6 @@ def test_boxes_that_cannot_be_followed_are_named(boxes, message):
         ({"likelihoods": ("colour", "speed")}, "likelihoods: expected names among colour, velocity, distance, tracks, foreground, got speed"),
         ({"likelihoods": "colour"}, "likelihoods: expected a sequence of names, got 'colour'"),
         ({"likelihoods": 3}, "likelihoods: expected a sequence of names, got 3"),
-        ({"without": 3}, "without: expected a sequence of names, got 3"),
         ({"resampling": "best"}, 'resampling: expected one of .*, got "best"'),
         ({"ess_threshold": 1.5}, "ess_threshold: expected a share from 0 to 1, got 1.5"),
         ({"foreground": "ratios"}, "foreground: expected .*, got"),
@@ -62,8 +61,8 @@ def test_options_out_of_range_are_named(options, message):
 
 
 def test_names_may_come_from_an_iterator():
-    tracker = ParticleTracker(FRAME, [BOX], n_particles=8, n_near=8, likelihoods=iter(["colour"]), without=iter(["hidden"]))
-    assert tracker.options["likelihoods"] == ["colour"] and tracker.options["without"] == ["hidden"]
+    tracker = ParticleTracker(FRAME, [BOX], n_particles=8, n_near=8, likelihoods=iter(["colour"]))
+    assert tracker.options["likelihoods"] == ["colour"]
 
 
 @pytest.mark.parametrize(("name", "value"), [("n_particles", 1.5), ("n_near", True), ("scale", "large"), ("ess_threshold", None), ("random_state", "0"), ("threads", 2.0)])

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::filter::particle::Resampling;
 use crate::parallel::Threads;
 use crate::segment::SegmentOptions;
-use crate::track::particle::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions, Parts};
+use crate::track::particle::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions};
 use pyo3::prelude::*;
 
 /// The keyword options of `jacoflow.track.ParticleTracker`.
@@ -16,7 +16,6 @@ pub(super) struct Given {
     n_near: usize,
     scale: Option<f64>,
     likelihoods: Option<Vec<String>>,
-    without: Vec<String>,
     resampling: String,
     ess_threshold: f64,
     foreground: String,
@@ -57,7 +56,6 @@ impl Given {
             n_near: self.n_near,
             scale: self.scale,
             likelihoods: self.likelihoods.map(|names| Likelihoods::from_names(&names)).transpose()?,
-            parts: Parts::without(&self.without)?,
             resampling: Resampling::parse(&self.resampling)?,
             ess_threshold: self.ess_threshold,
             foreground: word("foreground", &self.foreground, &ForegroundModel::ALL.map(|model| (model.name(), model)))?,

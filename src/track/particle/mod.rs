@@ -39,7 +39,7 @@ mod target;
 mod tracker;
 mod view;
 
-pub use options::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions, Parts};
+pub use options::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions};
 pub use record::{Particles, StepRecord};
 pub use step::{CornerTrack, ParticleStep, ParticleTarget};
 pub use tracker::ParticleTracker;

@@ -33,7 +33,7 @@ impl Noise {
     /// The noise that options ask for at a length scale.
     pub fn of_options(options: &ParticleOptions, scale: f64) -> Self {
         let noise = Self::of(options.mode, scale);
-        if options.used_parts().aspect { noise } else { Self { aspect: None, ..noise } }
+        if options.uses("particle.aspect") { noise } else { Self { aspect: None, ..noise } }
     }
 
     /// All of it multiplied by a factor.

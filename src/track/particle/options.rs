@@ -111,56 +111,6 @@ impl Likelihoods {
     }
 }
 
-/// Parts of the improved mode, each of which can be left out to see what it is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[allow(clippy::struct_excessive_bools, reason = "each part is left out by itself")]
-pub struct Parts {
-    /// Particles move with the background's affine motion.
-    pub camera: bool,
-    /// Tracks remember which target they belong to.
-    pub labels: bool,
-    /// Hidden targets are recognised.
-    pub hidden: bool,
-    /// Colours that are also frequent around the first box have a smaller weight.
-    pub contrast: bool,
-    /// Pixels without hue have bins of value.
-    pub values: bool,
-    /// Width and height change together.
-    pub aspect: bool,
-    /// Half of a new target's particles take the motion of tracks in its box.
-    pub quick_start: bool,
-    /// A hidden target takes over a group of tracks without an owner.
-    pub recovery: bool,
-}
-
-impl Parts {
-    /// Names of the parts, in the order of the fields.
-    pub const NAMES: [&'static str; 8] =
-        ["camera", "labels", "hidden", "contrast", "values", "aspect", "quick_start", "recovery"];
-
-    /// All parts, or none.
-    pub fn all(present: bool) -> Self {
-        Self::from_array([present; Self::NAMES.len()])
-    }
-
-    /// All parts but those with these names.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `without` for a name that is not known.
-    pub fn without<S: AsRef<str>>(names: &[S]) -> Result<Self> {
-        let mut present = [true; Self::NAMES.len()];
-        for at in positions("without", &Self::NAMES, names)? {
-            present[at] = false;
-        }
-        Ok(Self::from_array(present))
-    }
-
-    fn from_array(present: [bool; Self::NAMES.len()]) -> Self {
-        let [camera, labels, hidden, contrast, values, aspect, quick_start, recovery] = present;
-        Self { camera, labels, hidden, contrast, values, aspect, quick_start, recovery }
-    }
-}
-
 /// Places of some names among those that are known.
 fn positions<S: AsRef<str>>(argument: &'static str, known: &[&str], names: &[S]) -> Result<Vec<usize>> {
     let place = |name: &S| {
@@ -183,8 +133,6 @@ pub struct ParticleOptions {
     pub scale: Option<f64>,
     /// Factors of the likelihood; default `None`: those of the mode.
     pub likelihoods: Option<Likelihoods>,
-    /// Parts of the improved mode in use; default: all.
-    pub parts: Parts,
     /// Resampling scheme; default multinomial.
     pub resampling: Resampling,
     /// Particles are resampled if the effective sample size is below this share of their number; default 1:
@@ -212,7 +160,6 @@ impl Default for ParticleOptions {
             n_near: 2000,
             scale: None,
             likelihoods: None,
-            parts: Parts::all(true),
             resampling: Resampling::Multinomial,
             ess_threshold: 1.0,
             foreground: ForegroundModel::Ratio,
@@ -251,22 +198,9 @@ impl ParticleOptions {
         self.likelihoods.unwrap_or_else(|| Likelihoods::of(self.mode))
     }
 
-    /// The parts in use: none in paper mode.
-    pub(super) fn used_parts(&self) -> Parts {
-        if self.mode != ParticleMode::Improved {
-            return Parts::all(false);
-        }
-        let p = self.parts;
-        Parts {
-            camera: p.camera && crate::ablation::keeps("particle.camera"),
-            labels: p.labels && crate::ablation::keeps("particle.labels"),
-            hidden: p.hidden && crate::ablation::keeps("particle.hidden"),
-            contrast: p.contrast && crate::ablation::keeps("particle.contrast"),
-            values: p.values && crate::ablation::keeps("particle.values"),
-            aspect: p.aspect && crate::ablation::keeps("particle.aspect"),
-            quick_start: p.quick_start && crate::ablation::keeps("particle.quick_start"),
-            recovery: p.recovery && crate::ablation::keeps("particle.recovery"),
-        }
+    /// Whether a rule of improved mode acts; `rule` is its name in [`crate::ablation::HEURISTICS`].
+    pub(super) fn uses(&self, rule: &'static str) -> bool {
+        self.mode == ParticleMode::Improved && crate::ablation::keeps(rule)
     }
 
     /// Factor of all lengths for a picture of this many rows.
@@ -307,9 +241,6 @@ mod tests {
             Likelihoods::from_names(&["colour", "velocity", "tracks"]).unwrap(),
             Likelihoods::of(ParticleMode::Improved)
         );
-        let without = Parts::without(&["hidden", "labels"]).unwrap();
-        assert_eq!(without, Parts { hidden: false, labels: false, ..Parts::all(true) });
-        assert!(Parts::without(&["size"]).unwrap_err().to_string().starts_with("without: "));
         assert!(Likelihoods::from_names(&["color"]).unwrap_err().to_string().starts_with("likelihoods: "));
     }
 }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 const TRACKER_MARK: [u8; 4] = *b"JFPT";
 const STEP_MARK: [u8; 4] = *b"JFPS";
 /// Number of the layout: it goes up with every change of what is kept.
-const LAYOUT: u16 = 1;
+const LAYOUT: u16 = 2;
 /// Bytes of mark and layout.
 const HEAD: usize = 6;
 /// Bytes of the checksum.
@@ -148,7 +148,7 @@ impl ParticleTracker {
         let last = saved.last.restore()?;
         let (size, options) = (last.size(), saved.options);
         options.check()?;
-        let view = options.threads.install(|| View::new(&last, saved.gain, options.used_parts().values));
+        let view = options.threads.install(|| View::new(&last, saved.gain, options.uses("particle.values")));
         let pyramid = options.threads.install(|| Corners::pyramid(view.grey));
         let scale = options.length_scale(size.1);
         let mut corners = Corners::new(scale);

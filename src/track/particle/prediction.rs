@@ -70,7 +70,7 @@ pub(super) fn predict_targets(
 ) -> Vec<Prediction> {
     let mut predictions: Vec<Prediction> = targets.iter().map(|target| predicted(target, camera)).collect();
     find_near(&mut predictions, targets, options, scale);
-    let judges_hidden = options.factors().tracks && options.used_parts().hidden;
+    let judges_hidden = options.factors().tracks && options.uses("particle.hidden");
     if !judges_hidden {
         // A cut hides every target for one frame, in every mode.
         for target in targets.iter_mut() {

@@ -36,7 +36,7 @@ pub(super) struct Recovery {
 /// Looks for the target in the densest group of tracks without an owner.
 pub(super) fn recover(target: &Target, own: usize, context: &FrameContext<'_>) -> Option<Recovery> {
     let prediction = &context.predictions[own];
-    let on = context.factors.tracks && context.factors.colour && context.options.used_parts().recovery;
+    let on = context.factors.tracks && context.factors.colour && context.options.uses("particle.recovery");
     if prediction.hidden < HIDDEN_FRAMES || !on {
         return None;
     }

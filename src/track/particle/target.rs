@@ -21,8 +21,6 @@ pub(super) struct Target {
     pub presence: Presence,
     /// Whether its centre, carried on by one frame, leaves the picture: it is no longer followed.
     pub is_out: bool,
-    /// Whether no frame has come since it was added.
-    pub is_new: bool,
     /// Similarity of its colours in the last frame, 0 to 1.
     pub similarity: f64,
     pub effective_sample_size: f64,
@@ -39,13 +37,12 @@ impl Target {
         Self {
             id,
             first_size: [w, h],
-            appearance: Appearance::learn(bins, bounds, options.used_parts().contrast),
+            appearance: Appearance::learn(bins, bounds, options.uses("particle.contrast")),
             effective_sample_size: options.n_particles as f64,
             cloud,
             estimate: start.mean,
             presence: Presence::new([x, y]),
             is_out: false,
-            is_new: true,
             similarity: 1.0,
             degenerate: false,
         }

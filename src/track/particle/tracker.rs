@@ -76,7 +76,7 @@ impl ParticleTracker {
         let gain = level_gain(frame);
         let scale = options.length_scale(size.1);
         let (view, pyramid, corners) = options.threads.install(|| {
-            let view = View::new(frame, gain, options.used_parts().values);
+            let view = View::new(frame, gain, options.uses("particle.values"));
             let mut corners = Corners::new(scale);
             corners.top_up(&view.grey)?;
             let pyramid = Corners::pyramid(view.grey.clone());
@@ -229,7 +229,7 @@ impl ParticleTracker {
 
     /// One frame.
     fn advance(&mut self, frame: &AnyColourFrame, known: Option<CameraMotion>) -> Result<()> {
-        let view = View::new(frame, self.gain, self.options.used_parts().values);
+        let view = View::new(frame, self.gain, self.options.uses("particle.values"));
         if view.is_empty() {
             self.frame += 1;
             self.missed.push(known.map(CameraMotion::to_affine));
@@ -291,7 +291,7 @@ impl ParticleTracker {
             let rng = CounterRng::new(self.options.random_state).stream(CAMERA_STREAM).stream(self.frame as u64);
             let background = fit_background(&points, &flow, known, rng);
             let foreground = background.probability.iter().map(|q| 1.0 - q).collect();
-            let rides = self.options.used_parts().camera || known.is_some();
+            let rides = self.options.uses("particle.camera") || known.is_some();
             (if rides { background.motion } else { CameraMotion::NONE }, foreground, background.motion)
         };
         for ((track, point), foreground) in self.corners.tracks.iter_mut().zip(points).zip(foreground) {
@@ -333,7 +333,7 @@ impl ParticleTracker {
             let next = camera.carry(target.place(), target.velocity());
             target.is_out = !is_inside(next, self.size);
         }
-        if !(self.options.factors().tracks && self.options.used_parts().labels) || was_cut {
+        if !(self.options.factors().tracks && self.options.uses("particle.labels")) || was_cut {
             return;
         }
         let targets = labelled(&self.targets, |_, target| target.bounds());
