@@ -65,8 +65,8 @@ impl Agreement {
         self.edges >= MIN_EDGES && self.matched < MIN_MATCHED_SHARE
     }
 
-    /// Whether too few of enough edge pixels are matched, or the offset is `unsure` otherwise, and the matches
-    /// are poor.
+    /// Whether too few of enough edge pixels are matched, or the offset is `unsure` otherwise, and the
+    /// matches are poor.
     pub fn is_doubtful(&self, unsure: bool) -> bool {
         let poor = self.score.is_some_and(|score| score < MIN_SCORE);
         self.edges >= MIN_EDGES && (unsure || !self.suffices()) && poor

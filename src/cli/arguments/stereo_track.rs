@@ -60,7 +60,7 @@ impl StereoTrackerArguments {
         self.layout.given().or(self.matches.given()).or(own.into_iter().find_map(|given| given))
     }
 
-    /// The options of the stereo tracker; layers of disparity as wide as the range. `random_state` of the mixture.
+    /// The options of the stereo tracker; layers of disparity as wide as the range.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option.

@@ -114,8 +114,8 @@ impl StereoRun {
 
     /// Works through `pairs` and ends every sink, however the run ends.
     ///
-    /// `progress` is called with the number of pairs taken, at least once a pair and while waiting for one; its
-    /// error stops the run, and what is complete then stays.
+    /// `progress` is called with the number of pairs taken, at least once a pair and while waiting for one;
+    /// its error stops the run, and what is complete then stays.
     ///
     /// # Errors
     /// Those of the source, of `begin`, the tracker, the sinks and `progress`; [`Error::Argument`] named

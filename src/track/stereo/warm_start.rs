@@ -42,9 +42,9 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain none, at the
-/// largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels outside of such
-/// blobs; `None` if most pixels are unexplained: a new scene.
+/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain
+/// none, at the largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels
+/// outside of such blobs; `None` if most pixels are unexplained: a new scene.
 ///
 /// One seed a blob: several would compete for it over the next steps and exchange tracks. Explained pixels do
 /// not count, because a seed beside a flat component could take that over.
@@ -82,8 +82,8 @@ pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points
     Ok(Some(Seeded { seeds, outliers }))
 }
 
-/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or is spread so thinly that it explains
-/// none.
+/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or is spread so thinly that it
+/// explains none.
 pub(super) fn is_left_over(posterior: &Posterior, k: usize, (pixels, all): (f64, f64)) -> bool {
     pixels < MIN_COMPONENT_PIXELS || log_density(pixels / all, &covariance(posterior, k)) < explaining(all)
 }
