@@ -74,7 +74,7 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def checked_views(left: ArrayLike, right: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Both views as arrays, (H, W) or (H, W, 3) each; ValueError with both shapes where one is of another kind. What their sizes have to do with one another the compiled part tells."""
+    """Both views as arrays, (H, W) or (H, W, 3) each; ValueError with both shapes where one is of another kind. The compiled part checks their sizes."""
     views = as_array(left), as_array(right)
     for name, view in zip(("left", "right"), views, strict=True):
         if not (view.ndim == 2 or (view.ndim == 3 and view.shape[2] in (3, 4))):
@@ -104,8 +104,8 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-def tell_doubt(row_range: tuple[int, int]) -> None:
-    """Warns that views hardly agree with any of these row offsets, px."""
+def warn_of_rows(row_range: tuple[int, int]) -> None:
+    """Warns that the views disagree at each of these row offsets, px."""
     least, greatest = row_range
     message = f"row_range: the views hardly agree with any row offset that was searched, {least} to {greatest}, and many disparities are wrong; widen the range or give row_offset"
     warnings.warn(message, UserWarning, stacklevel=3)
@@ -150,7 +150,7 @@ def _count(name: str, value: Any) -> int | None:
 
 
 def _several(name: str, value: Any, length: int, *, whole: bool) -> tuple[Any, ...]:
-    """So many numbers of whatever sequence, in its unit; the last of `grid` may be None."""
+    """A sequence of so many numbers, in its unit; the last of `grid` may be None."""
     numbers = _converted(name, value, tuple, f"{length} numbers")
     if len(numbers) != length:
         raise ValueError(f"{name}: expected {length} numbers, got {len(numbers)}")

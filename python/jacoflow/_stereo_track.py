@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import StereoCamera, as_array, checked, checked_views, real_number, tell_doubt, whole_number
+from ._stereo_options import StereoCamera, as_array, checked, checked_views, real_number, warn_of_rows, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]
@@ -43,7 +43,7 @@ class StereoCluster:
     next_velocity: Array
     """Motion (u, v, w) to the next step, (3,), px/step and disparity/step, at `middle` and in depth the robust mean; known in the graph one step later, NaN before."""
     middle: Array
-    """Medians along x and y, (2,), px, of its pixels; in "improved" of those that show its own surface, neither strays nor those of its outline that lie beyond it: so `velocity` is the median of the affine motion over these."""
+    """Medians along x and y, (2,), px, of its pixels; in "improved" of those on its own surface, without outliers and pixels of its outline that lie beyond it: so `velocity` is the median of the affine motion over these."""
     affine: Array
     """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at `middle`, (6,), px/step and 1/step ("improved")."""
     next_affine: Array
@@ -81,7 +81,7 @@ class StereoStep:
     row_offset: float
     """How many rows lower the right view shows a point, px, as these views were matched; NaN where disparities were given."""
     rows_doubtful: bool
-    """Whether the row offset was searched and the views hardly agree with it: many disparities are wrong (no unit)."""
+    """Whether the row offset was searched and the views disagree with it: many disparities are wrong (no unit)."""
     rounds: int
     """Rounds of the mixture, no unit."""
 
@@ -191,16 +191,16 @@ def _flat(node: dict[str, Any]) -> dict[str, Any]:
 
 
 class StereoTracker:
-    """Follows everything that moves before two cameras, which may move themselves: nothing is learnt or marked beforehand.
+    """Tracks all moving objects before two cameras, which may move themselves: nothing is learnt or marked beforehand.
 
     Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x, y, disparity), clustered by
-    a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic, whatever the number of threads.
+    a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic for any number of threads.
     It holds the last views smoothed and cannot be pickled; its steps, its graph and its tracks can.
 
     Parameters
     ----------
     mode : "improved" or "paper"
-        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped; both cameras may expose otherwise from step to step.
+        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped; the exposure of both cameras may change from step to step.
         "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
     n_components : int
         Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.
@@ -260,10 +260,10 @@ class StereoTracker:
     def update(self, left: ArrayLike, right: ArrayLike, dt: float | None = None) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
-        Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of films, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
+        Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of videos, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
         cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
-        `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; where things go is foreseen, and what is lost waited for, over that time. Of the first step it means nothing.
+        `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; predictions and limits in steps refer to that time. Of the first step it means nothing.
 
         Raises
         ------
@@ -273,11 +273,11 @@ class StereoTracker:
         Warns
         -----
         UserWarning
-            Where views with edges hardly agree at any row offset in `row_range`; what is then found is mostly wrong.
+            Where views with edges disagree at every row offset in `row_range`; the disparities are then mostly wrong.
         """
         step = _step(self._tracker.update(*checked_views(left, right), _waited(dt)))
         if step.rows_doubtful:
-            tell_doubt(self._row_range)
+            warn_of_rows(self._row_range)
         return step
 
     def update_disparity(self, left: ArrayLike, disparity: ArrayLike, dt: float | None = None) -> StereoStep:
@@ -324,6 +324,6 @@ def _waited(dt: float | None) -> float | None:
     return None if dt is None else real_number("dt", dt)
 
 
-def _step(told: dict[str, Any]) -> StereoStep:
-    clusters = [StereoCluster(**cluster) for cluster in told.pop("clusters")]
-    return StereoStep(clusters=clusters, **told)
+def _step(fields: dict[str, Any]) -> StereoStep:
+    clusters = [StereoCluster(**cluster) for cluster in fields.pop("clusters")]
+    return StereoStep(clusters=clusters, **fields)

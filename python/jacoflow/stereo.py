@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
-from ._stereo_options import checked_matching, checked_views, tell_doubt
+from ._stereo_options import checked_matching, checked_views, warn_of_rows
 
 __all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
@@ -100,7 +100,7 @@ def edge_disparity(
     EdgeDisparity
         Empty, not an error, where there are no edges.
 
-    ValueError names an argument that is out of range or views that do not fit, with both shapes. A UserWarning says where views with edges hardly agree at any row offset in `row_range`: cameras that are farther
+    ValueError names an argument that is out of range or views that do not fit, with both shapes. A UserWarning says where views with edges disagree at every row offset in `row_range`: cameras that are farther
     apart in height, or views that do not belong together. What is then found is mostly wrong.
 
     "sgm" compares gradients, after the right view is multiplied by the ratio of both views' contrasts where that is below .92 or above 1.08 and alike for the greatest 1 to 8 % of the differences in brightness.
@@ -108,7 +108,7 @@ def edge_disparity(
     """
     disparity, rows, cols, values, score, (offset, doubtful) = _edge_disparity(*checked_views(left, right), _options(locals()))
     if doubtful:
-        tell_doubt(row_range)
+        warn_of_rows(row_range)
     return EdgeDisparity(disparity, rows, cols, values, score, offset)
 
 
@@ -132,7 +132,7 @@ def estimate_row_offset(
     """
     rows, doubtful = _estimate_row_offset(*checked_views(left, right), _options(locals()))
     if doubtful:
-        tell_doubt(row_range)
+        warn_of_rows(row_range)
     return rows
 
 
