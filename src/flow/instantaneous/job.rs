@@ -8,7 +8,7 @@ use super::lane_noise::LaneNoise;
 use super::noise::NoiseModel;
 use super::normal::{LaneRates, noise_square, solve_affine};
 use super::output::{clear, write};
-use super::point::{Asked, PointVisitor, rounding_floor};
+use super::point::{PointRequest, PointVisitor, rounding_floor};
 use super::propagation::factor_memory;
 use super::uncertainty::{Detail, LaneEstimate, estimate_affine};
 use crate::flow::options::EstimatorOptions;
@@ -265,13 +265,13 @@ impl<T: SimdReal> Job<'_, T> {
             return clear(band, local, Status::NonFinite);
         };
         let options = &self.owner.options;
-        let asked = Asked {
+        let request = PointRequest {
             floor: rounding_floor::<T>(&rates),
             policy: options.rank_deficient,
             noise: self.common.covariance.then_some(&self.owner.noise),
             pixel_variance: &|| NoiseModel::pixel_variance(&self.owner.stencil, self.frames, at),
         };
-        let estimate = options.model.visit(PointVisitor { rates: &rates, asked: &asked });
+        let estimate = options.model.dispatch(PointVisitor { rates: &rates, request: &request });
         write(band, local, &estimate);
     }
 }

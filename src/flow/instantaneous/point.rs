@@ -9,7 +9,7 @@ use crate::math::Real;
 use crate::types::Status;
 
 /// What is wanted of a pixel.
-pub(super) struct Asked<'a> {
+pub(super) struct PointRequest<'a> {
     /// Rounding noise in the jets.
     pub floor: f64,
     /// What to do where the rank is short.
@@ -43,15 +43,15 @@ pub(in crate::flow) fn rounding_floor<T: Real>(rates: &JetRates<f64>) -> f64 {
 /// Estimates one pixel with the model it is shown.
 pub(super) struct PointVisitor<'a> {
     pub rates: &'a JetRates<f64>,
-    pub asked: &'a Asked<'a>,
+    pub request: &'a PointRequest<'a>,
 }
 
 impl ModelVisitor for PointVisitor<'_> {
     type Output = PointEstimate;
 
-    fn visit<M: MotionModel<N, P>, const N: usize, const P: usize>(self) -> PointEstimate {
+    fn run<M: MotionModel<N, P>, const N: usize, const P: usize>(self) -> PointEstimate {
         let (a, b) = M::equations(self.rates);
-        let solution = solve(&a, &b, self.asked.floor);
+        let solution = solve(&a, &b, self.request.floor);
         let mut out = PointEstimate {
             values: [f64::NAN; 6],
             covariance: [[f64::NAN; 6]; 6],
@@ -61,12 +61,12 @@ impl ModelVisitor for PointVisitor<'_> {
             condition: solution.condition,
         };
         let full = solution.rank == P;
-        if full || self.asked.policy == RankPolicy::MinNorm {
+        if full || self.request.policy == RankPolicy::MinNorm {
             out.values[..P].copy_from_slice(&solution.x);
             out.status = if full { Status::Ok } else { Status::MinNorm };
         }
-        if let Some(noise) = self.asked.noise.filter(|_| full) {
-            let covariance = noise.covariance::<M, N, P>(&a, &solution, self.asked.pixel_variance);
+        if let Some(noise) = self.request.noise.filter(|_| full) {
+            let covariance = noise.covariance::<M, N, P>(&a, &solution, self.request.pixel_variance);
             for (to, from) in out.covariance.iter_mut().zip(covariance) {
                 to[..P].copy_from_slice(&from);
             }

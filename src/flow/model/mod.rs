@@ -118,9 +118,9 @@ macro_rules! motion_models {
             }
 
             /// Calls `visitor` with the model's type.
-            pub(super) fn visit<V: ModelVisitor>(self, visitor: V) -> V::Output {
+            pub(super) fn dispatch<V: ModelVisitor>(self, visitor: V) -> V::Output {
                 match self {
-                    $(Self::$model => visitor.visit::<$model, $n, $p>(),)*
+                    $(Self::$model => visitor.run::<$model, $n, $p>(),)*
                 }
             }
         }
@@ -160,12 +160,12 @@ motion_models! {
     accelerating => Accelerating(6, 4);
 }
 
-/// Something done with a model's type, chosen at run time by [`ModelKind::visit`].
+/// Operation on a model type that is chosen at run time by [`ModelKind::dispatch`].
 pub(super) trait ModelVisitor {
     /// What comes of it.
     type Output;
     /// Does it.
-    fn visit<M: MotionModel<N, P>, const N: usize, const P: usize>(self) -> Self::Output;
+    fn run<M: MotionModel<N, P>, const N: usize, const P: usize>(self) -> Self::Output;
 }
 
 impl ModelKind {

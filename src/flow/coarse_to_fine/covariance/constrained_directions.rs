@@ -1,7 +1,7 @@
 //! Constrained directions: where the data determine the motion, and in which directions.
 
-use super::noise::{ALL, NONE, Noise, UnconstrainedDirections};
-use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
+use super::noise::{ALL, NONE, Noise, UnconstrainedDirections, mean_information};
+use crate::flow::coarse_to_fine::data_term::SEEN;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
 use crate::simd::SimdReal;
@@ -39,13 +39,8 @@ impl ConstrainedDirections {
         let node = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
         let directions = |n: usize| {
             let (x, y) = (n % width, n / width);
-            let (columns, rows) = (around_site(x, width), around_site(y, height));
-            let count = (columns.len() * rows.len()) as f64;
-            let mean = |k| {
-                let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
-                rows.clone().map(row).sum::<f64>() / count
-            };
-            noise.unconstrained([UU, UV, VV].map(mean), node(x, width), node(y, height))
+            let information = mean_information(data, around_site(x, width), around_site(y, height));
+            noise.unconstrained(information, node(x, width), node(y, height))
         };
         let sites: Vec<UnconstrainedDirections> =
             (0..width * height).into_par_iter().with_min_len(SITES_PER_TASK).map(directions).collect();

@@ -155,11 +155,16 @@ fn textured_support<T: SimdReal>(
 
 /// Adds the noise density times its share in the flow and in the derivatives along x and y; `factors` for the
 /// flow and for the slopes.
-fn add_noise(node: &mut Entries, left: &noise::RemainingNoise, [flow, slopes]: [f64; 2]) {
-    let factors = [flow * left.flow, slopes * left.slopes[0], slopes * left.slopes[1]];
+fn add_noise(node: &mut Entries, noise: &noise::RemainingNoise, [flow, slopes]: [f64; 2]) {
+    add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
+}
+
+/// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and of its derivatives along x
+/// and y.
+fn add_blocks(node: &mut Entries, factors: [f64; 3], matrix: &[f64; 3]) {
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-            node[upper(2 * block + i, 2 * block + j)] += factor * left.density[k];
+            node[upper(2 * block + i, 2 * block + j)] += factor * matrix[k];
         }
     }
 }
@@ -182,13 +187,9 @@ fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize
 }
 
 /// Adds variances of the flow and of the slopes, in the unconstrained directions.
-fn add_coarse_level_error(node: &mut Entries, inheritance: &coarse_level_error::CoarseLevelError) {
-    let [flow, slopes] = inheritance.variances;
-    for (block, variance) in [flow, slopes, slopes].into_iter().enumerate() {
-        for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-            node[upper(2 * block + i, 2 * block + j)] += variance * inheritance.directions[k];
-        }
-    }
+fn add_coarse_level_error(node: &mut Entries, error: &coarse_level_error::CoarseLevelError) {
+    let [flow, slopes] = error.variances;
+    add_blocks(node, [flow, slopes, slopes], &error.directions);
 }
 
 /// Adds the remaining peak locking.

@@ -25,6 +25,7 @@ use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{SPACING, TERMS, WindowStatistics};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Bounds of the excess; beyond them it does not measure noise.
 const EXCESS_BOUNDS: [f64; 2] = [0.5, 50.0];
@@ -160,14 +161,9 @@ impl<'a, T: SimdReal> Noise<'a, T> {
             let middle = (SPACING * node).min(len - 1);
             middle.saturating_sub(TEXTURE_REACH)..(middle + TEXTURE_REACH + 1).min(len)
         };
-        let (columns, rows) = (around(x, data.width), around(y, data.height));
-        let count = (columns.len() * rows.len()) as f64;
-        let mean = |k| {
-            let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
-            rows.clone().map(row).sum::<f64>() / count
-        };
+        let information = mean_information(data, around(x, data.width), around(y, data.height));
         let energy = self.energy(x, y);
-        let [a, b, c] = inverse_without_noise([UU, UV, VV].map(mean), self.noise_information * energy);
+        let [a, b, c] = inverse_without_noise(information, self.noise_information * energy);
         let best = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
         self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
@@ -225,6 +221,15 @@ fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     let (mean, spread) = (0.5 * (strong + weak), 0.5 * (strong - weak));
     let (cosine, sine) = if radius > 0.0 { (half / radius, b / radius) } else { (1.0, 0.0) };
     [mean + spread * cosine, spread * sine, mean - spread * cosine]
+}
+
+/// Mean information `P_uu, P_uv, P_vv` of the sites in some columns and rows, grey^2/px^2.
+pub(super) fn mean_information<T: SimdReal>(data: &Planes<T>, columns: Range<usize>, rows: Range<usize>) -> [f64; 3] {
+    let count = (columns.len() * rows.len()) as f64;
+    [UU, UV, VV].map(|k| {
+        let row = |y| data.line(k, y)[columns.clone()].iter().map(|value| value.to_f64()).sum::<f64>();
+        rows.clone().map(row).sum::<f64>() / count
+    })
 }
 
 /// Information made positive definite.

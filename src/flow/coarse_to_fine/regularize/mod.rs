@@ -24,6 +24,7 @@ mod tests;
 
 use super::data_term::{ERROR, VALID};
 use super::planes::{LEFT, Planes};
+use crate::math::median;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use smoothness::SmoothnessProblem;
@@ -104,12 +105,7 @@ fn typical_energy<T: SimdReal>(data: &Planes<T>, floor: T, energies: &mut Vec<T>
         let (energy, valid) = (data.line(ERROR, y), data.line(VALID, y));
         energies.extend(energy.iter().zip(valid).filter(|(_, valid)| **valid > zero).map(|(energy, _)| *energy));
     }
-    if energies.is_empty() {
-        return floor;
-    }
-    let middle = energies.len() / 2;
-    let by_size = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal);
-    Lanes::max(*energies.select_nth_unstable_by(middle, by_size).1, floor)
+    median(energies).map_or(floor, |energy| Lanes::max(energy, floor))
 }
 
 /// Copies the flow to `start`, and clears the samples beside the motion's sites, since lanes there compute
