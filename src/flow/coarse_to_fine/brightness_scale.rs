@@ -6,6 +6,9 @@ use crate::types::{Frame, Mask};
 /// Standard deviation that brightness is scaled to, grey levels: about that of 8-bit pictures.
 const TARGET_STD: f64 = 40.0;
 
+/// Minimum standard deviation of a residual, as a share of that of the brightness: smaller ones are rounding
+/// and interpolation.
+pub(super) const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 /// Approximate maximum number of samples used.
 const MAX_SAMPLES: usize = 20_000;
 /// Maximum scaled brightness; beyond it a sample marks missing data.

@@ -2,6 +2,8 @@
 
 use crate::simd::SimdReal;
 
+/// Distance of the sites, px of their level: every second pixel.
+pub(super) const SITE_SPACING: f64 = 2.0;
 /// Unused samples before each row, so that a kernel may read the left neighbour of its first site.
 pub(super) const LEFT: usize = 16;
 /// Row lengths are multiples of this many samples (plus [`LEFT`]), so that no kernel needs a tail.

@@ -11,9 +11,9 @@ use super::data_term::{MOTION, SEEN};
 use super::descent::{DescentPlan, DescentResult};
 use super::peak_locking::PeakLocking;
 use super::plane_pool::PlanePool;
-use super::planes::Planes;
+use super::planes::{Planes, SITE_SPACING};
 use super::pyramid::ComparedFrames;
-use super::refine::{PITCH, RefineOptions, WindowStatistics, refine};
+use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::workspace::Workspace;
 use crate::flow::coarse_to_fine::descent::comparison::Comparison;
 use crate::math::median;
@@ -204,7 +204,7 @@ mod tests {
         let mut planes = Planes::new(20, 15, MOTION);
         for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
             let line = planes.line_mut(k, y);
-            line.iter_mut().enumerate().for_each(|(x, m)| *m = f(k, PITCH * x as f64, PITCH * y as f64));
+            line.iter_mut().enumerate().for_each(|(x, m)| *m = f(k, SITE_SPACING * x as f64, SITE_SPACING * y as f64));
         }
         planes
     }

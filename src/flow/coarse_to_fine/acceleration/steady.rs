@@ -1,9 +1,8 @@
 //! Acceleration in steady flow, whose velocity field is constant in time.
 
-use super::PITCH;
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
-use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::resample::motion_at;
 use crate::parallel::for_each_band;
 use crate::simd::SimdReal;
@@ -55,11 +54,11 @@ pub(super) fn refine_acceleration<T: SimdReal>(
 
 /// One round of [`refine_acceleration`]. Particles that were or will be outside the frame keep their value.
 fn round<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
-    let far = [mean.width, mean.height].map(|sites| PITCH * sites as f64 - 1.0);
+    let far = [mean.width, mean.height].map(|sites| SITE_SPACING * sites as f64 - 1.0);
     let is_inside = |p: [f64; 2]| (0..2).all(|k| (-1.0..=far[k]).contains(&p[k]));
     let mut out = at_sites(space, mean, |x, y| {
         let c = [0, 1].map(|k| acceleration.at(k, x, y).to_f64());
-        let middle = [PITCH * x as f64 + c[0], PITCH * y as f64 + c[1]];
+        let middle = [SITE_SPACING * x as f64 + c[0], SITE_SPACING * y as f64 + c[1]];
         let d = flow_at(mean, middle);
         let ends = [1.0, -1.0].map(|way| [middle[0] + way * d[0], middle[1] + way * d[1]]);
         if !ends.into_iter().all(is_inside) {
@@ -83,7 +82,7 @@ fn round<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Pla
 pub(super) fn next_step<T: SimdReal>(space: &PlanePool<T>, mean: &Planes<T>, acceleration: &Planes<T>) -> Planes<T> {
     at_sites(space, mean, |x, y| {
         let [u, v, u_x, v_x, u_y, v_y]: [f64; MOTION] = std::array::from_fn(|k| acceleration.at(k, x, y).to_f64());
-        let m = motion_at(mean, PITCH, PITCH * x as f64 + u, PITCH * y as f64 + v);
+        let m = motion_at(mean, SITE_SPACING, SITE_SPACING * x as f64 + u, SITE_SPACING * y as f64 + v);
         [
             u + m[0],
             v + m[1],
@@ -117,7 +116,7 @@ fn at_sites<T: SimdReal, const N: usize>(
 
 /// The first two planes at a position, px.
 fn flow_at<T: SimdReal>(planes: &Planes<T>, [x, y]: [f64; 2]) -> [f64; 2] {
-    let [u, v, ..] = motion_at(planes, PITCH, x, y);
+    let [u, v, ..] = motion_at(planes, SITE_SPACING, x, y);
     [u, v]
 }
 
@@ -149,7 +148,7 @@ fn derive<T: SimdReal>(flow: &mut Planes<T>) {
 
 /// Slope over so many sites.
 fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
-    T::from_f64((to.to_f64() - from.to_f64()) / (PITCH * sites.max(1) as f64))
+    T::from_f64((to.to_f64() - from.to_f64()) / (SITE_SPACING * sites.max(1) as f64))
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@
 use super::binomial_mean;
 use super::constrained_directions::ConstrainedDirections;
 use crate::flow::coarse_to_fine::data_term::MOTION;
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;
 use std::f64::consts::FRAC_PI_2;
 
@@ -126,7 +126,7 @@ fn differences<T: SimdReal>(
     constrained: &ConstrainedDirections,
 ) -> Option<[f64; 2]> {
     let (mut sums, mut count) = ([0.0; 2], 0.0);
-    let step = (1 << coarser).max(SPACING);
+    let step = (1 << coarser).max(SITES_PER_NODE);
     let every = |len: usize| (0..len).step_by(step);
     for (x, y) in every(motion.height).flat_map(|y| every(motion.width).map(move |x| (x, y))) {
         if !constrained.is_reference(x, y) {
@@ -146,8 +146,9 @@ fn differences<T: SimdReal>(
 fn squared_rise(values: &[f64], (width, height): (usize, usize), n: usize) -> f64 {
     let (x, y) = (n % width, n / width);
     let both = |before: Option<usize>, after: Option<usize>| {
-        let rise =
-            |to: Option<usize>| to.map_or(0.0, |to| ((values[to] - values[n]) / (PITCH * SPACING as f64)).powi(2));
+        let rise = |to: Option<usize>| {
+            to.map_or(0.0, |to| ((values[to] - values[n]) / (SITE_SPACING * SITES_PER_NODE as f64)).powi(2))
+        };
         0.5 * (rise(before) + rise(after))
     };
     let along = both((x > 0).then(|| n - 1), (x + 1 < width).then_some(n + 1));
@@ -166,7 +167,7 @@ mod tests {
         let constrained = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
         let sites: Vec<UnconstrainedDirections> =
             (0..side * side).map(|n| if constrained(n) { NONE } else { ALL }).collect();
-        let nodes = side.div_ceil(SPACING);
+        let nodes = side.div_ceil(SITES_PER_NODE);
         (ConstrainedDirections::with((side, &sites), (nodes, nodes), |_| true), nodes)
     }
 
@@ -235,7 +236,7 @@ mod tests {
         let sites = |here: UnconstrainedDirections| -> Vec<UnconstrainedDirections> {
             (0..side * side).map(|n| if (24..73).contains(&(n % side)) { here } else { NONE }).collect()
         };
-        let nodes = side.div_ceil(SPACING);
+        let nodes = side.div_ceil(SITES_PER_NODE);
         let found = |sites: &[UnconstrainedDirections]| {
             CoarseLevelErrors::new(
                 &constant(side, 1.0, 0.0),

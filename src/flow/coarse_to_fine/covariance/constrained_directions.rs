@@ -1,17 +1,15 @@
 //! Constrained directions: where the data determine the motion, and in which directions.
 
 use super::noise::{ALL, NONE, Noise, UnconstrainedDirections, mean_information};
-use crate::flow::coarse_to_fine::data_term::SEEN;
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
+use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
 /// Minimum share of constrained sites from which the errors of coarse levels are measured.
 const MIN_CONSTRAINED_SHARE: f64 = 0.02;
-/// Minimum usable share of a window.
-const MIN_USABLE_SHARE: f64 = 0.1;
 /// Reach, sites, of the mean of the information.
 const INFORMATION_REACH: usize = 1;
 /// Sites of a parallel task.
@@ -36,7 +34,9 @@ impl ConstrainedDirections {
         let (width, height) = (data.width, data.height);
         let around_site =
             |at: usize, len: usize| at.saturating_sub(INFORMATION_REACH)..(at + INFORMATION_REACH + 1).min(len);
-        let node = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count.div_ceil(SPACING) - 1);
+        let node = |site: usize, count: usize| {
+            ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count.div_ceil(SITES_PER_NODE) - 1)
+        };
         let directions = |n: usize| {
             let (x, y) = (n % width, n / width);
             let information = mean_information(data, around_site(x, width), around_site(y, height));
@@ -101,8 +101,8 @@ impl ConstrainedDirections {
         let (width, height) = (self.width, self.distances.len() / self.width);
         // The last nodes are at the last sites.
         let around_site = |node: usize, len: usize| {
-            let middle = (SPACING * node).min(len - 1);
-            middle.saturating_sub(SPACING / 2)..(middle + SPACING / 2 + 1).min(len)
+            let middle = (SITES_PER_NODE * node).min(len - 1);
+            middle.saturating_sub(SITES_PER_NODE / 2)..(middle + SITES_PER_NODE / 2 + 1).min(len)
         };
         let columns = around_site(x, width);
         around_site(y, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
@@ -114,7 +114,7 @@ fn distances(width: usize, constrained: &[bool]) -> Vec<f64> {
     let mut out: Vec<f64> =
         constrained.iter().map(|constrained| if *constrained { 0.0 } else { f64::INFINITY }).collect();
     let sites = out.len();
-    let (straight, diagonal) = (PITCH, PITCH * SQRT_2);
+    let (straight, diagonal) = (SITE_SPACING, SITE_SPACING * SQRT_2);
     // Once from above, and once reversed from below.
     for _ in 0..2 {
         for n in 0..sites {
@@ -148,7 +148,7 @@ mod tests {
         let constrained: Vec<bool> = (0..12).map(|n| n == 0 || n == 11).collect();
         let want = [0.0, 1.0, 2.0, 2.0, 1.0, SQRT_2, SQRT_2, 1.0, 2.0, 2.0, 1.0, 0.0];
         let got = distances(4, &constrained);
-        assert!(got.iter().zip(want).all(|(got, want)| (got - PITCH * want).abs() < 1e-12), "{got:?}");
+        assert!(got.iter().zip(want).all(|(got, want)| (got - SITE_SPACING * want).abs() < 1e-12), "{got:?}");
     }
 
     #[test]
@@ -159,7 +159,7 @@ mod tests {
             (0..side * side).map(|n| if n % side < 7 { NONE } else { along }).collect();
         let constrained = ConstrainedDirections::with((side, &sites), (3, 3), |_| true);
         assert_eq!([0, 1, 2].map(|node| constrained.directions(node)), [[0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
-        assert_eq!([0, 1, 2].map(|node| constrained.distance(node, 0)), [0.0, 0.0, 2.0 * PITCH]);
+        assert_eq!([0, 1, 2].map(|node| constrained.distance(node, 0)), [0.0, 0.0, 2.0 * SITE_SPACING]);
         // No site is fully constrained; one direction is known to be unconstrained.
         let half: Vec<UnconstrainedDirections> =
             (0..side * side).map(|n| if n % side < 4 { across } else { ALL }).collect();

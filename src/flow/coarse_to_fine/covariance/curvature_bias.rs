@@ -10,8 +10,9 @@
 //! as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
 use super::{Entries, binomial_mean};
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, TERMS, WindowStatistics};
+use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
@@ -28,8 +29,6 @@ const MIN_CHOSEN_SIGMA: f64 = 3.5;
 const ISOTROPIC_SHARE: f64 = 0.2;
 /// Nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
-/// Planes of the motion.
-const MOTION: usize = 6;
 /// The motion or its loss at a node.
 type Loss = [f64; MOTION];
 
@@ -74,16 +73,16 @@ fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
 
 /// The motion at a node.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize)) -> Loss {
-    let (x, y) = ((SPACING * x).min(motion.width - 1), (SPACING * y).min(motion.height - 1));
+    let (x, y) = ((SITES_PER_NODE * x).min(motion.width - 1), (SITES_PER_NODE * y).min(motion.height - 1));
     std::array::from_fn(|k| motion.at(k, x, y).to_f64())
 }
 
 /// `(1 - G)^2` of the motion at the nodes, G of [`FIXED_SIGMA`] px.
 fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
     // G and G G.
-    let kernels = [FIXED_SIGMA / PITCH, FIXED_SIGMA / PITCH * SQRT_2];
-    let along = kernels.map(|s| gaussians(s, (width, SPACING), motion.width));
-    let across = kernels.map(|s| gaussians(s, (height, SPACING), motion.height));
+    let kernels = [FIXED_SIGMA / SITE_SPACING, FIXED_SIGMA / SITE_SPACING * SQRT_2];
+    let along = kernels.map(|s| gaussians(s, (width, SITES_PER_NODE), motion.width));
+    let across = kernels.map(|s| gaussians(s, (height, SITES_PER_NODE), motion.height));
     let rows: Vec<Vec<Loss>> = (0..height)
         .into_par_iter()
         .map(|y| {
@@ -122,7 +121,8 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
         }
         let mut left = whole.clone();
         for _ in TERMS {
-            let smooth = smoothed(&left, (width, height), CHOSEN_SIGMA_FACTOR * sigma / (PITCH * SPACING as f64));
+            let smooth =
+                smoothed(&left, (width, height), CHOSEN_SIGMA_FACTOR * sigma / (SITE_SPACING * SITES_PER_NODE as f64));
             for (left, smooth) in left.iter_mut().zip(smooth) {
                 (0..MOTION).for_each(|k| left[k] -= smooth[k]);
             }
@@ -190,17 +190,17 @@ mod tests {
         let mut motion = Planes::<f64>::new(width, height, MOTION);
         for y in 0..height {
             for x in 0..width {
-                let (px, py) = (PITCH * x as f64, PITCH * y as f64);
+                let (px, py) = (SITE_SPACING * x as f64, SITE_SPACING * y as f64);
                 motion.line_mut(0, y)[x] = 3.0 + 0.02 * px - 0.01 * py;
                 motion.line_mut(1, y)[x] = (k * px).cos();
             }
         }
-        let size = (width.div_ceil(SPACING), height.div_ceil(SPACING));
+        let size = (width.div_ceil(SITES_PER_NODE), height.div_ceil(SITES_PER_NODE));
         let lost = lost(&motion, size);
         assert!(lost.iter().all(|l| l[0].abs() < 1e-12));
         let g = (-0.5 * (k * FIXED_SIGMA).powi(2)).exp();
         for x in 8..size.0 - 8 {
-            let want = (1.0 - g).powi(2) * (k * PITCH * (SPACING * x) as f64).cos();
+            let want = (1.0 - g).powi(2) * (k * SITE_SPACING * (SITES_PER_NODE * x) as f64).cos();
             assert!((lost[15 * size.0 + x][1] - want).abs() < 0.01);
         }
     }

@@ -4,13 +4,10 @@
 //! usable sites. Windows are truncated at that edge, not at the frame's. Untextured areas are extrapolated in
 //! the same way.
 
-use crate::flow::coarse_to_fine::data_term::SEEN;
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
+use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;
-
-/// Minimum usable share of a window; sites along the frame's edge have more.
-const MIN_USABLE_SHARE: f64 = 0.1;
 
 /// Positions of the nodes in the usable area.
 pub(super) struct DataSupport {
@@ -39,7 +36,7 @@ impl DataSupport {
     /// The same, counting only sites whose nearest node has texture (`textured`, row by row): elsewhere
     /// motion is extrapolated as well.
     pub fn textured<T: SimdReal>(data: &Planes<T>, size: (usize, usize), textured: &[bool]) -> Self {
-        let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
+        let nearest = |site: usize, count: usize| ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count - 1);
         Self::with(data, size, |x, y| textured[nearest(y, size.1) * size.0 + nearest(x, size.0)])
     }
 
@@ -100,17 +97,17 @@ impl Axis {
         let any: Vec<bool> = (0..sites[1]).map(|line| (0..sites[0]).any(|at| is_usable(at, line))).collect();
         let (mut distances, mut own, mut ends) = (Vec::with_capacity(nodes[0] * nodes[1]), Vec::new(), Vec::new());
         for n in 0..nodes[1] {
-            let line = (SPACING * n).min(sites[1] - 1);
+            let line = (SITES_PER_NODE * n).min(sites[1] - 1);
             let nearest = (0..sites[1]).filter(|l| any[*l]).min_by_key(|l| l.abs_diff(line));
             own.push(any[line]);
             if let Some(line) = nearest {
                 let row: Vec<bool> = (0..sites[0]).map(|at| is_usable(at, line)).collect();
                 let all = signed(&row);
-                distances.extend((0..nodes[0]).map(|n| PITCH * all[(SPACING * n).min(sites[0] - 1)]));
+                distances.extend((0..nodes[0]).map(|n| SITE_SPACING * all[(SITES_PER_NODE * n).min(sites[0] - 1)]));
                 let first = row.iter().position(|is_usable| *is_usable).unwrap_or(0);
                 ends.push([first, row.iter().rposition(|is_usable| *is_usable).unwrap_or(first)]);
             } else {
-                distances.extend((0..nodes[0]).map(|_| -PITCH * sites[0] as f64));
+                distances.extend((0..nodes[0]).map(|_| -SITE_SPACING * sites[0] as f64));
                 ends.push([0, sites[0] - 1]);
             }
         }
@@ -119,9 +116,9 @@ impl Axis {
 
     fn edge(&self, at: usize, line: usize) -> Edge {
         let (last, [first_seen, last_seen]) = (self.sites - 1, self.ends[line]);
-        let at = (SPACING * at).min(last);
+        let at = (SITES_PER_NODE * at).min(last);
         let (near, strip) = if at <= last - at { (at, first_seen) } else { (last - at, last - last_seen) };
-        Edge { distance: PITCH * near as f64, strip: PITCH * strip as f64 }
+        Edge { distance: SITE_SPACING * near as f64, strip: SITE_SPACING * strip as f64 }
     }
 
     fn distance(&self, at: usize, line: usize) -> f64 {

@@ -7,8 +7,8 @@
 
 use super::data_support::DataSupport;
 use super::{Entries, curvature_bias};
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, WindowStatistics};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, WindowStatistics};
 use crate::flow::symmetric::upper;
 use crate::simd::SimdReal;
 use std::f64::consts::FRAC_PI_2;
@@ -55,7 +55,7 @@ impl Extrapolation {
                 let across = (y + step + 1 < height).then(|| (nodes[at + step * width], 4));
                 for (there, slope) in along.into_iter().chain(across) {
                     let Some(there) = there else { continue };
-                    let distance = PITCH * (SPACING * step) as f64;
+                    let distance = SITE_SPACING * (SITES_PER_NODE * step) as f64;
                     for k in 0..2 {
                         // Forward and backward, so that neither end is preferred.
                         let turn = there[k] - here[k];
@@ -92,7 +92,7 @@ impl Extrapolation {
     fn variance(&self, kind: usize, distance: f64) -> f64 {
         let (mut from, mut below) = (0.0, 0.0);
         for (step, variances) in STEPS.into_iter().zip(&self.variances) {
-            let to = PITCH * (SPACING * step) as f64;
+            let to = SITE_SPACING * (SITES_PER_NODE * step) as f64;
             if distance < to {
                 let share = (distance * distance - from * from) / (to * to - from * from);
                 return below + share * (variances[kind] - below);

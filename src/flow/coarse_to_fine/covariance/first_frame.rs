@@ -5,8 +5,8 @@
 
 use super::Entries;
 use super::map::NodeAxis;
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
@@ -23,8 +23,8 @@ pub(super) fn to_first_frame<T: SimdReal>(
         .map(|n| {
             let (x, y) = (n % axes.0.count, n / axes.0.count);
             let m = super::curvature_bias::motion_at(motion, (x, y));
-            let node = |n: usize, last: usize| (SPACING * n).min(last) as f64 / SPACING as f64;
-            let half_way = 0.5 / (PITCH * SPACING as f64);
+            let node = |n: usize, last: usize| (SITES_PER_NODE * n).min(last) as f64 / SITES_PER_NODE as f64;
+            let half_way = 0.5 / (SITE_SPACING * SITES_PER_NODE as f64);
             let there = blend(nodes, axes, node(x, last.0) + half_way * m[0], node(y, last.1) + half_way * m[1]);
             inverse_half_step(&m).map_or(there, |inverse| transformed(&there, &inverse))
         })

@@ -1,13 +1,13 @@
 //! Covariance at pixels, interpolated from the nodes.
 
 use super::Entries;
-use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{PITCH, SPACING, node_count};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, node_count};
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 
 /// Distance of the nodes, pixels of the estimate's level.
-const NODE_SPACING: usize = SPACING * PITCH as usize;
+const NODE_SPACING: usize = SITES_PER_NODE * SITE_SPACING as usize;
 
 /// The nodes along one axis, at equal distances except the last two: the last one is at the last site.
 #[derive(Debug, Default, Clone, Copy)]
@@ -20,7 +20,7 @@ pub(super) struct NodeAxis {
 impl NodeAxis {
     /// For so many sites.
     pub fn of(sites: usize) -> Self {
-        Self { count: node_count(sites), end: (sites - 1) as f64 / SPACING as f64 }
+        Self { count: node_count(sites), end: (sites - 1) as f64 / SITES_PER_NODE as f64 }
     }
 
     /// The nodes around a coordinate and the weight of the second; beyond the last, that one alone.

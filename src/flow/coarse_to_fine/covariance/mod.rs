@@ -32,8 +32,14 @@ use super::peak_locking::PeakLocking;
 use super::planes::Planes;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
+use coarse_level_error::{CoarseLevelError, CoarseLevelErrors};
+use constrained_directions::ConstrainedDirections;
+use data_support::DataSupport;
+use extrapolation::Extrapolation;
 pub(super) use map::CovarianceMap;
+use map::NodeAxis;
 pub(super) use noise::Energy;
+use noise::{Noise, RemainingNoise};
 use rayon::prelude::*;
 
 /// Variance of the flow over that of white noise of the density seen between windows: real noise is not white
@@ -86,20 +92,19 @@ pub(super) fn covariance<T: SimdReal>(
 ) -> CovarianceMaps<T> {
     let Some(statistics) = &estimate.statistics else { return CovarianceMaps::default() };
     let (width, height) = statistics.size();
-    let axes = (map::NodeAxis::of(estimate.motion.width), map::NodeAxis::of(estimate.motion.height));
-    let support = data_support::DataSupport::new(&estimate.data, (width, height));
+    let axes = (NodeAxis::of(estimate.motion.width), NodeAxis::of(estimate.motion.height));
+    let support = DataSupport::new(&estimate.data, (width, height));
     let data = (&estimate.data, &support);
-    let noise = noise::Noise::new(statistics, data, energy, is_pair);
+    let noise = Noise::new(statistics, data, energy, is_pair);
     let textured_support = textured_support(&noise, &estimate.data, (width, height));
     let textured_support = textured_support.as_ref().unwrap_or(&support);
-    let extrapolation = extrapolation::Extrapolation::new(&estimate.motion, statistics, textured_support);
-    let constrained = constrained_directions::ConstrainedDirections::new(&estimate.data, &noise, (width, height));
-    let coarse_errors =
-        coarse_level_error::CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained);
+    let extrapolation = Extrapolation::new(&estimate.motion, statistics, textured_support);
+    let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
+    let coarse_errors = CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained);
     let coarse_errors = coarse_errors.at_nodes((width, height));
     let change = estimate.acceleration.as_ref();
     let change = change.map(|statistics| {
-        noise::Noise::new(statistics, data, energy.times(NEXT_FRAME_ENERGY), true).at_least_as_noisy_as(&noise)
+        Noise::new(statistics, data, energy.times(NEXT_FRAME_ENERGY), true).at_least_as_noisy_as(&noise)
     });
     let kind = usize::from(!is_pair);
     let mut nodes = curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]);
@@ -141,21 +146,17 @@ pub(super) fn covariance<T: SimdReal>(
 }
 
 /// Support of sites with data and texture, if smaller than that of sites with data but not negligible.
-fn textured_support<T: SimdReal>(
-    noise: &noise::Noise<'_, T>,
-    data: &Planes<T>,
-    size: (usize, usize),
-) -> Option<data_support::DataSupport> {
+fn textured_support<T: SimdReal>(noise: &Noise<'_, T>, data: &Planes<T>, size: (usize, usize)) -> Option<DataSupport> {
     let nodes = (0..size.0 * size.1).into_par_iter();
     let textured: Vec<bool> = nodes.map(|n| noise.is_textured(data, n % size.0, n / size.0)).collect();
     let count = textured.iter().filter(|textured| **textured).count();
     let tells = count < textured.len() && count as f64 >= MIN_TEXTURED_SHARE * textured.len() as f64;
-    tells.then(|| data_support::DataSupport::textured(data, size, &textured))
+    tells.then(|| DataSupport::textured(data, size, &textured))
 }
 
 /// Adds the noise density times its share in the flow and in the derivatives along x and y; `factors` for the
 /// flow and for the slopes.
-fn add_noise(node: &mut Entries, noise: &noise::RemainingNoise, [flow, slopes]: [f64; 2]) {
+fn add_noise(node: &mut Entries, noise: &RemainingNoise, [flow, slopes]: [f64; 2]) {
     add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
 }
 
@@ -187,7 +188,7 @@ fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize
 }
 
 /// Adds variances of the flow and of the slopes, in the unconstrained directions.
-fn add_coarse_level_error(node: &mut Entries, error: &coarse_level_error::CoarseLevelError) {
+fn add_coarse_level_error(node: &mut Entries, error: &CoarseLevelError) {
     let [flow, slopes] = error.variances;
     add_blocks(node, [flow, slopes, slopes], &error.directions);
 }
@@ -218,7 +219,7 @@ mod tests {
 
     #[test]
     fn noise_fills_the_blocks_of_flow_and_slopes() {
-        let left = noise::RemainingNoise { density: [2.0, -0.5, 1.0], flow: 0.1, slopes: [0.01, 0.03] };
+        let left = RemainingNoise { density: [2.0, -0.5, 1.0], flow: 0.1, slopes: [0.01, 0.03] };
         let mut node = [0.0; ENTRIES];
         add_noise(&mut node, &left, [FLOW_NOISE_FACTOR[0], SLOPE_NOISE_FACTOR]);
         assert!((node[upper(0, 1)] + FLOW_NOISE_FACTOR[0] * 0.05).abs() < 1e-15);

@@ -22,7 +22,7 @@
 use super::data_support::{DataSupport, Edge};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
 use crate::flow::coarse_to_fine::planes::Planes;
-use crate::flow::coarse_to_fine::refine::{SPACING, TERMS, WindowStatistics};
+use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -158,7 +158,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     /// is determined there.
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
         let around = |node: usize, len: usize| {
-            let middle = (SPACING * node).min(len - 1);
+            let middle = (SITES_PER_NODE * node).min(len - 1);
             middle.saturating_sub(TEXTURE_REACH)..(middle + TEXTURE_REACH + 1).min(len)
         };
         let information = mean_information(data, around(x, data.width), around(y, data.height));
@@ -251,7 +251,8 @@ fn excess<T: SimdReal>(statistics: &WindowStatistics<T>, data: &Planes<T>) -> f6
         }
         let [a, b, c] = positive_definite(statistics.information(x, y));
         let density = statistics.energy(x, y) * (a + c) / (a * c - b * b);
-        let valid = data.at(SEEN, (SPACING * x).min(data.width - 1), (SPACING * y).min(data.height - 1)).to_f64();
+        let valid =
+            data.at(SEEN, (SITES_PER_NODE * x).min(data.width - 1), (SITES_PER_NODE * y).min(data.height - 1)).to_f64();
         if valid > 0.5 && weights > MIN_WIDE_WEIGHT && density > 0.0 && changes > 0.0 {
             sum += (changes / (weights * density)).ln();
             count += 1.0;

@@ -50,6 +50,8 @@ fn band_rows(height: usize) -> usize {
     height.div_ceil(if bands > 1 { bands.next_multiple_of(2) } else { bands })
 }
 
+/// Minimum usable share of a site's window: somewhat less than in a corner of the frame.
+pub(super) const MIN_USABLE_SHARE: f64 = 0.1;
 /// Planes of the given motion: `u, v, u_x, v_x, u_y, v_y`.
 pub(super) const MOTION: usize = 6;
 

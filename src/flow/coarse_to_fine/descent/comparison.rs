@@ -1,6 +1,8 @@
 //! Compares two motions between the same frames; each site takes the one with less residual energy.
 
-use crate::flow::coarse_to_fine::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, Pool, VALID};
+use crate::flow::coarse_to_fine::data_term::{
+    COUNT, DataOptions, DataTerm, ERROR, MIN_USABLE_SHARE, MOTION, Pool, VALID,
+};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
@@ -9,8 +11,6 @@ use crate::simd::{Level, SimdReal};
 
 /// Minimum ratio of residual energies, the typical energy added to both: smaller differences are chance.
 const MIN_ENERGY_RATIO: f64 = 1.1;
-/// Minimum usable share of a window, somewhat less than in a corner of the frame.
-const MIN_USABLE_SHARE: f64 = 0.1;
 
 /// Frames and scales by which motions are compared.
 pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {

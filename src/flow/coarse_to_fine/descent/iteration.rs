@@ -2,6 +2,7 @@
 
 use super::DescentPlan;
 use super::comparison::Comparison;
+use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
@@ -14,8 +15,6 @@ use std::ops::Range;
 
 /// Minimum standard deviation of the noise, as a share of that of the brightness.
 const MIN_NOISE_SHARE: f64 = 1e-3;
-/// Minimum scale of the robust weights, as a share of the standard deviation of the brightness.
-const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 
 /// Distance, px of the level, beyond which a site has not converged.
 const MIN_MOVING_DISTANCE: f64 = 0.1;

@@ -1,5 +1,6 @@
 //! Sites where the frames contradict the motion.
 
+use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataOptions, ENERGY, UU, VV};
 use crate::flow::coarse_to_fine::estimate::Estimate;
 use crate::flow::coarse_to_fine::planes::Planes;
@@ -17,8 +18,6 @@ const MAX_ENERGY_RATIO: f64 = 10.0;
 /// Residual energy over information, px^2, that interpolation may cause: with strong texture its errors are
 /// large, and a residual explained by a shift of 0.1 px is no contradiction.
 const MAX_EXPLAINED_SHIFT_SQUARE: f64 = 0.01;
-/// Minimum residual, as a share of the standard deviation of the brightness.
-const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 
 /// Residual energy over information, px^2, beyond which the frames are unrelated, however common that is; and
 /// the minimum residual for it, as a share of the standard deviation of the brightness, since noise without

@@ -6,8 +6,8 @@ use super::covariance::{CovarianceMap, CovarianceMaps, Energy, covariance};
 use super::data_term::{DataOptions, ENERGY, MOTION, UU, UV, VV};
 use super::estimate::Estimate;
 use super::plane_pool::PlanePool;
-use super::planes::Planes;
-use super::refine::{SPACING, WindowStatistics};
+use super::planes::{Planes, SITE_SPACING};
+use super::refine::{SITES_PER_NODE, WindowStatistics};
 use super::resample::{finer, motion_at};
 use crate::flow::coarse_to_fine::resample::first_frame::at_first_frame;
 use crate::flow::coarse_to_fine::resample::rows::RowReader;
@@ -19,9 +19,6 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
 use rayon::prelude::*;
-
-/// Distance of the sites, px.
-const SITE_SPACING: f64 = 2.0;
 
 /// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
 fn rows() -> f64 {
@@ -193,7 +190,7 @@ impl<T: SimdReal> Writer<'_, T> {
 
     /// Window of the slopes, px of the frame, at the nearest node of the window statistics.
     fn window_at(&self, statistics: &WindowStatistics<T>, (x, y): (usize, usize)) -> T {
-        let nearest = |site: usize, count: usize| ((site + SPACING / 2) / SPACING).min(count - 1);
+        let nearest = |site: usize, count: usize| ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count - 1);
         let (columns, rows) = statistics.size();
         let [_, slopes] = statistics.mean_sigmas(nearest(x, columns), nearest(y, rows));
         T::from_f64(slopes * self.pitch as f64 / SITE_SPACING)

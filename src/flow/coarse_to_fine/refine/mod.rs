@@ -36,7 +36,7 @@ mod upsample;
 mod window_statistics;
 
 use super::plane_pool::PlanePool;
-use super::planes::{LEFT, Planes};
+use super::planes::{LEFT, Planes, SITE_SPACING};
 use crate::simd::{Level, SimdReal};
 use extended::Field;
 use fit::{FIT, FLOW};
@@ -45,17 +45,14 @@ pub(super) use ladder::TERMS;
 pub(super) use options::RefineOptions;
 use rayon::prelude::*;
 use regional_means::Fitted;
-pub(super) use window_statistics::{SPACING, WindowStatistics, node_count};
-
-/// Distance of the sites, px.
-pub(super) const PITCH: f64 = 2.0;
+pub(super) use window_statistics::{SITES_PER_NODE, WindowStatistics, node_count};
 
 /// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the
 /// last plane is the noise density `a`, px^4.
 #[cfg(test)]
 pub(super) const SIGMA: usize = 6;
 
-/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`PITCH`] px apart; the slopes are not used), given
+/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`SITE_SPACING`] px apart; the slopes are not used), given
 /// the summary of the last data term.
 ///
 /// Returns eight planes: the motion, the mean sigma, the noise density of the given flow (its variance times
@@ -71,7 +68,7 @@ pub(super) fn refine<T: SimdReal>(
     if motion.width == 0 || motion.height == 0 || options.ladder.is_empty() {
         return (Planes::new(motion.width, motion.height, finish::RESULT), None);
     }
-    let ladder = Ladder::new(options.ladder, PITCH);
+    let ladder = Ladder::new(options.ladder, SITE_SPACING);
     let base = mean_motion(motion);
     let grids = grids(simd, space, &ladder, motion, &base);
     let scales = ladder.scales.par_iter();
@@ -109,13 +106,13 @@ pub(super) fn refine<T: SimdReal>(
                 let finer = upsample::grow(simd, space, &fits[window.index], FIT, &grids[octave]);
                 Field::keep(space, [std::mem::replace(&mut fits[window.index], finer)]);
             }
-            let edge_fits = edge_fits::Edges::new(window, scale.sigma, PITCH, &fits[window.index]);
+            let edge_fits = edge_fits::Edges::new(window, scale.sigma, SITE_SPACING, &fits[window.index]);
             finish::add(simd, &inputs, &edge_fits, &mut sums);
             Field::keep(space, fits[window.index].take());
         }
         sums
     });
-    let out = finish::finish(simd, space, &inputs, sums.as_ref(), (&base, PITCH));
+    let out = finish::finish(simd, space, &inputs, sums.as_ref(), (&base, SITE_SPACING));
     if let Some(sums) = sums {
         space.keep(sums);
     }
@@ -136,7 +133,7 @@ fn grids<T: SimdReal>(
         for y in 0..motion.height {
             let start = finest.start(k, y as isize) + LEFT;
             let target = &mut finest.data_mut()[start..start + motion.width];
-            let (first, slope) = (base[k] + base[4 + k] * PITCH * y as f64, base[2 + k] * PITCH);
+            let (first, slope) = (base[k] + base[4 + k] * SITE_SPACING * y as f64, base[2 + k] * SITE_SPACING);
             let (first, slope) = (T::from_f64(first), T::from_f64(slope));
             for (x, (t, m)) in target.iter_mut().zip(motion.line(k, y)).enumerate() {
                 *t = *m - (first + slope * T::from_f64(x as f64));
@@ -180,8 +177,8 @@ fn mean_motion<T: SimdReal>(motion: &Planes<T>) -> [f64; 6] {
         let spread = |n: f64, other: f64| (other * n * (n * n - 1.0) / 12.0).max(f64::MIN_POSITIVE);
         let slope_x = sums[1] / spread(width, height);
         let slope_y = sums[2] / spread(height, width);
-        base[2 + k] = slope_x / PITCH;
-        base[4 + k] = slope_y / PITCH;
+        base[2 + k] = slope_x / SITE_SPACING;
+        base[4 + k] = slope_y / SITE_SPACING;
         base[k] = sums[0] / (width * height) - slope_x * middle_x - slope_y * middle_y;
     }
     base

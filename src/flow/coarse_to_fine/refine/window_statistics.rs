@@ -6,8 +6,8 @@ use super::regional_means::Layout;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::SimdReal;
 
-/// Distance of the nodes, sites.
-pub(in crate::flow::coarse_to_fine) const SPACING: usize = 1 << MAX_OCTAVE;
+/// Sites from one node of the statistics to the next.
+pub(in crate::flow::coarse_to_fine) const SITES_PER_NODE: usize = 1 << MAX_OCTAVE;
 
 /// Regional means and weights of windows at nodes, every fourth site.
 #[derive(Debug)]
@@ -36,7 +36,8 @@ impl<T: SimdReal> WindowStatistics<T> {
         [self.means, self.choice]
     }
 
-    /// Nodes along x and y, [`SPACING`] sites apart; the last ones are at the last sites and may be nearer.
+    /// Nodes along x and y, [`SITES_PER_NODE`] sites apart; the last ones are at the last
+    /// sites and may be nearer.
     pub fn size(&self) -> (usize, usize) {
         (node_count(self.sites.0), node_count(self.sites.1))
     }
@@ -72,7 +73,7 @@ impl<T: SimdReal> WindowStatistics<T> {
 
 /// Number of nodes along so many sites.
 pub(in crate::flow::coarse_to_fine) fn node_count(sites: usize) -> usize {
-    (sites - 1).div_ceil(SPACING) + 1
+    (sites - 1).div_ceil(SITES_PER_NODE) + 1
 }
 
 /// Value at a node; beyond the grid of regional means its last value.

@@ -2,14 +2,12 @@
 
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
-use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::flow::coarse_to_fine::planes::{LEFT, Planes, SITE_SPACING};
 use crate::math::Real;
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Distance of the sites, px.
-const SITE_SPACING: f64 = 2.0;
 /// Maximum number of lanes of a vector.
 const MAX_LANES: usize = 16;
 /// Minimum determinant of `I - M / 2`; below it the motion folds the image.

@@ -26,7 +26,7 @@ pub(super) fn field<T: SimdReal>(width: usize, height: usize, f: impl Fn(usize, 
     for k in 0..2 {
         for y in 0..height {
             for (x, value) in m.line_mut(k, y).iter_mut().enumerate() {
-                *value = T::from_f64(f(k, PITCH * x as f64, PITCH * y as f64));
+                *value = T::from_f64(f(k, SITE_SPACING * x as f64, SITE_SPACING * y as f64));
             }
         }
     }
@@ -51,7 +51,7 @@ pub(super) fn statistics<T: SimdReal>(width: usize, height: usize, density: f64)
 
 /// Density of white noise of standard deviation `deviation` at each site.
 fn density(deviation: f64) -> f64 {
-    (deviation * PITCH).powi(2)
+    (deviation * SITE_SPACING).powi(2)
 }
 
 fn refined<T: SimdReal>(motion: &Planes<T>, data: &Planes<T>) -> Planes<T> {
@@ -69,7 +69,7 @@ fn rms<T: SimdReal>(
     for k in planes {
         for y in 0..m.height {
             for x in (0..m.width).filter(|x| keep(*x, y)) {
-                sum += (m.at(k, x, y).to_f64() - f(k, PITCH * x as f64, PITCH * y as f64)).powi(2);
+                sum += (m.at(k, x, y).to_f64() - f(k, SITE_SPACING * x as f64, SITE_SPACING * y as f64)).powi(2);
                 n += 1.0;
             }
         }
@@ -116,8 +116,9 @@ fn noise_on_smooth_motion_falls_and_wide_windows_are_chosen() {
             _ => 0.0,
         }
     };
-    let motion =
-        field::<f32>(120, 90, |k, x, y| truth(k, x, y) + 0.1 * white((x / PITCH) as usize, (y / PITCH) as usize, k));
+    let motion = field::<f32>(120, 90, |k, x, y| {
+        truth(k, x, y) + 0.1 * white((x / SITE_SPACING) as usize, (y / SITE_SPACING) as usize, k)
+    });
     let got = refined(&motion, &statistics(120, 90, density(0.1)));
     let (before, after) = (rms(&motion, 0..2, |_, _| true, truth), rms(&got, 0..2, |_, _| true, truth));
     assert!(after < before / 5.0, "{before} {after}");
@@ -130,7 +131,7 @@ fn fine_waves_stay() {
     // Seven hundredths have been lost to the windows of the data: 1 px^2 times the square of the wave number.
     let wave = |k: usize, x: f64, y: f64| (2.0 * PI / 24.0 * if k == 0 { y + 0.2 * x } else { x - 0.3 * y }).sin();
     let motion = field::<f32>(100, 80, |k, x, y| {
-        0.93 * wave(k, x, y) + 0.02 * white((x / PITCH) as usize, (y / PITCH) as usize, k)
+        0.93 * wave(k, x, y) + 0.02 * white((x / SITE_SPACING) as usize, (y / SITE_SPACING) as usize, k)
     });
     let got = refined(&motion, &statistics(100, 80, density(0.02)));
     let error = rms(&got, 0..2, |_, _| true, wave);
@@ -145,11 +146,12 @@ fn motion_boundaries_stay_sharp() {
         let m = if side(x, y) { right } else { left };
         if k < 2 { m[k] + m[2 + k] * (x - 100.0) + m[4 + k] * (y - 75.0) } else { m[k] }
     };
-    let motion =
-        field::<f32>(100, 75, |k, x, y| truth(k, x, y) + 0.03 * white((x / PITCH) as usize, (y / PITCH) as usize, k));
+    let motion = field::<f32>(100, 75, |k, x, y| {
+        truth(k, x, y) + 0.03 * white((x / SITE_SPACING) as usize, (y / SITE_SPACING) as usize, k)
+    });
     let data = statistics(100, 75, density(0.03));
     let near = |x: usize, y: usize| {
-        let (x, y) = (PITCH * x as f64, PITCH * y as f64);
+        let (x, y) = (SITE_SPACING * x as f64, SITE_SPACING * y as f64);
         let distance = (0.9 * (x - 100.3) + 0.3 * (y - 75.2)) / 0.9f64.hypot(0.3);
         (2.0..16.0).contains(&distance.abs()) && (10.0..140.0).contains(&y)
     };
@@ -210,7 +212,7 @@ fn nothing_comes_of_nothing_and_missing_data_stay_finite() {
 fn time() {
     let motion = field::<f32>(320, 240, |k, x, y| {
         let cells = if ((x / 90.0).floor() + (y / 70.0).floor()) as i64 % 2 == 0 { 2.0 } else { -1.0 };
-        cells + (x / 60.0 + k as f64).sin() + 0.05 * white((x / PITCH) as usize, (y / PITCH) as usize, k)
+        cells + (x / 60.0 + k as f64).sin() + 0.05 * white((x / SITE_SPACING) as usize, (y / SITE_SPACING) as usize, k)
     });
     let data = statistics(320, 240, density(0.05));
     let space = PlanePool::default();

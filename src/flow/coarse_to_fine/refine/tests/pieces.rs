@@ -40,9 +40,9 @@ fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize
             sum += g;
             mean += g * value;
             square += g * value * value;
-            along += g * value * i as f64 * PITCH;
-            across += g * value * j as f64 * PITCH;
-            spread += g * (i as f64 * PITCH).powi(2);
+            along += g * value * i as f64 * SITE_SPACING;
+            across += g * value * j as f64 * SITE_SPACING;
+            spread += g * (i as f64 * SITE_SPACING).powi(2);
         }
     }
     let (a, b, c) = (mean / sum, along / spread, across / spread);
@@ -50,7 +50,7 @@ fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize
 }
 
 fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
-    let ladder = Ladder::new(seven().ladder, PITCH);
+    let ladder = Ladder::new(seven().ladder, SITE_SPACING);
     let grids = grids(Level::detect(), &PlanePool::default(), &ladder, motion, &[0.0; 6]);
     (ladder, grids)
 }
@@ -94,7 +94,7 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
                 }
                 // Near a least-squares fit in the same window: slopes differ by the truncation of the
                 // Gaussian.
-                let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
+                let want = least_squares(&z, scale.sigma / SITE_SPACING, x as isize, y as isize);
                 assert!((got[0] - want[0]).abs() < 1e-12);
                 assert!((got[1] - want[1]).abs() < 0.01 && (got[2] - want[2]).abs() < 0.01, "{got:?} {want:?}");
                 misfit += mean_square(&scale.first.taps, &z, x as isize, y as isize)
@@ -121,7 +121,7 @@ fn coarse_grids_give_nearly_the_fit_of_the_whole_window() {
         let step = 1 << scale.octave;
         for (x, y) in [(8, 8), (16, 12), (24, 16)] {
             let z = |x: isize, y: isize| motion.at(0, x as usize, y as usize);
-            let want = least_squares(&z, scale.sigma / PITCH, x as isize, y as isize);
+            let want = least_squares(&z, scale.sigma / SITE_SPACING, x as isize, y as isize);
             let got = [0, 2, 4].map(|k| fits.at(k, x / step, y / step));
             assert!((got[0] - want[0]).abs() < 0.02, "{}: {got:?} {want:?}", scale.sigma);
             assert!((got[1] - want[1]).abs() < 0.003 && (got[2] - want[2]).abs() < 0.003, "{got:?} {want:?}");
@@ -148,7 +148,7 @@ fn grids_grow_back_without_bending_cubics() {
 #[test]
 fn choices_follow_the_formulas() {
     let options = seven();
-    let ladder = Ladder::<f64>::new(options.ladder, PITCH);
+    let ladder = Ladder::<f64>::new(options.ladder, SITE_SPACING);
     let layout = Layout::new(&seven());
     let mut means = Planes::<f64>::new(9, 1, layout.count());
     let roots = |l: usize, x: usize| 0.02 + 0.02 * x as f64 - 0.002 * l as f64;
@@ -266,7 +266,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let options = RefineOptions { ladder: &[2.5], edge_misfit: 1e-9, ..seven() };
     let got = refine(Level::detect(), &PlanePool::default(), &options, &motion, &data).0;
     let base = mean_motion(&motion);
-    let ladder = Ladder::<f64>::new(options.ladder, PITCH);
+    let ladder = Ladder::<f64>::new(options.ladder, SITE_SPACING);
     let grids = grids(Level::detect(), &PlanePool::default(), &ladder, &motion, &base);
     let scale: &Scale<f64> = &ladder.scales[0];
     let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
@@ -277,7 +277,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
         for (dx, dy) in [(0, 0), (2, 0), (-2, 0), (0, 2), (0, -2), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
             let (i, j) = ((x as isize + dx) as usize, (y as isize + dy) as usize);
             let mut m: [f64; 6] = std::array::from_fn(|k| fits.at(k, i, j));
-            (0..2).for_each(|k| m[k] -= PITCH * (m[2 + k] * dx as f64 + m[4 + k] * dy as f64));
+            (0..2).for_each(|k| m[k] -= SITE_SPACING * (m[2 + k] * dx as f64 + m[4 + k] * dy as f64));
             let own: f64 = (0..2).map(|k| (m[k] - grids[0].at(k, x, y)).powi(2)).sum();
             let weight = (fits.at(6, i, j) + own + 1e-4).powi(-2);
             let weights = [weight, weight * weight];
@@ -287,7 +287,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
         for k in 0..6 {
             let mut want = sum[k] / total[usize::from(k > 1)] + base[k];
             if k < 2 {
-                want += PITCH * (base[2 + k] * x as f64 + base[4 + k] * y as f64);
+                want += SITE_SPACING * (base[2 + k] * x as f64 + base[4 + k] * y as f64);
             }
             assert!((got.at(k, x, y) - want).abs() < 1e-9, "{x} {y} {k}: {} {want}", got.at(k, x, y));
         }
