@@ -11,7 +11,7 @@ use super::data_term::{MOTION, SEEN};
 use super::descent::{DescentPlan, DescentResult};
 use super::peak_locking::PeakLocking;
 use super::plane_pool::PlanePool;
-use super::planes::{Planes, SITE_SPACING};
+use super::planes::Planes;
 use super::pyramid::ComparedFrames;
 use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::workspace::Workspace;
@@ -199,6 +199,7 @@ fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flow::coarse_to_fine::planes::SITE_SPACING;
 
     pub(super) fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
         let mut planes = Planes::new(20, 15, MOTION);

@@ -160,8 +160,8 @@ fn add_noise(node: &mut Entries, noise: &RemainingNoise, [flow, slopes]: [f64; 2
     add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
 }
 
-/// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and of its derivatives along x
-/// and y.
+/// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and of its derivatives along
+/// x and y.
 fn add_blocks(node: &mut Entries, factors: [f64; 3], matrix: &[f64; 3]) {
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
