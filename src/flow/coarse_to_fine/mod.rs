@@ -19,8 +19,8 @@
 //! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
 //! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves
 //! by more than its grain on every level may not be found. The covariance includes neither motions that were
-//! not found nor errors at motion boundaries. `docs/flow.md` has the equations, `docs/design/coarse_to_fine.md`
-//! the origin of the constants.
+//! not found nor errors at motion boundaries. `docs/flow.md` has the equations,
+//! `docs/design/coarse_to_fine.md` the origin of the constants.
 
 mod acceleration;
 mod brightness_scale;
