@@ -38,7 +38,7 @@ def car(data: Path) -> list[Row]:
             box, flow = laser.boxes[first], field(images[index], images[index + step], "balanced")
             scene, _ = motion3d.estimate_field_motion(flow, K_CAR)
             found, points = motion3d.estimate_field_motion(
-                flow, K_CAR, spacing=CAR_SPACING, region=box, scene=scene, turning=TURNING * step
+                flow, K_CAR, spacing=CAR_SPACING, region=box, scene=scene, object_rotation_std=TURNING * step
             )
             divergence, spread, _ = flow.region_mean("divergence", region=box)
             facing, facing_deviation = 2 * step / divergence, 2 * step * spread / divergence**2

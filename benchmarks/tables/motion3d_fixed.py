@@ -58,7 +58,7 @@ def fixed_values() -> list[Row]:
                 ("direction, deg", "w_x, mrad", "w_y, mrad", "w_z, mrad"), published, got, strict=True
             ):
                 tell(f"21 x 21 grid, {name}, {what}: {part}", figure, value)
-    sideways = motion3d.sideways_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
+    sideways = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
     tell("one unknown (29)", 8.8940e-4, sideways.ml_variance)
     tell("one unknown (31)", 8.9109e-4, sideways.ones_variance)
     tell("one unknown, CRLB", 8.2128e-4, sideways.crlb)

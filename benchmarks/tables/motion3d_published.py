@@ -127,16 +127,16 @@ def one_unknown(trials: int) -> list[Row]:
     for n, sigmas in ((1000, (0.1, 0.30369, 0.6, 1.0)), (50, (1.0,))):
         nu = np.linspace(0.5, 1.5, n)
         for sigma in sigmas:
-            bound = motion3d.sideways_bound(nu, sigma=sigma)
+            bound = motion3d.lateral_bound(nu, sigma=sigma)
             errors: dict[str, list[float]] = {weights: [] for weights in ONE_UNKNOWN.values()}
             inside: list[bool] = []
             for _ in range(trials):
                 flow = np.stack([nu, 0 * nu], -1) + sigma * rng.normal(size=(n, 2))
                 for weights in errors:
                     errors[weights].append(
-                        motion3d.estimate_sideways(flow, sigma=sigma, weights=weights).angle
+                        motion3d.estimate_lateral(flow, sigma=sigma, weights=weights).angle
                     )  # type: ignore[arg-type]
-                unknown = motion3d.estimate_sideways(flow)
+                unknown = motion3d.estimate_lateral(flow)
                 inside.append(unknown.angle**2 < 1.96**2 * unknown.variance)
             predicted = (bound.ml_variance, bound.ones_variance, bound.shrunk_variance)
             row: Row = {"n": n, "sigma": sigma, "crossover": round(bound.crossover, 4), "trials": trials}

@@ -73,8 +73,8 @@ __all__ = [
     "_motion3d_field_points",
     "_motion3d_focus",
     "_motion3d_predict",
-    "_motion3d_sideways",
-    "_motion3d_sideways_bound",
+    "_motion3d_lateral",
+    "_motion3d_lateral_bound",
     "_observability",
     "_restore_particle_step",
     "_restore_particle_tracker",
@@ -1310,7 +1310,7 @@ def _mixture_densities(
     points: NDArray[np.float64], components: dict[str, Any], threads: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def _motion3d_beside(
-    rotation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, turning: float
+    rotation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, object_rotation_std: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
 def _motion3d_bound(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, layout: dict[str, Any]
@@ -1332,8 +1332,8 @@ def _motion3d_focus(
 def _motion3d_predict(
     points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool, whole_frame: bool
 ) -> NDArray[np.float64]: ...
-def _motion3d_sideways(flow: ArrayLike, sigma: float | None, weights: str) -> dict[str, Any]: ...
-def _motion3d_sideways_bound(inverse_depth: ArrayLike, sigma: float) -> dict[str, float]: ...
+def _motion3d_lateral(flow: ArrayLike, sigma: float | None, weights: str) -> dict[str, Any]: ...
+def _motion3d_lateral_bound(inverse_depth: ArrayLike, sigma: float) -> dict[str, float]: ...
 def _classify(jet: Sequence[float], motion: Sequence[float]) -> tuple[int, int, int, float]: ...
 def _observability(
     frames: _Frames,

@@ -28,12 +28,12 @@ use std::path::{Path, PathBuf};
     They come from the flow's own covariance: that of the baseline lucas-kanade holds for motions well below a pixel only, and says nothing of larger ones.\n\
     Rows of a run that is stopped (Ctrl-C) are kept in name.partial.csv.\n\
     status: ok, few_points, too_few_points, rotation_only, ambiguous (another motion explains the flow as well), ill_conditioned, low_snr.\n\
-    With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --turning then says how much the object may turn by itself:\n\
+    With --region on an object that moves by itself the motion is that object's, and the time to contact its own. --object-rotation-std then says how much the object may turn by itself:\n\
     its rotation is otherwise that of the rest of the picture, whose status is the column scene_status; where that rotation is not known, nothing is assumed of the object's.\n\n\
     Examples:\n  \
     jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv --picture pictures/ --maps contact/\n  \
     jacoflow egomotion drive/ --intrinsics calib.txt --preset fast --no-robust --alternatives others.csv > motion.csv\n  \
-    jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 --turning 0.001 -o car.csv"
+    jacoflow egomotion drive/ --intrinsics 721.5,721.5,609.6,172.9 --region 551,277,170,50 --object-rotation-std 0.001 -o car.csv"
 )]
 pub struct EgomotionCommand {
     #[command(flatten)]
@@ -62,7 +62,7 @@ pub struct EgomotionCommand {
     /// Take what is in --region for a thing that moves by itself, which turns by so much (standard deviation
     /// about each axis) beside the rotation of the rest of the picture: 0.001 for a car
     #[arg(long, value_name = "RAD/FRAME", value_parser = parse_positive, requires = "region", help_heading = "Motion")]
-    pub turning: Option<f64>,
+    pub object_rotation_std: Option<f64>,
     /// Seed of the random choices
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Motion")]
     pub random_state: u64,
@@ -119,7 +119,7 @@ impl EgomotionCommand {
     /// Where flow is wanted: all over the picture where its rest tells the rotation.
     fn seen(&self) -> SiteArguments {
         let mut seen = self.sites.clone();
-        if self.turning.is_some() {
+        if self.object_rotation_std.is_some() {
             seen.region = None;
         }
         seen
@@ -147,7 +147,7 @@ impl EgomotionCommand {
                 threads,
                 ..MotionOptions::default()
             },
-            turning: self.turning,
+            object_rotation_std: self.object_rotation_std,
             target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
             alternatives: self.others()?,
             pictures: self.picture.clone(),

@@ -1,15 +1,16 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
 use super::kernels::{equations, information};
-use super::model::motion::{Motion, tangents};
+use super::model::input::{Flow, Noise, Placement};
+use super::model::motion::Motion;
 use super::model::observations::Observations;
-use super::model::options::{Flow, Noise, Placement};
 use super::model::result::nested;
+use super::model::rows::{Matrix5, Vector5, tangents};
 use super::model::whitening::Intake;
-use super::solver::covariance::{Matrix5, determined, direction_deviation};
+use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
-use nalgebra::{Matrix2x3, SMatrix, Vector2};
+use nalgebra::{Matrix2x3, Vector2};
 
 /// Least number of points for a motion.
 const LEAST: usize = 5;
@@ -148,7 +149,7 @@ fn weighted_noise(
         }
         let p = Vector2::new(t.y, -t.x) / s2.sqrt();
         let (along, turn) = (tangent * row.g.transpose() * p, row.r.transpose() * p);
-        let d = SMatrix::<f64, 5, 1>::from_column_slice(&[nu[k] * along.x, nu[k] * along.y, turn.x, turn.y, turn.z]);
+        let d = Vector5::from_column_slice(&[nu[k] * along.x, nu[k] * along.y, turn.x, turn.y, turn.z]);
         let weight = (d.transpose() * bound * d)[0] / s2;
         let mut block = sum.fixed_view_mut::<2, 2>(0, 0);
         block += weight * along * along.transpose();

@@ -1,13 +1,11 @@
 //! The whole way from flow to motion.
 
-use super::diagnostics::degenerate::{turning, turning_in_unknown_noise};
-use super::diagnostics::inliers::{doubted, with_all_inliers};
-use super::diagnostics::report::rotation_report;
-use super::diagnostics::rotation_prior::Known;
+use super::diagnostics::report::{doubted, rotation_report, with_all_inliers};
+use super::diagnostics::rotation_only::{turning, turning_in_unknown_noise};
 use super::fit::Task;
-use super::model::derotation::HalfTurn;
-use super::model::observations::{Observations, ROUNDING};
-use super::model::options::{Flow, MotionOptions, Noise};
+use super::model::input::{Flow, Noise};
+use super::model::observations::Scaled;
+use super::model::options::{MotionOptions, RotationPrior};
 use super::model::result::{MotionEstimate, Status};
 use super::model::whitening::Intake;
 use super::robust;
@@ -18,9 +16,6 @@ use crate::math::random::CounterRng;
 
 /// Least number of points for a motion.
 const LEAST: usize = 5;
-
-/// Noise of flow that is exactly zero, in its unit.
-const LEAST_NOISE: f64 = 1e-100;
 
 /// Times that a rotation is taken out of displacements and points that obey are looked for again.
 const TURNS: usize = 2;
@@ -34,32 +29,11 @@ const TURNS: usize = 2;
 ///
 /// # Errors
 /// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`,
-/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `shared`, `correlation_length`.
+/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `points_per_independent_sample`, `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     options.check(flow, noise)?;
     Ok(options.threads.check()?.install(|| estimate(flow, noise, options)))
-}
-
-/// Points in units of their noise, and that in the flow's unit.
-pub(crate) struct Scaled {
-    pub observations: Observations,
-    pub sigma: f64,
-    /// Whether `sigma` has to be estimated.
-    pub unknown: bool,
-    /// Whether the flow may be that of a rotation alone.
-    pub may_turn: bool,
-}
-
-impl Scaled {
-    /// Takes `sigma` in units of the present noise to be the noise.
-    pub fn take(&mut self, sigma: f64) {
-        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(LEAST_NOISE);
-        if sigma.is_finite() {
-            self.observations.rescale(1.0 / sigma);
-            self.sigma *= sigma;
-        }
-    }
 }
 
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
@@ -78,9 +52,10 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let sigma = if scaled.unknown { f64::NAN } else { sigma };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
     }
-    scaled.observations.shared = options.shared.unwrap_or(1.0);
+    scaled.observations.points_per_independent_sample = options.points_per_independent_sample.unwrap_or(1.0);
     let alone = |told: Option<f64>, usual: f64| told.is_none_or(|told| told == usual);
-    scaled.observations.independent = alone(options.shared, 1.0) && alone(options.correlation_length, 0.0);
+    scaled.observations.independent =
+        alone(options.points_per_independent_sample, 1.0) && alone(options.correlation_length, 0.0);
     if unknown && options.rotation_prior.is_some() {
         // What is known beforehand weighs nothing beside flow of no noise, and how large that is it does not
         // tell.
@@ -88,7 +63,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         scaled.take(alone.sigma);
         scaled.may_turn = alone.status == Status::RotationOnly;
     }
-    scaled.observations.prior = options.rotation_prior.as_ref().and_then(Known::new);
+    scaled.observations.prior = options.rotation_prior.as_ref().and_then(RotationPrior::information);
     let rng = CounterRng::new(options.random_state);
     if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {
         scaled.observations = turned;
@@ -132,7 +107,7 @@ fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) ->
         if !decides(intake, &obeying, &kept.motion) {
             break;
         }
-        scaled.observations = intake.turned(&scaled.observations, HalfTurn::of(&kept.motion));
+        scaled.observations = intake.turned(&scaled.observations, kept.motion.derotation());
         kept = consensus(scaled, rng)?;
     }
     Some(kept)

@@ -1,10 +1,11 @@
 //! Points of a flow field that share no window.
 
-use super::diagnostics::systematic_errors::CommonErrors;
+use super::model::options::CommonErrors;
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::math::{median, quantile};
 use crate::types::{FlowField, Rect, SamplingGrid, Status};
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 
 /// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of
 /// them goes together still (`benchmarks/tables/motion3d_drive.py`), which the motion's covariance sums
@@ -38,8 +39,8 @@ pub struct FieldOptions {
     pub most: Option<usize>,
 }
 
-/// Points with their flow and its covariance, as [`Flow::Plane`](super::Flow::Plane) and
-/// [`Noise::Covariances`](super::Noise::Covariances) take them.
+/// Points with their flow and its covariance, as [`Flow::Plane`](crate::motion3d::Flow::Plane) and
+/// [`Noise::Covariances`](crate::motion3d::Noise::Covariances) take them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FieldPoints {
     /// Pixels.
@@ -50,13 +51,13 @@ pub struct FieldPoints {
     /// `4 pi l^2 / spacing^2`.
     pub covariances: Vec<f64>,
     /// How many points share one error: what the covariances are multiplied with. For
-    /// [`MotionOptions::shared`](super::MotionOptions).
-    pub shared: f64,
+    /// [`MotionOptions::points_per_independent_sample`](crate::motion3d::MotionOptions).
+    pub points_per_independent_sample: f64,
     /// How far errors of neighbours go together, px: the field's own. For
-    /// [`MotionOptions::correlation_length`](super::MotionOptions).
+    /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
     pub correlation_length: f64,
     /// What the flow of the whole field may have in common, as far as its covariances tell. For
-    /// [`MotionOptions::common`](super::MotionOptions).
+    /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
     pub common: CommonErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
@@ -68,7 +69,7 @@ impl FieldPoints {
     pub fn outside(&self, region: Rect) -> Self {
         let mut out = Self {
             spacing: self.spacing,
-            shared: self.shared,
+            points_per_independent_sample: self.points_per_independent_sample,
             correlation_length: self.correlation_length,
             common: self.common,
             ..Self::default()
@@ -90,7 +91,7 @@ impl FieldPoints {
 /// `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too
 /// small. Closer than 4 `l` they get their covariance times `4 pi l^2 / spacing^2`, the number of points on
 /// the area over which errors are one. What goes together farther than that is for
-/// [`MotionOptions::correlation_length`](super::MotionOptions).
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
 ///
 /// A list of points is taken whole.
 ///
@@ -116,14 +117,15 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         }
         SamplingGrid::Points(_) => 1,
     };
-    let shared = shared_by(field, step);
+    let points_per_independent_sample = shared_by(field, step);
     let spacing = match field.layout.sites {
         SamplingGrid::Grid { stride, .. } => (step * stride) as f64,
         SamplingGrid::Points(_) => spacing,
     };
     let correlation_length = field.layout.correlation_length;
-    let common = CommonErrors::of_field(field);
-    let mut out = FieldPoints { shared, correlation_length, common, spacing, ..FieldPoints::default() };
+    let common = of_field(field);
+    let mut out =
+        FieldPoints { points_per_independent_sample, correlation_length, common, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
@@ -143,7 +145,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
             }
             out.points.push([x as f64, y as f64]);
             out.flow.push([m[0], m[1]]);
-            out.covariances.extend([uu, uv, vu, vv].map(|value| shared * value));
+            out.covariances.extend([uu, uv, vu, vv].map(|value| points_per_independent_sample * value));
         }
     }
     Ok(out)
@@ -202,6 +204,51 @@ fn coarse_enough<T>(field: &FlowField<T>, step: usize, options: &FieldOptions) -
     step
 }
 
+/// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of
+/// windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it
+/// (`benchmarks/tables/motion3d_fields.py --only errors`).
+const SHARE: f64 = 0.4;
+
+/// The share of the points whose errors tell how far the factor is off: others have covariances for lack of
+/// texture.
+const BEST: f64 = 0.25;
+
+/// About so many sites of a field are asked.
+const FIELD_SITES: f64 = 4000.0;
+
+/// As far as covariances tell. The factor: by what would be the whole error of the points that tell it
+/// best. Of each point, its flow and the covariance of that.
+fn told_by(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
+    let (mut squares, mut variances) = (Vec::new(), Vec::new());
+    for (flow, covariance) in points {
+        let square = covariance.cholesky().map(|factor| flow.dot(&factor.solve(&flow)));
+        if let Some(square) = square.filter(|square| square.is_finite()) {
+            squares.push(square);
+            variances.push(0.5 * covariance.trace());
+        }
+    }
+    let square = quantile(&mut squares, 1.0 - BEST).unwrap_or(0.0);
+    // An error has two components. Flow that may be twice as long or none has no scale.
+    let scale = if square > 0.0 { (2.0 / square).sqrt().min(1.0) } else { 1.0 };
+    CommonErrors { scale, offset: SHARE * median(&mut variances).unwrap_or(0.0).sqrt() }
+}
+
+/// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not
+/// tell by how large a factor flow is off.
+pub(crate) fn of_field<T: Real>(field: &FlowField<T>) -> CommonErrors {
+    let step = ((field.len() as f64 / FIELD_SITES).sqrt() as usize).max(1);
+    let sites = (0..field.height)
+        .step_by(step)
+        .flat_map(|row| (0..field.width).step_by(step).map(move |column| row * field.width + column));
+    let told = |site: usize| {
+        let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
+        let covariance = field.covariance_at(site).filter(|_| valid)?;
+        let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+        Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
+    };
+    told_by(sites.filter_map(told))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,13 +287,16 @@ mod tests {
         let covariance = field_points(&field, &dense).unwrap().covariances[0];
         assert!((covariance / 0.25 - 4.0 * std::f64::consts::PI).abs() < 1e-12, "{covariance}");
         assert!((points.covariances[0] / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{}", points.covariances[0]);
-        assert_eq!(field_points(&field, &dense).unwrap().shared, covariance / 0.25);
-        assert_eq!((points.shared, points.correlation_length), (points.covariances[0] / 0.25, 5.0));
+        assert_eq!(field_points(&field, &dense).unwrap().points_per_independent_sample, covariance / 0.25);
+        assert_eq!(
+            (points.points_per_independent_sample, points.correlation_length),
+            (points.covariances[0] / 0.25, 5.0)
+        );
         let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
         assert_eq!(field_points(&field, &denser).unwrap().spacing, 5.0);
         let far = FieldOptions { spacing: Some(20.0), ..FieldOptions::default() };
         let far = field_points(&field, &far).unwrap();
-        assert_eq!((far.shared, &far.covariances[..4]), (1.0, &[0.25, 0.0, 0.0, 0.25][..]));
+        assert_eq!((far.points_per_independent_sample, &far.covariances[..4]), (1.0, &[0.25, 0.0, 0.0, 0.25][..]));
         field.status[5 * 60 + 5] = Status::Inconsistent;
         assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
     }
@@ -276,5 +326,15 @@ mod tests {
         assert!(field_points(&bare, &FieldOptions::default()).unwrap_err().to_string().starts_with("field: "));
         let wrong = FieldOptions { spacing: Some(0.0), ..FieldOptions::default() };
         assert!(field_points(&field(), &wrong).unwrap_err().to_string().starts_with("spacing: "));
+    }
+
+    #[test]
+    fn both_are_told_by_points() {
+        let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
+        let common = told_by([1.0, 4.0, 9.0].into_iter().map(point));
+        // A flow of 45 deviations, and one point's of 0.2.
+        assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
+        assert!((common.offset - SHARE * 0.2).abs() < 1e-12, "{common:?}");
+        assert_eq!(told_by(std::iter::empty()).scale, 1.0);
     }
 }

@@ -1,9 +1,9 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
 use super::diagnostics::correlated_noise::area;
-use super::diagnostics::systematic_errors::CommonErrors;
 use super::field::{measured, within};
 use super::model::camera::Intrinsics;
+use super::model::options::CommonErrors;
 use super::patches::AffinePatches;
 use crate::error::{Error, Result};
 use crate::math::Real;
@@ -32,7 +32,7 @@ pub struct FieldPatches {
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
     /// What the flow of the whole field may have in common, as far as its covariances tell. For
-    /// [`MotionOptions::common`](super::MotionOptions).
+    /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
     pub common: CommonErrors,
 }
 
@@ -56,7 +56,7 @@ impl FieldPatches {
 /// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels
 /// times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over
 /// which errors of the correlation length `l` are one, their tail beyond the windows included (see
-/// [`MotionOptions::correlation_length`](super::MotionOptions)). Flow that is of no second order in a window,
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is of no second order in a window,
 /// as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as
 /// much that of the patch grows.
 ///
@@ -75,7 +75,7 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     let sites = windows.sites(field, region);
     let fitted: Vec<_> = Threads::default()
         .install(|| sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect());
-    let mut out = FieldPatches { common: CommonErrors::of_field(field), ..FieldPatches::default() };
+    let mut out = FieldPatches { common: crate::motion3d::field::of_field(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());

@@ -1,23 +1,21 @@
 //! From the points that obey one motion to what is told about it.
 
-use super::diagnostics::degenerate::{by_chance, turning, turning_in_unknown_noise};
-use super::diagnostics::inliers::of_estimated_noise;
-use super::diagnostics::nonlinearity::beyond_theory;
-use super::diagnostics::report::{Solution, report, rotation_report};
+use super::diagnostics::report::{of_estimated_noise, report, rotation_report};
+use super::diagnostics::rotation_only::{turning, turning_in_unknown_noise};
 use super::diagnostics::rotation_prior::of_flow_alone;
+use super::diagnostics::solution::Solution;
 use super::diagnostics::status::{Evidence, judge};
-use super::estimate::Scaled;
 use super::model::motion::Motion;
-use super::model::observations::Observations;
+use super::model::observations::{Observations, Scaled};
 use super::model::options::{Method, MotionOptions};
 use super::model::result::{Alternative, MotionEstimate, Status};
+use super::model::statistics::by_chance;
 use super::model::whitening::Intake;
 use super::robust::{Consensus, Rival, larger};
 use super::solver::covariance::{Plugged, direction_deviation, plugged};
-use super::solver::efficient::{Efficient, WeightDepths, unsolved};
+use super::solver::efficient::{Efficient, WeightDepths, beyond_theory, unsolved};
 use super::solver::finite_rotation::{matters, settle, shift};
-use super::solver::likelihood::{Candidate, choose, different, minima};
-use super::solver::minima::{DISTINCT, Trial, close, smoothed};
+use super::solver::likelihood::{Candidate, DISTINCT, Trial, choose, different, minima, near_best, smoothed};
 use super::solver::profile_likelihood::Valley;
 use super::solver::refine::{Effort, Minimum, refine};
 use super::solver::smoothing::DepthSmoother;
@@ -91,7 +89,7 @@ impl Task<'_, '_> {
         if solved.solution.contradicted(&inliers) {
             solved.undecided = Some(of_flow_alone(&inliers, &solved.solution.motion));
         }
-        solved.solution.alternatives = close(&candidates, inliers.n)[1..]
+        solved.solution.alternatives = near_best(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
             .collect();
@@ -206,7 +204,7 @@ impl Task<'_, '_> {
         };
         let plugged = plugged(&chosen.minimum.equations);
         let low = plugged.is_none();
-        let several = close(candidates, inliers.n).len() > 1;
+        let several = near_best(candidates, inliers.n).len() > 1;
         let Minimum { motion, tangent, .. } = &chosen.minimum;
         let valley = Valley { observations: inliers, motion, tangent };
         let beyond = |plugged: &Plugged| {
@@ -279,7 +277,7 @@ fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternativ
 /// whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was
 /// missed), the motion is off by as much (R. Birge 1932).
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
-    let free = inliers.n.saturating_sub(5) as f64 / inliers.shared;
+    let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
     if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
 }
 

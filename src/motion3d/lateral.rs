@@ -22,7 +22,7 @@ const ROUNDS: usize = 8;
 
 /// What the flow across the direction is weighed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SidewaysWeights {
+pub enum LateralWeights {
     /// Depths drawn to their mean by what noise leaves of their scatter: never worse than either of the
     /// others.
     #[default]
@@ -35,7 +35,7 @@ pub enum SidewaysWeights {
 
 /// What section 5 of the paper says of known depths: variances of the angle `psi`, rad^2.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SidewaysBound {
+pub struct LateralBound {
     /// The Cramér-Rao bound `sigma^2 / (n m2)`, `m2 = mean nu^2`.
     pub bound: f64,
     /// Maximum likelihood `sigma^2 / (n m2) + sigma^4 / (n m2^2)` (29).
@@ -51,7 +51,7 @@ pub struct SidewaysBound {
 
 /// A direction along the image plane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SidewaysEstimate {
+pub struct LateralEstimate {
     /// `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; depths are positive,
     /// most of them.
     pub angle: f64,
@@ -91,13 +91,13 @@ impl Moments {
     }
 
     /// `a` of the weights `mean + a (m - mean)`.
-    fn share(&self, weights: SidewaysWeights, noise: f64) -> f64 {
+    fn share(&self, weights: LateralWeights, noise: f64) -> f64 {
         match weights {
-            SidewaysWeights::Likelihood => 1.0,
-            SidewaysWeights::Ones => 0.0,
+            LateralWeights::Likelihood => 1.0,
+            LateralWeights::Ones => 0.0,
             // Depths without any scatter are their mean.
-            SidewaysWeights::Shrunk if self.scatter == 0.0 => 0.0,
-            SidewaysWeights::Shrunk => self.scatter / (self.scatter + noise),
+            LateralWeights::Shrunk if self.scatter == 0.0 => 0.0,
+            LateralWeights::Shrunk => self.scatter / (self.scatter + noise),
         }
     }
 
@@ -198,7 +198,7 @@ fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
 /// [`Error::Argument`] for a `sigma` that is none and for a `flow` of fewer than two finite vectors (one
 /// where `sigma` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum, is
 /// zero.
-pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: SidewaysWeights) -> Result<SidewaysEstimate> {
+pub fn estimate_lateral(flow: &[[f64; 2]], sigma: Option<f64>, weights: LateralWeights) -> Result<LateralEstimate> {
     sigma.map_or(Ok(()), check)?;
     let sums = Sums::of(flow);
     let least = if sigma.is_some() { 1.0 } else { 2.0 };
@@ -211,16 +211,16 @@ pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: Sideway
     let noise = |u: &Vector2<f64>| sigma.map_or_else(|| sums.noise(u), |sigma| sigma * sigma);
     let share = |u: &Vector2<f64>| sums.moments(u, noise(u)).share(weights, noise(u));
     let along = match weights {
-        SidewaysWeights::Ones => sums.first,
-        SidewaysWeights::Likelihood => before(sums.axis(1.0), flow),
-        SidewaysWeights::Shrunk => before((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
+        LateralWeights::Ones => sums.first,
+        LateralWeights::Likelihood => before(sums.axis(1.0), flow),
+        LateralWeights::Shrunk => before((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
     };
     if sums.second.trace() == 0.0 || along == Vector2::zeros() {
         return Err(Error::NotObservable("flow that is zero in sum has no direction".into()));
     }
     let u = along.normalize();
     let (noise, moments) = (noise(&u), sums.moments(&u, noise(&u)));
-    Ok(SidewaysEstimate {
+    Ok(LateralEstimate {
         angle: u.y.atan2(u.x),
         variance: moments.variance(moments.share(weights, noise), noise),
         bound: moments.bound(noise),
@@ -229,7 +229,7 @@ pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: Sideway
     })
 }
 
-/// What any estimator, and each of those of [`estimate_sideways`], makes of points with these true inverse
+/// What any estimator, and each of those of [`estimate_lateral`], makes of points with these true inverse
 /// depths: for the design of an experiment.
 ///
 /// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out. `sigma`:
@@ -238,7 +238,7 @@ pub fn estimate_sideways(flow: &[[f64; 2]], sigma: Option<f64>, weights: Sideway
 /// # Errors
 /// [`Error::Argument`] for a `sigma` that is none, and an `inverse_depth` without a finite value;
 /// [`Error::NotObservable`] when all are zero.
-pub fn sideways_bound(inverse_depth: &[f64], sigma: f64) -> Result<SidewaysBound> {
+pub fn lateral_bound(inverse_depth: &[f64], sigma: f64) -> Result<LateralBound> {
     check(sigma)?;
     let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();
     if known.is_empty() {
@@ -249,11 +249,11 @@ pub fn sideways_bound(inverse_depth: &[f64], sigma: f64) -> Result<SidewaysBound
         return Err(Error::NotObservable("points that are infinitely far do not show a translation".into()));
     }
     let of = |weights| moments.variance(moments.share(weights, noise), noise);
-    Ok(SidewaysBound {
+    Ok(LateralBound {
         bound: moments.bound(noise),
-        likelihood: of(SidewaysWeights::Likelihood),
-        ones: of(SidewaysWeights::Ones),
-        shrunk: of(SidewaysWeights::Shrunk),
+        likelihood: of(LateralWeights::Likelihood),
+        ones: of(LateralWeights::Ones),
+        shrunk: of(LateralWeights::Shrunk),
         crossover: (moments.mean_square() * moments.scatter / moments.squared_mean).sqrt(),
     })
 }

@@ -34,7 +34,6 @@
 //! ```
 
 mod bound;
-mod contact;
 mod diagnostics;
 mod estimate;
 mod field;
@@ -49,18 +48,20 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
+pub use bound::MotionBound;
 #[cfg(feature = "python")]
 pub(crate) use bound::check_motion;
-pub use bound::{MotionBound, motion_bound};
-pub use contact::{ContactMap, UncertainMotion, contact_map};
-pub use diagnostics::systematic_errors::{CommonEffect, CommonErrors};
+pub use bound::motion_bound;
+pub use diagnostics::contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
 pub use field::{FieldOptions, FieldPoints, field_points};
 pub use field_patches::{FieldPatches, field_patches};
-pub use lateral::{SidewaysBound, SidewaysEstimate, SidewaysWeights, estimate_sideways, sideways_bound};
+pub use lateral::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 pub use model::camera::Intrinsics;
+pub use model::input::{Flow, Noise, Placement};
 pub use model::motion::{Motion, Projection};
-pub use model::options::{Flow, Method, MotionOptions, Noise, Placement, RotationPrior};
-pub use model::result::{Alternative, Likelihood, MotionEstimate, Status, focus_of_expansion};
+pub use model::options::{CommonErrors, Method, MotionOptions, RotationPrior, Smoother};
+pub use model::result::{
+    Alternative, CommonEffect, Likelihood, MotionEstimate, Status, UncertainMotion, focus_of_expansion,
+};
 pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};
-pub use solver::smoothing::Smoother;

@@ -52,7 +52,7 @@ def test_arguments_of_another_kind_are_refused():
         motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
     with pytest.raises(TypeError, match=r"^sigma\b"):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
-    for wrong in ({"robust": "no"}, {"robust": 1}, {"robust": None}, {"shared": "2"}, {"shared": None}, {"shared": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"random_state": True}, {"sigma": "0.3"}, {"sigma": True}, {"random_state": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
+    for wrong in ({"robust": "no"}, {"robust": 1}, {"robust": None}, {"points_per_independent_sample": "2"}, {"points_per_independent_sample": None}, {"points_per_independent_sample": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"random_state": True}, {"sigma": "0.3"}, {"sigma": True}, {"random_state": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
         with pytest.raises(TypeError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
     for name in ("method", "placement", "projection", "smoother"):
@@ -60,7 +60,7 @@ def test_arguments_of_another_kind_are_refused():
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **{name: None})
     with pytest.raises(TypeError, match="^jacobian: "):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), jacobian=np.zeros((5, 2, 2), complex), cov=np.tile(np.eye(6), (5, 1, 1)))
-    for wrong in ({"threads": 2**70}, {"shared": 0.5, "sigma": 1.0}, {"shared": float("nan"), "sigma": 1.0}, {"correlation_length": float("inf")}, {"threads": -1}, {"random_state": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
+    for wrong in ({"threads": 2**70}, {"points_per_independent_sample": 0.5, "sigma": 1.0}, {"points_per_independent_sample": float("nan"), "sigma": 1.0}, {"correlation_length": float("inf")}, {"threads": -1}, {"random_state": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
         with pytest.raises(ValueError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(**{"points": np.zeros((5, 2)), "flow": np.zeros((5, 2)), **wrong})
     with pytest.raises(ValueError, match="^inv_depth: "):
@@ -111,7 +111,7 @@ def test_mistakes_of_an_estimate_are_told_in_short_words():
         ({"rotation_prior": (np.zeros(3), -1e300 * np.eye(3))}, "-1e300"),
         ({"initial": (np.array([1e300, np.nan, 0]), np.zeros(3))}, "(1e300, NaN, 0) and (0, 0, 0)"),
         ({"sigma": 1e-300}, "1e-300"),
-        ({"shared": 1e-200, "sigma": 1.0}, "1e-200"),
+        ({"points_per_independent_sample": 1e-200, "sigma": 1.0}, "1e-200"),
     ):
         with pytest.raises(ValueError) as raised:
             motion3d.estimate_motion(PLACES, np.zeros((6, 2)), **change)

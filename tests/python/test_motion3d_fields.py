@@ -63,7 +63,7 @@ def test_a_field_has_a_map_of_times_to_contact():
         motion3d.time_to_contact_map(field, found, camera, placement="end")
 
 
-@pytest.mark.parametrize("common", [{"flow_scale": 0.5}, {"flow_offset": 0.5}])
+@pytest.mark.parametrize("common", [{"flow_scale_std": 0.5}, {"flow_bias_std": 0.5}])
 @pytest.mark.parametrize("form", [{"robust": False}, {"patches": 24}])
 def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
     frames, camera = textured_drive()
@@ -75,7 +75,7 @@ def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
     known = found.common_errors
     assert_allclose(np.linalg.eigvalsh(found.covariance - known.motion.T @ known.motion) > 0, True)
     (name, value), = common.items()
-    if name == "flow_scale":
+    if name == "flow_scale_std":
         assert known.scale == value
     else:
         assert_allclose(known.displacements, np.diag(value / np.diag(camera)[:2]), rtol=1e-12)
@@ -92,8 +92,8 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
         ({"jacobian": np.ones((3, 2, 2))}, ["jacobian: ", "patches"]),
         ({"projection": "sphere"}, ["projection: ", "sphere"]),
         ({"scene": whole}, ["scene: ", "region"]),
-        ({"scene": whole, "region": box, "turning": -1.0}, ["turning: ", "positive"]),
-        ({"turning": np.nan}, ["turning: ", "positive"]),
+        ({"scene": whole, "region": box, "object_rotation_std": -1.0}, ["object_rotation_std: ", "positive"]),
+        ({"object_rotation_std": np.nan}, ["object_rotation_std: ", "positive"]),
         ({"scene": whole, "region": box, "rotation_prior": (np.zeros(3), np.eye(3))}, ["rotation_prior: ", "scene"]),
         ({"scene": dataclasses.replace(whole, rotation=np.full(3, np.nan)), "region": box}, ["scene: ", "rotation is known"]),
         ({"patches": 7}, ["patches: ", "at least 8"]),
@@ -118,7 +118,7 @@ def test_the_rotation_of_a_scene_is_that_of_a_thing_in_it():
     field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
-    by_scene, _ = motion3d.estimate_field_motion(field, camera, region=box, scene=whole, turning=0.002, robust=False)
+    by_scene, _ = motion3d.estimate_field_motion(field, camera, region=box, scene=whole, object_rotation_std=0.002, robust=False)
     prior = (whole.rotation, whole.covariance[2:, 2:] + 0.002**2 * np.eye(3))
     by_hand, _ = motion3d.estimate_field_motion(field, camera, region=box, rotation_prior=prior, robust=False)
     alone, _ = motion3d.estimate_field_motion(field, camera, region=box, robust=False)

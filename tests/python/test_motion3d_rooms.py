@@ -38,7 +38,7 @@ def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation():
     true = made.flow(points.astype(float))
     assert 1.1 < np.sum(flow * true) / np.sum(true * true) < 1.3
     found, _ = motion3d.estimate_field_motion(field, rooms.K)
-    bare, _ = motion3d.estimate_field_motion(field, rooms.K, flow_scale=0.0)
+    bare, _ = motion3d.estimate_field_motion(field, rooms.K, flow_scale_std=0.0)
     np.testing.assert_array_equal(found.translation, bare.translation)
     np.testing.assert_allclose(found.direction_std, bare.direction_std)
     added = found.covariance - bare.covariance
@@ -46,13 +46,13 @@ def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation():
     scale = np.sqrt(np.trace(added) / np.trace(along))
     np.testing.assert_allclose(added[2:, 2:], scale**2 * along, atol=1e-9 * np.trace(found.covariance))
     assert 0.03 < scale < 0.5
-    for name in ("flow_scale", "flow_offset"):
+    for name in ("flow_scale_std", "flow_bias_std"):
         with pytest.raises(ValueError, match=f"^{name}"):
             motion3d.estimate_field_motion(field, rooms.K, **{name: -1.0})
         with pytest.raises(ValueError, match=f"^{name}"):
             motion3d.estimate_motion([[0.0, 0.0]] * 20, [[0.0, 0.0]] * 20, **{name: float("nan")})
-    with pytest.raises(ValueError, match="^flow_offset"):
-        motion3d.estimate_motion([[0.0, 0.0, 1.0]] * 20, [[0.0, 0.0, 0.0]] * 20, projection="sphere", flow_offset=0.1)
+    with pytest.raises(ValueError, match="^flow_bias_std"):
+        motion3d.estimate_motion([[0.0, 0.0, 1.0]] * 20, [[0.0, 0.0, 0.0]] * 20, projection="sphere", flow_bias_std=0.1)
 
 
 @pytest.mark.parametrize("six", [False, True])
@@ -72,7 +72,7 @@ def test_a_displacement_that_all_flow_has_in_common_is_in_the_covariance(six):
         given |= {"jacobian": jacobian, "cov": np.diag([0.01**2] * 2 + [0.0003**2] * 4) + np.zeros((n, 1, 1))}
     else:
         given |= {"sigma": 0.01}
-    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_offset=offset, **given) for offset in (0.02, 0.0))
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_bias_std=offset, **given) for offset in (0.02, 0.0))
     moved = []
     for step in 1e-4 * np.eye(2):
         other = motion3d.estimate_motion(pixels, flow + step, rooms.K, initial=(bare.translation, bare.rotation), **given)
@@ -93,7 +93,7 @@ def test_what_all_flow_has_in_common_is_in_a_rotation_alone_too():
     pixels, _ = scene()
     flow = motion3d.predict_flow(pixels, [1.0, 0.0, 0.0], [0.01, -0.01, 0.005], np.zeros(400), rooms.K)
     given = {"sigma": 0.01, "placement": "start"}
-    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, **common, **given) for common in ({"flow_offset": 0.02, "flow_scale": 0.1}, {}))
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, **common, **given) for common in ({"flow_bias_std": 0.02, "flow_scale_std": 0.1}, {}))
     assert found.status == bare.status == "rotation_only"
     moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, **given).rotation - bare.rotation for step in 0.02 * np.eye(2)]
     moved.append(0.1 * bare.rotation)
@@ -112,7 +112,7 @@ def test_a_rotation_known_beforehand_counts_once_beside_a_displacement_of_all_fl
     pixels, flow = scene()
     prior = (np.array([0.01, -0.01, 0.005]), 1e-7 * np.eye(3))
     given = {"sigma": 0.05, "placement": "start", "method": "ml", "rotation_prior": prior}
-    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_offset=offset, **given) for offset in (0.3, 0.0))
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_bias_std=offset, **given) for offset in (0.3, 0.0))
     moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, initial=(bare.translation, bare.rotation), **given).rotation - bare.rotation for step in 0.01 * np.eye(2)]
     added = np.sqrt(np.trace((found.covariance - bare.covariance)[2:, 2:]))
     assert added == pytest.approx(30 * np.linalg.norm(moved), rel=0.1)
@@ -121,12 +121,12 @@ def test_a_rotation_known_beforehand_counts_once_beside_a_displacement_of_all_fl
 def test_times_to_contact_scale_with_the_flow():
     """A tenth more flow is a tenth more of every rate, and nothing else."""
     pixels, flow = scene()
-    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=0.05, flow_scale=scale) for scale in (0.1, 0.0))
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=0.05, flow_scale_std=scale) for scale in (0.1, 0.0))
     share = np.sqrt(found.time_to_contact_std**2 - bare.time_to_contact_std**2) / np.abs(found.time_to_contact)
     np.testing.assert_allclose(share, 0.1, rtol=1e-3)
 
 
-@pytest.mark.parametrize(("name", "value"), [("flow_scale", np.nan), ("flow_scale", 2.0), ("flow_scale", -1.0), ("flow_offset", np.inf), ("flow_offset", 1e200), ("flow_offset", -1.0)])
+@pytest.mark.parametrize(("name", "value"), [("flow_scale_std", np.nan), ("flow_scale_std", 2.0), ("flow_scale_std", -1.0), ("flow_bias_std", np.inf), ("flow_bias_std", 1e200), ("flow_bias_std", -1.0)])
 def test_deviations_of_patches_are_checked(name, value):
     patches = np.zeros((4, 2, 2)), np.tile(np.eye(6), (4, 1, 1))
     with pytest.raises(ValueError, match=f"^{name}"):

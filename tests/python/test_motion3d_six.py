@@ -60,7 +60,7 @@ def test_rates_of_patches_are_as_sure_as_they_say(common):
         jacobian = np.stack([right - flow, below - flow], axis=-1) / 1e-3 + 0.0006 * rng.normal(size=(20, 2, 2))
         flow = flow + 0.02 * rng.normal(size=(20, 2)) + common * rng.normal(size=2)
         cov = np.diag([0.02**2] * 2 + [0.0006**2] * 4) + np.zeros((20, 1, 1))
-        found = motion3d.estimate_motion(pixels, flow, scenes.K, jacobian=jacobian, cov=cov, placement="start", method="ml", flow_offset=common)
+        found = motion3d.estimate_motion(pixels, flow, scenes.K, jacobian=jacobian, cov=cov, placement="start", method="ml", flow_bias_std=common)
         rate = -1 / found.time_to_contact
         held.append(np.abs(rate - depths * u[2]) < 1.96 * found.time_to_contact_std * rate**2)
     assert 0.91 < np.mean(held) < 0.98

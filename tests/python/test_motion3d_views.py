@@ -77,7 +77,7 @@ def test_displacements_are_predicted_in_pixels():
 @pytest.mark.parametrize("robust", [False, True])
 @pytest.mark.parametrize("turn", [0.12, 0.17, 0.25])
 def test_covariances_hold_in_fast_turns(turn, robust):
-    """The flow placed half way has ellipsoids of which none or hardly any hold (`claims.turning`)."""
+    """The flow placed half way has ellipsoids of which none or hardly any hold (`claims.object_rotation_std`)."""
     row = coverage.row("", (coverage.turns(seed, turn, robust) for seed in range(150)))
     assert row["ok"] > 120 and 0.88 <= row["ellipsoid"] <= 0.985 and row["median, deg"] < 0.9, row
 

@@ -19,7 +19,7 @@ from ._bound import MotionBound, motion_bound
 from ._estimate import estimate_motion
 from ._field import estimate_field_motion, time_to_contact_map
 from ._results import CommonEffect, MotionEstimate, MotionSolution, focus_of_expansion, time_to_contact, time_to_contact_std
-from ._sideways import SidewaysBound, SidewaysEstimate, estimate_sideways, sideways_bound
+from ._lateral import LateralBound, LateralEstimate, estimate_lateral, lateral_bound
 from ._two_views import essential_matrix, predict_flow
 
 __all__ = [
@@ -27,16 +27,16 @@ __all__ = [
     "MotionBound",
     "MotionEstimate",
     "MotionSolution",
-    "SidewaysBound",
-    "SidewaysEstimate",
+    "LateralBound",
+    "LateralEstimate",
     "essential_matrix",
     "estimate_field_motion",
     "estimate_motion",
-    "estimate_sideways",
+    "estimate_lateral",
     "focus_of_expansion",
     "motion_bound",
     "predict_flow",
-    "sideways_bound",
+    "lateral_bound",
     "time_to_contact",
     "time_to_contact_map",
     "time_to_contact_std",

@@ -27,10 +27,10 @@ def estimate_motion(
     weight_inv_depth: ArrayLike | None = None,
     rotation_prior: tuple[ArrayLike, ArrayLike] | None = None,
     initial: tuple[ArrayLike, ArrayLike] | None = None,
-    shared: float = 1.0,
+    points_per_independent_sample: float = 1.0,
     correlation_length: float = 0.0,
-    flow_scale: float = 0.0,
-    flow_offset: float = 0.0,
+    flow_scale_std: float = 0.0,
+    flow_bias_std: float = 0.0,
     random_state: int = 0,
     threads: int | None = None,
 ) -> MotionEstimate:
@@ -58,7 +58,7 @@ def estimate_motion(
     method : "auto", "ml" or "efficient"
         "auto": "efficient" from 30 points (5 patches) on, else "ml".
     robust : bool
-        Find the points that obey one motion among up to 60 % that do not. Where what the points leave that obey it looks like those of something that moves otherwise (residuals of neighbours have one sign, or those of a part of the picture pull another way) and two motions explain them better, the status is "ambiguous"; that is not asked with `shared` or `correlation_length`, as errors that go together look like that everywhere. Noise of these points that is larger than told widens the covariance. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
+        Find the points that obey one motion among up to 60 % that do not. Where what the points leave that obey it looks like those of something that moves otherwise (residuals of neighbours have one sign, or those of a part of the picture pull another way) and two motions explain them better, the status is "ambiguous"; that is not asked with `points_per_independent_sample` or `correlation_length`, as errors that go together look like that everywhere. Noise of these points that is larger than told widens the covariance. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
     placement : "midpoint" or "start"
         What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
         negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
@@ -70,13 +70,13 @@ def estimate_motion(
         The rotation as known from elsewhere: from a gyroscope, or from the rest of the scene where the points lie on a thing that moves by itself. In a narrow field a rotation looks like a sideways translation, and this decides. Where the flow contradicts it by more than chance, the status is "ambiguous", what the flow tells by itself is among the `alternatives`, and the covariance reaches as far; of a rotation alone the status stays "rotation_only", with both.
     initial : (translation (3,), rotation (3,) in rad/frame)
         Look for the minimum near this motion instead of everywhere.
-    shared : float, no unit
+    points_per_independent_sample : float, no unit
         How many points share one error, as close points of a dense field do: `cov` (or `sigma` squared) is so many times their own, so that together they tell no more than they know. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
     correlation_length : float, px with K, else units of points; rad on the sphere
         How far errors of neighbours go together, as those of windowed flow do (a field tells its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
-    flow_scale : float, no unit, from 0 to 1
+    flow_scale_std : float, no unit, from 0 to 1
         Standard deviation of a factor, about 1, that all flow has in common, as flow from gradients is too short or too long by a share (a field tells how much it may be). No residual tells it; it widens the covariance of the rotation along itself.
-    flow_offset : float, units of flow
+    flow_bias_std : float, units of flow
         Standard deviation of each component of a displacement that all flow has in common (a field tells how large it may be). Most of it looks like a rotation, and no residual tells it; it widens the covariance along what it would make of the motion. Not on the sphere.
     random_state : int
         Seed of the random choices.
@@ -93,7 +93,7 @@ def estimate_motion(
     given = layout(K, sigma, cov, projection, jacobian is not None)
     options = {
         "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "shared": besides(1, number("shared", shared)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale": number("flow_scale", flow_scale), "flow_offset": number("flow_offset", flow_offset), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "points_per_independent_sample": besides(1, number("points_per_independent_sample", points_per_independent_sample)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale_std": number("flow_scale_std", flow_scale_std), "flow_bias_std": number("flow_bias_std", flow_bias_std), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = six(flow, jacobian)

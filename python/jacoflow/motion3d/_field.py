@@ -31,7 +31,7 @@ def estimate_field_motion(
     max_points: int | None = None,
     region: Sequence[int] | None = None,
     scene: MotionEstimate | None = None,
-    turning: float = 1e-3,
+    object_rotation_std: float = 1e-3,
     patches: int | None = None,
     **options: Any,
 ) -> tuple[MotionEstimate, Array]:
@@ -44,14 +44,14 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what would be the whole error of the quarter of the field's points that tell it best (`flow_scale`), and that it may be off by one displacement, of 0.4 deviations of a point (`flow_offset`).
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what would be the whole error of the quarter of the field's points that tell it best (`flow_scale_std`), and that it may be off by one displacement, of 0.4 deviations of a point (`flow_bias_std`).
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
         Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
     scene : MotionEstimate or None
         The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the thing's in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
-    turning : float, rad/frame
+    object_rotation_std : float, rad/frame
         Standard deviation of the thing's own rotation, per axis; it matters only with `scene`.
     patches : px or None
         Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, from a fit of second order to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows in the patch, of the area `58 l^2` over which errors go together, and more where flow has edges in it. Six numbers pay for
@@ -69,20 +69,20 @@ def estimate_field_motion(
     kind("field", field, FlowField)
     if K is None:
         raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    if not 0 < number("turning", turning) < float("inf"):
-        raise ValueError(f"turning: expected a positive number, got {turning}")
+    if not 0 < number("object_rotation_std", object_rotation_std) < float("inf"):
+        raise ValueError(f"object_rotation_std: expected a positive number, got {object_rotation_std}")
     options = _own(options)
     if patches is not None:
         _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
         points, six, covariances, (scale, offset) = _motion3d_field_patches(field, count("patches", patches), region)
         slopes = six[:, 2:].reshape(-1, 2, 2).transpose(0, 2, 1)
-        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **{"flow_scale": scale, "flow_offset": offset, **options}), points
+        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **{"flow_scale_std": scale, "flow_bias_std": offset, **options}), points
     if scene is not None:
         if options.get("rotation_prior") is not None:
             raise ValueError("rotation_prior: expected None with a scene, whose rotation it would be, got both")
-        options["rotation_prior"] = _beside(scene, turning, region)
+        options["rotation_prior"] = _beside(scene, object_rotation_std, region)
     points, flow, covariances, (_, shared, length, scale, offset) = _motion3d_field_points(field, None if spacing is None else number("spacing", spacing), None if max_points is None else count("max_points", max_points), region)
-    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "shared": shared, "correlation_length": length, "flow_scale": scale, "flow_offset": offset, **options}), points
+    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "points_per_independent_sample": shared, "correlation_length": length, "flow_scale_std": scale, "flow_bias_std": offset, **options}), points
 
 
 def _own(options: dict[str, Any]) -> dict[str, Any]:
@@ -106,13 +106,13 @@ def _refuse_with_patches(**given: object) -> None:
             raise ValueError(f"{name}: expected its default with patches, got {_kind(value)}")
 
 
-def _beside(scene: MotionEstimate, turning: float, region: Sequence[int] | None) -> tuple[Array, Array]:
+def _beside(scene: MotionEstimate, object_rotation_std: float, region: Sequence[int] | None) -> tuple[Array, Array]:
     """What the scene's rotation says about that of a thing in it."""
     if not isinstance(scene, MotionEstimate):
         raise TypeError(f"scene: expected a MotionEstimate, got {_kind(scene)}")
     if region is None:
         raise ValueError("scene: expected a region beside it, of the thing whose motion is wanted, got no region")
-    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, turning)
+    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, object_rotation_std)
     if known is None:
         raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
     return known

@@ -30,7 +30,7 @@ class MotionSolution:
 
 @dataclass(frozen=True, eq=False)
 class CommonEffect:
-    """What a factor and a displacement do to a motion that all flow has in common (`flow_scale`, `flow_offset` of `estimate_motion`): `motion.T @ motion` (5, 5) is in its covariance, rad and rad/frame."""
+    """What a factor and a displacement do to a motion that all flow has in common (`flow_scale_std`, `flow_bias_std` of `estimate_motion`): `motion.T @ motion` (5, 5) is in its covariance, rad and rad/frame."""
 
     scale: float
     """Standard deviation of the factor, no unit."""

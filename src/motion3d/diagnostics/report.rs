@@ -1,143 +1,26 @@
 //! From a solution on the inliers to what is told about every point that was given.
 
-use super::correlated_noise::{Weighted, together, turning};
-use super::degenerate::RotationOnly;
-use super::nonlinearity::departure;
-use super::rotation_prior::{Grown, contradiction, rotation_contradiction};
-use super::systematic_errors;
-use super::systematic_errors::{CommonEffect, CommonErrors, Moved, moved};
-use crate::motion3d::contact::{Rates, Slopes};
-use crate::motion3d::kernels::{Depths, depths, equations, information};
+use super::contact::{Rates, Slopes};
+use super::correlated_noise::turning;
+use super::rotation_only::RotationOnly;
+use super::rotation_prior::rotation_contradiction;
+use super::solution::{Solution, rotation_shift};
+use crate::motion3d::kernels::{Depths, depths, equations};
 use crate::motion3d::model::camera::to_plane;
 use crate::motion3d::model::derotation::HalfWay;
+use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::{Flow, MotionOptions};
-use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use crate::motion3d::robust::{Consensus, Told, among_strays};
-use crate::motion3d::solver::covariance::{Matrix5, Plugged, direction_deviation, plugged};
-use crate::motion3d::solver::efficient::Efficient;
-use crate::motion3d::solver::likelihood::Candidate;
-use nalgebra::{Matrix2x3, Matrix3, Vector3};
+use crate::motion3d::model::options::MotionOptions;
+use crate::motion3d::model::result::{MotionEstimate, Status, axes, nested};
+use crate::motion3d::robust;
+use crate::motion3d::robust::Consensus;
+use crate::motion3d::solver::covariance::{direction_deviation, plugged};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// Fewest points that a thread is worth its while for.
 const TOGETHER: usize = 1000;
-
-/// A motion found on the inliers.
-pub(crate) struct Solution {
-    pub motion: Motion,
-    pub tangent: Matrix2x3<f64>,
-    /// `None` where nothing is known.
-    pub covariance: Option<Matrix5>,
-    /// What is in it of errors that all flow has in common.
-    common: CommonEffect,
-    /// What it was made of.
-    grown: Option<Grown>,
-    pub status: Status,
-    pub alternatives: Vec<Alternative>,
-    likelihood: Likelihood,
-    /// Depths in the weights, where they were smoothed, and their variances where these are known.
-    smooth: Option<Vec<f64>>,
-    variance: Option<Vec<f64>>,
-    fell_back: bool,
-}
-
-impl Solution {
-    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
-    /// maximum likelihood's covariance.
-    pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
-        let minimum = &chosen.minimum;
-        let likelihood = Likelihood {
-            motion: minimum.motion,
-            covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
-            tangent: axes(&minimum.tangent),
-            cost: minimum.equations.cost,
-        };
-        let plain = Self {
-            motion: minimum.motion,
-            tangent: minimum.tangent,
-            covariance: plugged.map(|plugged| plugged.likelihood),
-            common: CommonEffect::default(),
-            grown: None,
-            status: Status::Ok,
-            alternatives: Vec::new(),
-            likelihood,
-            smooth: None,
-            variance: None,
-            fell_back: wanted && improved.is_none(),
-        };
-        match improved {
-            Some(improved) if wanted => Self {
-                motion: improved.motion,
-                tangent: improved.tangent,
-                covariance: Some(improved.covariance),
-                smooth: Some(improved.smooth),
-                variance: improved.variance,
-                ..plain
-            },
-            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
-            None => plain,
-        }
-    }
-
-    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the
-    /// weights, which may be wrong, the motion stays.
-    pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
-        let Some(covariance) = self.covariance else { return };
-        let from = Told { motion: self.motion, tangent: self.tangent, covariance };
-        let smooth = self.smooth.as_deref().filter(|_| !given);
-        let Some(told) = among_strays(all, known, &from, smooth, !given) else { return };
-        (self.motion, self.tangent) = (told.motion, told.tangent);
-        self.covariance = Some(told.covariance);
-    }
-
-    /// Takes errors into the covariance that go together over a length, in the unit of the points.
-    pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
-        let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
-        let nu = self.weights(inliers);
-        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-        self.covariance = together(&covariance, inliers, &at, flow, length);
-    }
-
-    /// What errors do that all flow has in common.
-    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
-        let Some(covariance) = self.covariance else { return CommonEffect::default() };
-        let nu = self.weights(inliers);
-        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-        let moved = if common.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
-        common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera())))
-    }
-
-    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
-    pub fn widen(&mut self, wider: f64, common: CommonEffect) {
-        self.grown = self.covariance.map(|own| Grown { own, wider, common: common.added() });
-        self.covariance = self.grown.as_ref().map(Grown::covariance);
-        self.common = common;
-    }
-
-    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as
-    /// far as the motion that the flow tells by itself.
-    pub fn contradicted(&mut self, inliers: &Observations) -> bool {
-        let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
-        let told = if let Some(nu) = &self.smooth {
-            information(inliers, &self.motion, &self.tangent, nu, 0.0)
-        } else {
-            let here = equations(inliers, &self.motion, &self.tangent, None);
-            here.h - here.p
-        };
-        let Some(apart) = contradiction(known, &self.motion.w(), &told, grown) else { return false };
-        self.covariance = Some(grown.covariance() + apart * apart.transpose());
-        true
-    }
-
-    /// The depths in the weights, as long as the planes.
-    fn weights(&self, inliers: &Observations) -> Cow<'_, [f64]> {
-        let own = || Cow::Owned(depths(inliers, &self.motion).nu);
-        self.smooth.as_deref().map_or_else(own, Cow::Borrowed)
-    }
-}
 
 /// From inverse depths in the rows to those half way in time.
 fn half_way(points: &Observations, motion: &Motion) -> HalfWay {
@@ -249,7 +132,7 @@ pub(crate) fn rotation_report(
     options: &MotionOptions,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, sigma);
-    let moved = systematic_errors::turned(inliers, &rotation.covariance) * to_plane(flow.camera());
+    let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
     let mut covariance = rotation.covariance;
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
         covariance = turning(&covariance, inliers, &rotation.rotation, flow, length);
@@ -302,3 +185,48 @@ pub(crate) fn turned(
         out.time_to_contact_std[source] = f64::INFINITY;
     }
 }
+
+/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their
+/// own.
+pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    for &k in &kept.inliers {
+        let source = all.source[k as usize] as usize;
+        if !found.inliers[source] {
+            found.inliers[source] = true;
+            found.inverse_depth_smooth[source] = found.inverse_depth[source];
+        }
+    }
+    found
+}
+
+/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that
+/// nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
+/// choice of points and no surer; what else is told says more.
+///
+/// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of
+/// them.
+pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    let doubtful = kept.doubtful;
+    let few = match found.status {
+        Status::Ok => doubtful || robust::hangs_on_few(all, &found),
+        Status::RotationOnly => doubtful && !(kept.whole && robust::one_noise(&found.residuals)),
+        Status::LowSnr => doubtful,
+        _ => false,
+    };
+    if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
+}
+
+/// What a covariance that is a multiple of an estimated variance is to be multiplied with: of errors in units
+/// of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W.
+/// Gosset 1908).
+///
+/// Residuals cut off as those of outliers tell less of the variance than all would.
+pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
+    let free = points.saturating_sub(5) as f64 * if cut { TOLD_BY_CUT } else { 1.0 };
+    let free = free.max(2.0 * 2.0);
+    free / (free - 2.0)
+}
+
+/// The information about a variance that is left where residuals beyond 2.5 deviations are cut off and the
+/// points chosen by it: 0.69 by the cut alone.
+pub(crate) const TOLD_BY_CUT: f64 = 0.6;

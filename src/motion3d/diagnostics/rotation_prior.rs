@@ -5,38 +5,15 @@
 //! away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right,
 //! `d` has the covariance `L^-1 + C_ww` with that of the flow alone.
 
-use super::degenerate::by_chance;
 use crate::motion3d::kernels::{add_to_rotation, equations};
-use crate::motion3d::model::motion::{Motion, tangents};
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::RotationPrior;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::{Known, Observations};
 use crate::motion3d::model::result::Alternative;
-use crate::motion3d::solver::covariance::{Matrix5, inverse};
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::statistics::by_chance;
+use crate::motion3d::solver::covariance::inverse;
 use crate::motion3d::solver::refine::{Effort, refine};
-use nalgebra::{Matrix3, SVector, Vector3};
-
-/// A rotation known beforehand, with the inverse of its covariance.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Known {
-    pub rotation: Vector3<f64>,
-    pub information: Matrix3<f64>,
-}
-
-impl Known {
-    /// `None` unless everything is finite and the covariance positive definite.
-    pub fn new(prior: &RotationPrior) -> Option<Self> {
-        let covariance = Matrix3::from_fn(|i, j| 0.5 * (prior.covariance[i][j] + prior.covariance[j][i]));
-        let known = Self { rotation: prior.rotation.into(), information: covariance.cholesky()?.inverse() };
-        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
-    }
-
-    /// `(w0 - w)` times the information, and the square of the difference in its units.
-    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
-        let off = self.rotation - w;
-        let pull = self.information * off;
-        (pull, off.dot(&pull))
-    }
-}
+use nalgebra::{Matrix3, Vector3};
 
 /// What a motion's covariance is made of: `own`, in which errors that the information takes for independent
 /// may go together, times `wider`, and what all flow has in `common`.
@@ -58,12 +35,7 @@ impl Grown {
 /// it, or where the flow alone does not determine a motion.
 ///
 /// `information`: of the flow and of the known rotation together.
-pub(crate) fn contradiction(
-    known: &Known,
-    w: &Vector3<f64>,
-    information: &Matrix5,
-    told: &Grown,
-) -> Option<SVector<f64, 5>> {
+pub(crate) fn contradiction(known: &Known, w: &Vector3<f64>, information: &Matrix5, told: &Grown) -> Option<Vector5> {
     let mut of_flow = *information;
     add_to_rotation(&mut of_flow, &known.information, -1.0);
     let alone = inverse(&of_flow)?;

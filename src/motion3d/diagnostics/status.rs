@@ -1,21 +1,21 @@
 //! How far a motion can be trusted.
 
-use super::cheirality::opposite;
-use super::confidence_region::{Farther, plausible_beyond};
-use super::degenerate::twin;
-use super::report::Solution;
-use super::smaller_rotation::plausible_less_turned;
+use super::confidence_region::{Farther, plausible_beyond, plausible_less_turned};
+use super::planar_twin::twin;
+use super::solution::Solution;
 use crate::math::random::CounterRng;
-use crate::motion3d::kernels::equations;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::kernels::{FrontEquations, equations, front_equations};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
+use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::model::whitening::Intake;
 use crate::motion3d::robust::Rival;
 use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::likelihood::SAME;
-use crate::motion3d::solver::starts::SEARCHED;
-use nalgebra::{SMatrix, SymmetricEigen};
+use crate::motion3d::solver::starts::{SEARCHED, sample};
+use nalgebra::SymmetricEigen;
+use std::borrow::Cow;
 
 /// Below so many points several motions may explain them exactly.
 const FEW: usize = 12;
@@ -212,6 +212,61 @@ pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
     if !(depth > 0.0 && turn > 0.0 && depth.is_finite() && turn.is_finite()) {
         return false;
     }
-    let relative = SMatrix::<f64, 5, 5>::from_fn(|i, j| h[(i, j)] / (scale(i) * scale(j)).sqrt());
+    let relative = Matrix5::from_fn(|i, j| h[(i, j)] / (scale(i) * scale(j)).sqrt());
     SymmetricEigen::new(relative).eigenvalues.min() > DETERMINED
+}
+
+/// Most steps, and the length of one that is not worth another, rad.
+pub(crate) const STEPS: usize = 30;
+
+pub(crate) const STEP: f64 = 1e-7;
+
+/// Squared deviations by which the opposite must be worse to be excluded: a chance of about 1 in 100.
+pub(crate) const SURE: f64 = 9.0;
+
+/// The most likely motion near `start` that has no depth behind the camera, and its cost.
+pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
+    let equations = |motion: &Motion| front_equations(observations, motion, &tangents(&motion.u()));
+    let (mut motion, mut damping) = (*start, 1e-4);
+    let mut here: FrontEquations = equations(&motion);
+    for _ in 0..STEPS {
+        let mut h = here.h;
+        // The last term keeps directions that no point tells of where they are.
+        let floor = 1e-12 * h.trace();
+        for i in 0..5 {
+            h[(i, i)] += damping * h[(i, i)] + floor;
+        }
+        let Some(step) = h.cholesky().map(|factor| factor.solve(&here.gradient)) else { break };
+        if !step.iter().all(|value| value.is_finite()) {
+            break;
+        }
+        let next = motion.stepped(&tangents(&motion.u()), &step);
+        let there = equations(&next);
+        if there.cost <= here.cost {
+            (motion, here) = (next, there);
+            damping *= 0.1;
+        } else {
+            damping *= 10.0;
+        }
+        if step.norm() < STEP || damping > 1e9 {
+            break;
+        }
+    }
+    (motion, here.cost)
+}
+
+/// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared
+/// units of noise; `None` where the depths exclude it.
+pub(crate) fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<(Motion, f64)> {
+    let searched = if observations.n > SEARCHED {
+        Cow::Owned(observations.subset(&sample(observations.n, SEARCHED, rng)))
+    } else {
+        Cow::Borrowed(observations)
+    };
+    let (_, cost) = in_front(&searched, motion);
+    let (opposite, other) = in_front(&searched, &motion.reversed());
+    // One that turned back is no other motion.
+    let turned = opposite.u().dot(&motion.u()) < 0.0;
+    let excess = (other - cost) * observations.n as f64 / searched.n as f64;
+    (turned && excess < SURE).then_some((opposite, excess))
 }

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::math::random::CounterRng;
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::{Intrinsics, Motion, MotionOptions, Placement, Status as Told, estimate_patch_motion};
 use crate::types::FieldLayout;
-use nalgebra::SMatrix;
 
 const FOCAL: f64 = 500.0;
 
@@ -177,8 +177,8 @@ fn squared(found: &crate::motion3d::MotionEstimate, truth: &Motion) -> f64 {
     let off: Vec<f64> = (0..3).map(|i| truth.translation[i] - found.motion.translation[i]).collect();
     let along = |axis: usize| (0..3).map(|i| found.tangent[axis][i] * off[i]).sum::<f64>();
     let turn = |i: usize| truth.rotation[i] - found.motion.rotation[i];
-    let error = SMatrix::<f64, 5, 1>::from_column_slice(&[along(0), along(1), turn(0), turn(1), turn(2)]);
-    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| found.covariance[i][j]);
+    let error = Vector5::from_column_slice(&[along(0), along(1), turn(0), turn(1), turn(2)]);
+    let covariance = Matrix5::from_fn(|i, j| found.covariance[i][j]);
     (error.transpose() * covariance.try_inverse().unwrap() * error)[0]
 }
 

@@ -3,25 +3,22 @@
 //! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar
 //! line and `s m = T . d` the part along it (2).
 
-mod cheirality;
+use crate::motion3d::model::observations::PLANES;
+use crate::motion3d::model::rows::Matrix5;
 mod equations;
 mod points;
 mod weighted;
 
-pub(crate) use cheirality::{FrontEquations, front_equations};
-pub(crate) use equations::{Equations, equations};
-pub(crate) use points::{Depths, best_rotation, consensus, depths};
+pub(crate) use equations::{Equations, FrontEquations, equations, front_equations};
+pub(crate) use points::{Depths, best_rotation, consensus, depths, slopes};
 pub(crate) use weighted::{Bilinear, information, slope};
 
-use super::model::motion::Motion;
-use super::model::observations::Observations;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
 use crate::simd::Lanes;
-use nalgebra::{Matrix2x3, Matrix3, SMatrix};
+use nalgebra::{Matrix2x3, Matrix3};
 use rayon::prelude::*;
 use std::ops::{AddAssign, Range};
-
-/// Planes of an [`Observations`].
-pub(crate) const PLANES: usize = 14;
 
 /// A motion in every lane.
 struct Everywhere<V> {
@@ -44,7 +41,7 @@ struct Seen<V> {
     along: V,
 }
 
-type Planes<'a> = [&'a [f64]; PLANES];
+pub(crate) type Planes<'a> = [&'a [f64]; PLANES];
 
 impl<V: Lanes<Scalar = f64>> Everywhere<V> {
     #[inline(always)]
@@ -147,6 +144,6 @@ const UPPER: [(usize, usize); 15] = [
 ];
 
 /// Adds a 3 x 3 matrix, times a factor, to the block of the rotation.
-pub(crate) fn add_to_rotation(h: &mut SMatrix<f64, 5, 5>, information: &Matrix3<f64>, factor: f64) {
+pub(crate) fn add_to_rotation(h: &mut Matrix5, information: &Matrix3<f64>, factor: f64) {
     h.fixed_view_mut::<3, 3>(2, 2).add_assign(information * factor);
 }

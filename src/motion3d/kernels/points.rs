@@ -3,8 +3,9 @@
 use super::{Everywhere, Planes, over_chunks, see, total};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{CHUNK, Observations};
+use crate::motion3d::model::rows::Vector5;
 use crate::simd::{Kernel, Lanes, dispatch};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// The 3 x 3 normal equations of `w` for a fixed direction.
@@ -149,4 +150,18 @@ pub(crate) fn consensus(observations: &Observations, motion: &Motion, cut: f64) 
         dispatch(observations.level, ConsensusSum { planes, motion, floor: observations.floor, cut2: cut * cut })
     });
     cost
+}
+
+/// The row `D(nu)` of point `k`, 0 at the epipole.
+pub(crate) fn slopes(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: f64, k: usize) -> Vector5 {
+    let point = points.row(k);
+    let t = point.g * motion.u();
+    let s = t.norm();
+    if s * s <= points.floor {
+        return Vector5::zeros();
+    }
+    let across = nalgebra::RowVector2::new(t.y, -t.x) / s;
+    let psi = across * point.g * tangent.transpose() * nu;
+    let turn = across * point.r;
+    Vector5::new(psi.x, psi.y, turn.x, turn.y, turn.z)
 }

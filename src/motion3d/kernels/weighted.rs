@@ -1,11 +1,11 @@
 //! The estimating equation with given depths in its weights.
 
 use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
-use crate::motion3d::diagnostics::rotation_prior::Known;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Known, Observations};
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::simd::{Kernel, Lanes, dispatch};
-use nalgebra::{Matrix2x3, SMatrix};
+use nalgebra::Matrix2x3;
 use std::ops::AddAssign;
 
 /// `sum W^t W` for given depths in the weights, as the upper triangle.
@@ -85,13 +85,13 @@ pub(crate) fn information(
     tangent: &Matrix2x3<f64>,
     nu: &[f64],
     spread: f64,
-) -> SMatrix<f64, 5, 5> {
+) -> Matrix5 {
     let sums = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
         let nu = &nu[range];
         dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread })
     });
-    let mut h = SMatrix::<f64, 5, 5>::zeros();
+    let mut h = Matrix5::zeros();
     for (value, &(i, j)) in sums.iter().zip(&UPPER) {
         h[(i, j)] = *value;
         h[(j, i)] = *value;
@@ -163,14 +163,14 @@ pub(crate) fn slope(
     nu: &[f64],
     share: &[f64],
     spread: f64,
-) -> SMatrix<f64, 5, 5> {
+) -> Matrix5 {
     let sums = over_chunks(observations, |range| {
         let planes = observations.slices(&range);
         let nu = &nu[range.clone()];
         let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
         dispatch(observations.level, SlopeSums { weights, share: &share[range] })
     });
-    let mut slope = SMatrix::<f64, 5, 5>::zeros();
+    let mut slope = Matrix5::zeros();
     (slope[(0, 0)], slope[(0, 1)], slope[(1, 0)], slope[(1, 1)]) = (sums[0], sums[1], sums[1], sums[2]);
     let mut k = 15;
     for i in 0..3 {
@@ -252,9 +252,9 @@ impl Bilinear {
     }
 
     /// Its value at a motion, and its slopes along `tangent` and `w`.
-    pub fn at(&self, motion: &Motion, tangent: &Matrix2x3<f64>) -> (SMatrix<f64, 5, 1>, SMatrix<f64, 5, 5>) {
+    pub fn at(&self, motion: &Motion, tangent: &Matrix2x3<f64>) -> (Vector5, Matrix5) {
         let (u, w) = (motion.translation, motion.rotation);
-        let (mut value, mut slope) = (SMatrix::<f64, 5, 1>::zeros(), SMatrix::<f64, 5, 5>::zeros());
+        let (mut value, mut slope) = (Vector5::zeros(), Matrix5::zeros());
         for row in 0..5 {
             let h = |i: usize, j: usize| self.sums[12 * row + 4 * i + j];
             for i in 0..3 {

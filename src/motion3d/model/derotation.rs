@@ -25,7 +25,7 @@
 //! point is in `m`, too, and the residual across the line is its distance from the epipolar line times `2
 //! Z_2' / (Z_1' + Z_2')`: a motion that takes all depths far away would make any flow fit.
 
-use super::motion::{Motion, Rows, cross_matrix};
+use super::rows::{Rows, cross_matrix};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 /// Angle, rad, below which series are exact to double precision where closed forms cancel.
@@ -100,10 +100,10 @@ impl HalfTurn {
         }
     }
 
-    /// Takes out the rotation of a motion, whose translation tells what another rotation would change.
-    pub fn of(motion: &Motion) -> Self {
-        let turn = Self::new(&motion.w());
-        let towards = turn.mean * motion.u();
+    /// Takes out the rotation of a motion along `translation`, by which its rows change a little.
+    pub fn along(rotation: &Vector3<f64>, translation: &Vector3<f64>) -> Self {
+        let turn = Self::new(rotation);
+        let towards = turn.mean * translation;
         if towards.iter().all(|value| value.is_finite()) { Self { towards, ..turn } } else { turn }
     }
 
@@ -188,6 +188,7 @@ impl HalfWay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion3d::Motion;
 
     /// `(first, second, depth half way)` of a point under a motion over a whole frame.
     fn seen(motion: &Motion, first: [f64; 2], nu: f64) -> ([f64; 2], [f64; 2], f64) {

@@ -1,15 +1,16 @@
 //! What is given and what is estimated, in the order of the data.
 //!
-//! `options` (flow, noise, method) and `camera` say what is given; `derotation` takes a rotation out of finite
-//! displacements; `covariance_floor` limits given covariances; `whitening` turns points into rows of `f = nu G u
-//! + R w` with unit noise, which `observations` holds as planes. `motion` is what is estimated, `result` what is
-//! returned.
+//! `input` (points, flow, noise), `camera` and `options` say what is given. `rows` writes a point's flow as
+//! `f = nu G u + R w`, `derotation` does so for finite displacements; `whitening` scales the rows to unit noise
+//! and `observations` holds them as planes. `motion` is what is estimated, `result` what is returned.
 
 pub(crate) mod camera;
-pub(crate) mod covariance_floor;
 pub(crate) mod derotation;
+pub(crate) mod input;
 pub(crate) mod motion;
 pub(crate) mod observations;
 pub(crate) mod options;
 pub(crate) mod result;
+pub(crate) mod rows;
+pub(crate) mod statistics;
 pub(crate) mod whitening;

@@ -1,12 +1,10 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
 use super::derotation::HalfTurn;
-use super::motion::Rows;
+use super::rows::Rows;
 use crate::math::{median, quantile};
-use crate::motion3d::diagnostics::rotation_prior::Known;
-use crate::motion3d::kernels::PLANES;
 use crate::simd::Level;
-use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
@@ -65,7 +63,7 @@ pub(crate) struct Observations {
     /// What is known of the rotation beforehand.
     pub prior: Option<Known>,
     /// How many points share one error: their own has the variance `1 / shared`.
-    pub shared: f64,
+    pub points_per_independent_sample: f64,
     /// Whether errors of neighbours are independent.
     pub independent: bool,
     /// Whether flow is a displacement over a whole frame.
@@ -134,7 +132,7 @@ impl Observations {
             floor,
             level: Level::detect(),
             prior: None,
-            shared: 1.0,
+            points_per_independent_sample: 1.0,
             independent: true,
             displaced: false,
             turn: None,
@@ -144,7 +142,8 @@ impl Observations {
 
     /// Takes units and what is known beforehand from other observations; these have just been whitened.
     pub fn like(&mut self, other: &Self) {
-        (self.prior, self.shared, self.displaced) = (other.prior, other.shared, other.displaced);
+        (self.prior, self.points_per_independent_sample, self.displaced) =
+            (other.prior, other.points_per_independent_sample, other.displaced);
         self.independent = other.independent;
         self.rescale(other.units);
     }
@@ -171,7 +170,7 @@ impl Observations {
             floor: self.floor,
             level: self.level,
             prior: self.prior,
-            shared: self.shared,
+            points_per_independent_sample: self.points_per_independent_sample,
             independent: self.independent,
             displaced: self.displaced,
             turn: self.turn,
@@ -229,7 +228,7 @@ impl Observations {
 
     /// The deviation of a point's own error, in units of noise.
     pub fn own(&self) -> f64 {
-        self.shared.sqrt().recip()
+        self.points_per_independent_sample.sqrt().recip()
     }
 
     /// One plane, `stride` values.
@@ -278,4 +277,47 @@ fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let second = (covariance[(1, 1)] - below * below).sqrt();
     let positive = first > 0.0 && second > 0.0;
     positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
+}
+
+/// A rotation known beforehand, with the inverse of its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known {
+    pub rotation: Vector3<f64>,
+    pub information: Matrix3<f64>,
+}
+
+impl Known {
+    /// `(w0 - w)` times the information, and the square of the difference in its units.
+    pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let off = self.rotation - w;
+        let pull = self.information * off;
+        (pull, off.dot(&pull))
+    }
+}
+
+/// Planes of an [`Observations`].
+pub(crate) const PLANES: usize = 14;
+
+/// Noise of flow that is exactly zero, in its unit.
+pub(crate) const LEAST_NOISE: f64 = 1e-100;
+
+/// Points in units of their noise, and that in the flow's unit.
+pub(crate) struct Scaled {
+    pub observations: Observations,
+    pub sigma: f64,
+    /// Whether `sigma` has to be estimated.
+    pub unknown: bool,
+    /// Whether the flow may be that of a rotation alone.
+    pub may_turn: bool,
+}
+
+impl Scaled {
+    /// Takes `sigma` in units of the present noise to be the noise.
+    pub fn take(&mut self, sigma: f64) {
+        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(LEAST_NOISE);
+        if sigma.is_finite() {
+            self.observations.rescale(1.0 / sigma);
+            self.sigma *= sigma;
+        }
+    }
 }

@@ -1,51 +1,13 @@
 //! What is given and how it is worked on.
 
-use super::camera::Intrinsics;
-use super::motion::{Motion, Projection, tangents};
-use super::result::MotionEstimate;
+use super::input::{Flow, Noise, Placement};
+use super::motion::{Motion, Projection};
+use super::observations::Known;
+use super::result::{CommonEffect, MotionEstimate, Moved};
+use super::rows::{Matrix5, Vector5};
 use crate::error::{Error, Result, numbers};
-use crate::motion3d::diagnostics::rotation_prior::Known;
-use crate::motion3d::diagnostics::systematic_errors::CommonErrors;
-use crate::motion3d::solver::smoothing::Smoother;
 use crate::parallel::Threads;
-use nalgebra::{DMatrix, Matrix3, Vector3};
-
-/// Points with their flow, N of each.
-#[derive(Debug, Clone, Copy)]
-pub enum Flow<'a> {
-    /// On the picture.
-    Plane {
-        /// Where, px with a camera, else on the plane at distance 1.
-        points: &'a [[f64; 2]],
-        /// Displacement over one frame, in the same unit.
-        flow: &'a [[f64; 2]],
-        /// The camera; `None`: everything is on the plane at distance 1.
-        camera: Option<&'a Intrinsics>,
-    },
-    /// On the unit sphere.
-    Sphere {
-        /// Bearings of length 1.
-        bearings: &'a [[f64; 3]],
-        /// Their rates of change, rad/frame; parts along the bearings do not count.
-        flow: &'a [[f64; 3]],
-    },
-}
-
-/// Noise of the flow.
-#[derive(Debug, Clone, Copy, Default)]
-pub enum Noise<'a> {
-    /// The same everywhere; its size is estimated from the residuals.
-    #[default]
-    Unknown,
-    /// Standard deviation of each component, in the unit of the flow.
-    Sigma(f64),
-    /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of
-    /// the flow. Points whose covariance is not finite are left out; others must be symmetric and positive
-    /// definite, on the sphere across the bearing. A point whose smaller variance is below a millionth of the
-    /// lower quartile of all has that quartile added: no measurement is so much better than others, and one
-    /// that says so would decide alone.
-    Covariances(&'a [f64]),
-}
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
 /// Which estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,16 +19,6 @@ pub enum Method {
     MaximumLikelihood,
     /// The estimating equation whose weights have smoothed depths: (19), (25).
     Efficient,
-}
-
-/// Where on its path a displacement is taken to be the instantaneous flow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Placement {
-    /// Half way: exact to second order.
-    #[default]
-    Midpoint,
-    /// Where the point was: for flow that is instantaneous already.
-    Start,
 }
 
 /// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a
@@ -84,15 +36,22 @@ pub struct RotationPrior {
 }
 
 impl RotationPrior {
-    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `turning` (standard
+    /// `None` unless everything is finite and the covariance positive definite.
+    pub(crate) fn information(&self) -> Option<Known> {
+        let covariance = Matrix3::from_fn(|i, j| 0.5 * (self.covariance[i][j] + self.covariance[j][i]));
+        let known = Known { rotation: self.rotation.into(), information: covariance.cholesky()?.inverse() };
+        known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
+    }
+
+    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `object_rotation_std` (standard
     /// deviation about each axis, rad/frame). `None` where the scene's is not known.
-    pub fn of_scene(scene: &MotionEstimate, turning: f64) -> Option<Self> {
-        Self::beside(scene.motion.rotation, &scene.covariance, turning)
+    pub fn of_scene(scene: &MotionEstimate, object_rotation_std: f64) -> Option<Self> {
+        Self::from_scene_covariance(scene.motion.rotation, &scene.covariance, object_rotation_std)
     }
 
     /// The same from the scene's rotation and the covariance of its `(psi, w)`.
-    pub fn beside(rotation: [f64; 3], covariance: &[[f64; 5]; 5], turning: f64) -> Option<Self> {
-        let own = |i, j| if i == j { turning * turning } else { 0.0 };
+    pub fn from_scene_covariance(rotation: [f64; 3], covariance: &[[f64; 5]; 5], object_rotation_std: f64) -> Option<Self> {
+        let own = |i, j| if i == j { object_rotation_std * object_rotation_std } else { 0.0 };
         let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance[2 + i][2 + j] + own(i, j)));
         let known = Self { rotation, covariance };
         known.rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(known)
@@ -121,7 +80,7 @@ pub struct MotionOptions {
     /// How many points share one error, at least 1: the noise given is so many times their own in variance,
     /// so that together they tell no more than they know. What is an outlier, and what chance explains, is
     /// judged by their own. Default: 1.
-    pub shared: Option<f64>,
+    pub points_per_independent_sample: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the
     /// sphere), as those of windowed flow do: the covariance is then that of the sums over points whose
     /// errors correlate (`together`), in no direction smaller than that of independent points. Default: not
@@ -142,7 +101,7 @@ impl MotionOptions {
             return Err(Error::argument("weight_inv_depth", expected, depths.len()));
         }
         self.check_in_front()?;
-        if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| Known::new(prior).is_none()) {
+        if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| prior.information().is_none()) {
             let expected = "a finite rotation with a positive definite covariance";
             let (rotation, covariance) = (numbers(&prior.rotation), numbers(prior.covariance.as_flattened()));
             return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
@@ -183,117 +142,90 @@ impl MotionOptions {
         if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(Error::argument("correlation_length", "a number of at least 0", length));
         }
-        match self.shared {
-            Some(shared) if !(shared.is_finite() && shared >= 1.0) => {
-                Err(Error::argument("shared", "a number of at least 1", shared))
+        match self.points_per_independent_sample {
+            Some(points_per_independent_sample)
+                if !(points_per_independent_sample.is_finite() && points_per_independent_sample >= 1.0) =>
+            {
+                Err(Error::argument(
+                    "points_per_independent_sample",
+                    "a number of at least 1",
+                    points_per_independent_sample,
+                ))
             }
             Some(_) if matches!(noise, Noise::Unknown) => {
-                Err(Error::argument("shared", "a noise that is known", "sigma and cov left out"))
+                Err(Error::argument("points_per_independent_sample", "a noise that is known", "sigma and cov left out"))
             }
             _ => Ok(()),
         }
     }
 }
 
-impl Flow<'_> {
-    /// Number of points.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Plane { points, .. } => points.len(),
-            Self::Sphere { bearings, .. } => bearings.len(),
-        }
-    }
-    /// No point at all.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-    /// Where point `k` lies, in the unit of the points.
-    pub(crate) fn place(&self, k: usize) -> Vector3<f64> {
-        match self {
-            Self::Plane { points, .. } => Vector3::new(points[k][0], points[k][1], 0.0),
-            Self::Sphere { bearings, .. } => bearings[k].into(),
-        }
-    }
-    /// The camera that saw it.
-    pub(crate) fn camera(&self) -> Option<&Intrinsics> {
-        if let Self::Plane { camera, .. } = self { *camera } else { None }
-    }
-    /// The screen.
-    pub fn projection(&self) -> Projection {
-        match self {
-            Self::Plane { .. } => Projection::Plane,
-            Self::Sphere { .. } => Projection::Sphere,
-        }
-    }
+/// Which predictors may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Smoother {
+    /// The better of both on these points.
+    #[default]
+    Auto,
+    /// One normal distribution of all inverse depths.
+    Prior,
+    /// Local-linear regression on the 8, 16, 32 or 64 nearest points.
+    Neighbours,
+}
 
-    /// Whether all covariances that are finite are some; on the sphere only across the bearing, where the
-    /// flow is.
-    fn check_covariances(&self, covariances: &[f64], values: usize) -> Result<()> {
-        for (k, given) in covariances.chunks_exact(values).enumerate() {
-            let good = match self {
-                Self::Plane { .. } => is_covariance(&DMatrix::from_row_slice(2, 2, given)),
-                Self::Sphere { bearings, .. } => {
-                    let axes = tangents(&Vector3::from(bearings[k]).normalize());
-                    let given = Matrix3::from_row_slice(given);
-                    let across = axes * given * axes.transpose();
-                    symmetric(given.as_slice(), 3)
-                        && is_covariance(&DMatrix::from_column_slice(2, 2, across.as_slice()))
-                }
-            };
-            if !good {
-                return Err(not_covariance(k, given));
-            }
+/// Standard deviations of errors that all flow of a picture has in common. Default: 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CommonErrors {
+    /// Of a factor, about 1, that all flow is too long by: no residual tells it, and it is one of the
+    /// rotation's length.
+    pub scale: f64,
+    /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not
+    /// on the sphere.
+    pub offset: f64,
+}
+
+impl CommonErrors {
+    /// On the plane or the sphere.
+    pub(crate) fn check(&self, projection: Projection) -> Result<()> {
+        if !(0.0..=1.0).contains(&self.scale) {
+            return Err(Error::argument("flow_scale_std", "a number from 0 to 1", self.scale));
+        }
+        if !(0.0..=FARTHEST).contains(&self.offset) {
+            return Err(Error::argument("flow_bias_std", format!("a number from 0 to {FARTHEST:e}"), self.offset));
+        }
+        if projection == Projection::Sphere && self.offset > 0.0 {
+            return Err(Error::argument(
+                "flow_bias_std",
+                "0 on the sphere, where no displacement is common",
+                self.offset,
+            ));
         }
         Ok(())
     }
 
-    pub(crate) fn check(&self, noise: &Noise<'_>) -> Result<()> {
-        let (points, flow, values) = match self {
-            Self::Plane { points, flow, .. } => (points.len(), flow.len(), 4),
-            Self::Sphere { bearings, flow } => (bearings.len(), flow.len(), 9),
-        };
-        if points != flow {
-            return Err(Error::argument("flow", format!("{points} values, one for each point"), flow));
+    /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do
+    /// to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
+    pub(crate) fn on(
+        &self,
+        covariance: &Matrix5,
+        motion: &Motion,
+        known: Option<&Known>,
+        (moved, unit): (&Moved, &Matrix2<f64>),
+    ) -> CommonEffect {
+        let w = motion.w();
+        let mut scaled = Vector5::new(0.0, 0.0, w.x, w.y, w.z);
+        if let Some(known) = known {
+            scaled -= covariance.fixed_columns::<3>(2) * (known.information * w);
         }
-        if let Self::Sphere { bearings, .. } = self {
-            let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
-            if let Some(wrong) = bearings.iter().find(off) {
-                return Err(Error::argument("points", "bearings of length 1", numbers(wrong)));
-            }
-        }
-        match noise {
-            // The sums of squares that an estimate is made of are of its fourth power.
-            Noise::Sigma(sigma) if !(*sigma > 0.0 && sigma.powi(4).is_normal()) => {
-                Err(Error::argument("sigma", "a positive number between 1e-75 and 1e75", sigma))
-            }
-            Noise::Covariances(c) if c.len() != values * points => {
-                let expected = format!("{points} matrices of {values} values");
-                Err(Error::argument("cov", expected, format!("{} values", c.len())))
-            }
-            Noise::Covariances(c) => self.check_covariances(c, values),
-            _ => Ok(()),
-        }
+        let displaced = unit * self.offset;
+        CommonEffect::of(self.scale, &scaled, &displaced, &(moved * displaced))
+    }
+
+    /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the
+    /// flow do to it.
+    pub(crate) fn added_to_rotation(&self, w: &Vector3<f64>, moved: &Matrix3x2<f64>) -> Matrix3<f64> {
+        w * w.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
     }
 }
 
-/// Asymmetry of a covariance, in shares of its largest entry, that is rounding.
-const ROUNDED: f64 = 1e-5;
-
-fn symmetric(values: &[f64], size: usize) -> bool {
-    let largest = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    let off = |i: usize, j: usize| (values[size * i + j] - values[size * j + i]).abs();
-    (0..size).all(|i| (0..i).all(|j| off(i, j) <= ROUNDED * largest))
-}
-
-/// Whether a matrix is symmetric and positive definite, or not finite: then its point is left out.
-pub(crate) fn is_covariance(matrix: &DMatrix<f64>) -> bool {
-    if !matrix.iter().all(|value| value.is_finite()) {
-        return true;
-    }
-    let even = 0.5 * (matrix + matrix.transpose());
-    symmetric(matrix.as_slice(), matrix.nrows()) && even.cholesky().is_some()
-}
-
-pub(crate) fn not_covariance(k: usize, got: &[f64]) -> Error {
-    Error::argument("cov", "symmetric positive definite matrices", format!("at point {k} {}", numbers(got)))
-}
+/// The largest displacement: squares of larger ones are no numbers.
+pub(crate) const FARTHEST: f64 = 1e100;

@@ -2,9 +2,8 @@
 
 use super::camera::Intrinsics;
 use super::motion::Motion;
-use crate::motion3d::contact::UncertainMotion;
-use crate::motion3d::diagnostics::systematic_errors::CommonEffect;
-use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, SMatrix};
+use super::rows::{Matrix5, Vector5};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};
 
 /// How far an estimate can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -129,7 +128,7 @@ pub(crate) fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
 }
 
-pub(crate) fn nested(matrix: &SMatrix<f64, 5, 5>) -> [[f64; 5]; 5] {
+pub(crate) fn nested(matrix: &Matrix5) -> [[f64; 5]; 5] {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
 }
 
@@ -192,4 +191,65 @@ pub fn focus_of_expansion(
     let of_focus = slope * block * slope.transpose();
     let at = camera.map_or(at, |camera| camera.to_pixel(at));
     Some((at, std::array::from_fn(|i| std::array::from_fn(|j| of_focus[(i, j)]))))
+}
+
+/// What one displacement of all flow, on the plane at distance 1, does to the equations' unknowns.
+pub(crate) type Moved = SMatrix<f64, 5, 2>;
+
+/// What they do to a motion: its covariance has the squares of `motion` in it. Default: nothing.
+///
+/// Whatever is computed from the same flow and the motion together, as depths are, errs with both.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CommonEffect {
+    /// Standard deviation of the factor.
+    pub scale: f64,
+    /// Displacements of one deviation along both axes of the picture, on the plane at distance 1.
+    pub displaced: [[f64; 2]; 2],
+    /// What one deviation of the factor and each of these displacements do to `(psi, w)`, rad and rad/frame.
+    pub motion: [[f64; 5]; 3],
+}
+
+impl CommonEffect {
+    pub(crate) fn of(scale: f64, scaled: &Vector5, displaced: &Matrix2<f64>, moved: &Moved) -> Self {
+        let column = |k: usize| moved.column(k).into_owned().into();
+        let displacement = |k: usize| displaced.column(k).into_owned().into();
+        Self {
+            scale,
+            displaced: [displacement(0), displacement(1)],
+            motion: [(scaled * scale).into(), column(0), column(1)],
+        }
+    }
+
+    /// What displacements of one deviation do to the motion.
+    fn moves(&self) -> [Vector5; 3] {
+        self.motion.map(SVector::from)
+    }
+
+    /// What is in the motion's covariance.
+    pub(crate) fn added(&self) -> Matrix5 {
+        self.moves().iter().map(|moved| moved * moved.transpose()).sum()
+    }
+
+    /// The variance of a value that is `value` times as large with all flow, by its slopes along `(psi, w)`
+    /// and along a point's own flow on the plane at distance 1.
+    pub(crate) fn variance(&self, value: f64, of_motion: &Vector5, of_flow: &RowVector2<f64>) -> f64 {
+        let [_, along @ ..] = self.moves();
+        let displaced = along.iter().zip(self.displaced.map(Vector2::from));
+        let moved = displaced.map(|(moved, by)| (of_motion.dot(moved) + (of_flow * by)[0]).powi(2));
+        (value * self.scale).powi(2) + moved.sum::<f64>()
+    }
+}
+
+/// A motion as far as times to contact take it: that of a [`MotionEstimate`](crate::motion3d::MotionEstimate) by
+/// [`uncertain`](crate::motion3d::MotionEstimate::uncertain).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UncertainMotion {
+    /// The motion of the scene relative to the camera.
+    pub motion: Motion,
+    /// Axes of `psi`: two unit vectors perpendicular to `u`.
+    pub tangent: [[f64; 3]; 2],
+    /// Covariance of `(psi, w)`, rad and rad/frame.
+    pub covariance: [[f64; 5]; 5],
+    /// What is in it of errors that all flow has in common, those of the points whose times are wanted too.
+    pub common: CommonEffect,
 }

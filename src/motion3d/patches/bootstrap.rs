@@ -10,9 +10,10 @@ use super::system::System;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
-use crate::motion3d::model::motion::{Motion, tangents};
-use crate::motion3d::solver::covariance::{Matrix5, inverse, plugged_in};
-use nalgebra::{SMatrix, Vector3, Vector6};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::solver::covariance::{inverse, plugged_in};
+use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 
 /// Patches from which on the linear theory does.
@@ -65,6 +66,6 @@ fn distance(system: &System, truth: &Motion, weighted: bool) -> f64 {
     let Some((found, covariance)) = found() else { return f64::INFINITY };
     let along = tangents(&found.u()) * truth.u();
     let turn = truth.w() - found.w();
-    let off = SMatrix::<f64, 5, 1>::from_column_slice(&[along.x, along.y, turn.x, turn.y, turn.z]);
+    let off = Vector5::from_column_slice(&[along.x, along.y, turn.x, turn.y, turn.z]);
     covariance.cholesky().map_or(f64::INFINITY, |factor| off.dot(&factor.solve(&off)))
 }

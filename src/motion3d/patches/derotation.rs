@@ -4,8 +4,9 @@ use super::system::{Patch, System};
 use super::{AffinePatches, cheapest, least_squares};
 use crate::motion3d::model::camera::affine_map;
 use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::input::Placement;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::options::{MotionOptions, Placement};
+use crate::motion3d::model::options::MotionOptions;
 use nalgebra::{Matrix2, Matrix6, Vector6};
 
 /// Times that a rotation is taken out of displacements, and the change of it, rad, that is rounding.

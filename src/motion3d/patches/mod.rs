@@ -10,19 +10,21 @@ mod shrinkage;
 mod status;
 mod system;
 
-use super::bound::{MotionBound, check_truth, not_determined, too_few};
-use super::diagnostics::degenerate::{RotationOnly, by_chance};
-use super::diagnostics::systematic_errors::CommonEffect;
-use super::model::camera::{Intrinsics, to_plane};
-use super::model::covariance_floor::believed;
-use super::model::derotation::HalfTurn;
-use super::model::motion::{Motion, Projection, tangents};
-use super::model::options::{Method, MotionOptions, Noise, Placement, is_covariance, not_covariance};
-use super::model::result::{Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use super::solver::covariance::{determined, inverse, plugged_in};
-use super::solver::starts::{apart, evaluate, sample};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
+use crate::motion3d::bound::{MotionBound, check_truth, not_determined, too_few};
+use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::model::camera::{Intrinsics, to_plane};
+use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::input::{Noise, Placement, is_covariance, not_covariance};
+use crate::motion3d::model::motion::{Motion, Projection};
+use crate::motion3d::model::options::{Method, MotionOptions};
+use crate::motion3d::model::result::{CommonEffect, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use crate::motion3d::model::rows::tangents;
+use crate::motion3d::model::statistics::by_chance;
+use crate::motion3d::model::whitening::believed;
+use crate::motion3d::solver::covariance::{determined, inverse, plugged_in};
+use crate::motion3d::solver::starts::{apart, evaluate, sample};
 use bootstrap::wider;
 use derotation::{beforehand, settle, turned_patch};
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -115,7 +117,7 @@ impl AffinePatches<'_> {
 
 /// The rigid motion that explains the affine flow of patches.
 ///
-/// As [`estimate_motion`](super::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5
+/// As [`estimate_motion`](crate::motion3d::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5
 /// patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches.
 /// Patches should be fits over windows of 30 px and more that do not overlap: numbers that share noise must
 /// come with covariances that say so. Other minima and opposite directions that no patch behind the camera
@@ -123,7 +125,7 @@ impl AffinePatches<'_> {
 ///
 /// # Errors
 /// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`,
-/// `rotation_prior`, `shared` and `correlation_length`, which this form does not have.
+/// `rotation_prior`, `points_per_independent_sample` and `correlation_length`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let refuse = |name: &'static str| {
@@ -133,7 +135,7 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { robust: true, .. } => return refuse("robust"),
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
         MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
-        MotionOptions { shared: Some(_), .. } => return refuse("shared"),
+        MotionOptions { points_per_independent_sample: Some(_), .. } => return refuse("points_per_independent_sample"),
         MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
         _ => {}
     }
@@ -251,11 +253,11 @@ fn least_squares(system: &System) -> Option<RotationOnly> {
     Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
-/// As [`motion_bound`](super::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given;
+/// As [`motion_bound`](crate::motion3d::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given;
 /// their flow is not looked at.
 ///
 /// # Errors
-/// As [`motion_bound`](super::motion_bound).
+/// As [`motion_bound`](crate::motion3d::motion_bound).
 pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces: &[[f64; 3]]) -> Result<MotionBound> {
     patches.check()?;
     check_truth(&Noise::Sigma(1.0), motion)?;

@@ -1,13 +1,14 @@
 //! What is told about a motion of patches.
 
 use super::system::System;
-use crate::motion3d::contact::Rates;
-use crate::motion3d::diagnostics::degenerate::RotationOnly;
+use crate::motion3d::diagnostics::contact::Rates;
 use crate::motion3d::diagnostics::report::turned;
-use crate::motion3d::diagnostics::systematic_errors::CommonErrors;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, MotionEstimate, Status, axes, nested};
-use crate::motion3d::solver::covariance::{Matrix5, direction_deviation, plugged_in};
+use crate::motion3d::model::rows::{Matrix5, tangents};
+use crate::motion3d::solver::covariance::{direction_deviation, plugged_in};
 use nalgebra::{Matrix2, Vector3};
 
 /// Fills in what is told about a motion; whether the patches are one plane that has another motion too.

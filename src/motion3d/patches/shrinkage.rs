@@ -1,7 +1,8 @@
 //! The estimating equation with surfaces drawn to their distribution over the patches.
 
 use super::system::System;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::rows::tangents;
 use nalgebra::{Matrix3, Vector3};
 
 /// Rounds of shrinking and solving; of expectation and maximisation; of the solution.

@@ -5,9 +5,10 @@ use super::system::System;
 use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::diagnostics::status::{FAR, SPACING, WIDE};
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::{Alternative, MotionEstimate, Status};
-use crate::motion3d::solver::covariance::{Matrix5, direction_deviation};
+use crate::motion3d::model::rows::{Matrix5, tangents};
+use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::starts::{evaluate, sample};
 use nalgebra::Vector3;
 

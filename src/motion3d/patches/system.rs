@@ -1,10 +1,11 @@
 //! The equations of whitened patches.
 
-use crate::motion3d::diagnostics::degenerate::by_chance;
-use crate::motion3d::diagnostics::systematic_errors::Moved;
 use crate::motion3d::model::derotation::HalfTurn;
-use crate::motion3d::model::motion::{AffineRows, Motion, tangents};
-use crate::motion3d::solver::covariance::{Matrix5, inverse};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::result::Moved;
+use crate::motion3d::model::rows::{AffineRows, Matrix5, Vector5, tangents};
+use crate::motion3d::model::statistics::by_chance;
+use crate::motion3d::solver::covariance::inverse;
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, RowVector2, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
@@ -53,7 +54,7 @@ pub(crate) struct System {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PatchEquations {
     pub h: Matrix5,
-    pub gradient: SMatrix<f64, 5, 1>,
+    pub gradient: Vector5,
     pub p: Matrix5,
     pub cost: f64,
     pub behind: f64,
@@ -128,7 +129,7 @@ impl Patch {
         tangent: &Matrix2x3<f64>,
         motion: &Motion,
         seen: &SeenPatch,
-    ) -> (SMatrix<f64, 5, 1>, RowVector2<f64>) {
+    ) -> (Vector5, RowVector2<f64>) {
         let along = (seen.covariance * self.depth(&motion.u()).transpose()).fixed_rows::<1>(0).into_owned();
         let of_motion = -(along * self.slopes(tangent, &seen.surface)).transpose();
         (of_motion, along * self.whiten.fixed_columns::<2>(0))

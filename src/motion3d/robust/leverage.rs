@@ -7,8 +7,9 @@ use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::MotionEstimate;
-use crate::motion3d::solver::covariance::{Matrix5, inverse};
-use nalgebra::{Matrix2x3, SMatrix, Vector3};
+use crate::motion3d::model::rows::Matrix5;
+use crate::motion3d::solver::covariance::inverse;
+use nalgebra::{Matrix2x3, Vector3};
 
 /// From so many inliers on no few of them decide.
 const MANY: usize = 300;
@@ -19,8 +20,7 @@ const SURE: f64 = 0.95;
 /// By how much the deviation may grow without the points that may be outliers.
 const MOST: f64 = 2.0;
 
-type Vector5 = SMatrix<f64, 5, 1>;
-
+use crate::motion3d::model::rows::Vector5;
 /// Whether the direction's deviation would more than double without the inliers that tell most of it, of as
 /// many as outliers may obey by chance.
 ///

@@ -1,6 +1,6 @@
 //! The last steps towards the motion among points of which some are strays.
 //!
-//! With the probability `g(e)` of each point that it is an inlier ([`strays`](super::outlier_posterior)), the estimating
+//! With the probability `g(e)` of each point that it is an inlier ([`strays`](crate::motion3d::robust::outlier_posterior)), the estimating
 //! equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its
 //! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
 //! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the
@@ -11,10 +11,11 @@ use super::depth_consistency::{Gate, Judged};
 use super::outlier_posterior::{Strays, normal};
 use super::{Consensus, INLIER, LEAST, obeying};
 use crate::motion3d::kernels::depths;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{CHUNK, Observations};
-use crate::motion3d::solver::covariance::{Matrix5, direction_spread, inverse};
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2};
+use crate::motion3d::model::rows::{Matrix5, tangents};
+use crate::motion3d::solver::covariance::{direction_spread, inverse};
+use nalgebra::{Matrix2, Matrix2x3, Vector2};
 use rayon::prelude::*;
 
 /// Most Newton steps, and the square of one, in deviations, that is the last.
@@ -32,8 +33,7 @@ const LONGEST: f64 = 0.2;
 const ROUNDS: usize = 6;
 const SETTLED: f64 = 1e-3;
 
-type Vector5 = SMatrix<f64, 5, 1>;
-
+use crate::motion3d::model::rows::Vector5;
 /// A motion with its covariance in the axes `tangent`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Told {

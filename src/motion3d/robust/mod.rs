@@ -15,13 +15,12 @@ mod search;
 mod single_noise;
 mod two_motion_fit;
 
-use super::estimate::Scaled;
-use super::kernels::{consensus as truncated, depths};
-use super::model::motion::Motion;
-use super::model::observations::Observations;
-use super::solver::refine::{Effort, FEWER, MANY, refine};
-use super::solver::starts::sample;
 use crate::math::random::CounterRng;
+use crate::motion3d::kernels::{consensus as truncated, depths};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::{Observations, Scaled};
+use crate::motion3d::solver::refine::{Effort, FEWER, MANY, refine};
+use crate::motion3d::solver::starts::sample;
 use competing_motions::{among_many_strays, rivals, second};
 use depth_consistency::Gate;
 use graduated_weights::Narrowing;

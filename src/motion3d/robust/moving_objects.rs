@@ -4,8 +4,9 @@
 use super::{Consensus, LEAST, MANY, Rival, obeying};
 use crate::math::median;
 use crate::motion3d::kernels::equations;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_block, inverse};
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::{Effort, refine};
@@ -153,5 +154,5 @@ fn differ(observations: &Observations, found: &Consensus, inner: &Motion, fewer:
     }
     let own = (some - all) + all * BESIDES;
     // Here points are in units of their own errors, of which there are fewer than points.
-    Some(off.dot(&(own.try_inverse()? * off)) > RARE * observations.shared)
+    Some(off.dot(&(own.try_inverse()? * off)) > RARE * observations.points_per_independent_sample)
 }

@@ -7,10 +7,9 @@
 use super::residual_autocorrelation::alike;
 use super::{Consensus, UNKNOWNS, in_known_noise};
 use crate::math::random::CounterRng;
-use crate::motion3d::estimate::Scaled;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Observations, Scaled};
 
 /// First guesses, in shares of the median flow: the next one where residuals go together.
 const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];

@@ -2,15 +2,14 @@
 //! and the scene obey a third motion together, their residuals are as small as noise, but those of each pull
 //! another way.
 
-use crate::motion3d::diagnostics::correlated_noise::slopes;
-use crate::motion3d::diagnostics::degenerate::chi2_deviation;
-use crate::motion3d::kernels::depths;
+use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::solver::covariance::Matrix5;
+use crate::motion3d::model::rows::{Matrix5, Vector5};
+use crate::motion3d::model::statistics::chi2_deviation;
 use crate::motion3d::solver::neighbours::Tree;
 use crate::motion3d::solver::refine::{Effort, refine};
-use nalgebra::{SVector, SymmetricEigen};
+use nalgebra::SymmetricEigen;
 use std::ops::Range;
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
@@ -45,7 +44,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
     let tree = Tree::new(&own.site[..own.n]);
     let parts = tree.halves(FEWEST.max(own.n / PART));
     let departs = |places: &Range<usize>| {
-        let (mut share, mut pull) = (Matrix5::zeros(), SVector::<f64, 5>::zeros());
+        let (mut share, mut pull) = (Matrix5::zeros(), Vector5::zeros());
         for &k in &tree.order()[places.clone()] {
             let row = &rows[k as usize];
             share += row * row.transpose();
@@ -60,7 +59,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
 }
 
 /// How far the `pull` of a part that has the `share` of all information is from noise, in deviations.
-fn departure(share: Matrix5, pull: &SVector<f64, 5>, variance: f64) -> f64 {
+fn departure(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
     if !share.iter().chain(pull).all(|value| value.is_finite()) {
         return 0.0;
     }

@@ -1,10 +1,10 @@
 //! Covariances of a motion: maximum likelihood's and the bound.
 
-use crate::motion3d::kernels::Equations;
-use nalgebra::{Matrix2, SMatrix, SymmetricEigen};
-
-/// Covariance of `(psi, w)`.
-pub(crate) type Matrix5 = SMatrix<f64, 5, 5>;
+use crate::motion3d::kernels::{Equations, information};
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::Matrix5;
+use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
 
 /// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still
 /// known to be positive.
@@ -76,4 +76,14 @@ pub(crate) fn direction_deviation(covariance: &Matrix5) -> f64 {
 /// The larger variance of the direction, rad^2.
 pub(crate) fn direction_spread(covariance: &Matrix5) -> f64 {
     SymmetricEigen::new(direction_block(covariance)).eigenvalues.max()
+}
+
+/// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
+pub(crate) fn damping(
+    observations: &Observations,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    nu: &[f64],
+) -> Option<f64> {
+    inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
 }

@@ -1,12 +1,14 @@
 //! The estimating equation with smoothed depths in its weights.
 
-use super::covariance::{Matrix5, direction_spread, inverse};
-use super::profile_likelihood::Valley;
+use super::covariance::{Plugged, damping, direction_deviation, inverse};
+use super::profile_likelihood::{Valley, among};
+use super::refine::Minimum;
 use super::smoothing::{DepthSmoother, Smoothed};
 use crate::motion3d::kernels::{Bilinear, depths, information, slope};
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use nalgebra::{Matrix2x3, SymmetricEigen};
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2};
 
 /// Times that depths are smoothed and the equation is solved.
 const ROUNDS: usize = 3;
@@ -192,16 +194,6 @@ fn known_sandwich(
     covariance.cholesky().map(|_| covariance)
 }
 
-/// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
-pub(crate) fn damping(
-    observations: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-) -> Option<f64> {
-    inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
-}
-
 /// The root of the equation whose weights are frozen at `start`.
 fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
     let tangent = tangents(&start.u());
@@ -223,11 +215,35 @@ fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Moti
     None
 }
 
+/// By how much the deviation of (17) must be above the bound's for the noise of the depths to matter.
+pub(crate) const NOISY: f64 = 1.3;
+
+/// Whether (17) cannot be trusted: the noise of the depths matters, and the epipole may lie among the points.
+pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plugged: &Plugged) -> bool {
+    let deviation = direction_deviation(&plugged.likelihood);
+    if deviation < NOISY * direction_deviation(&plugged.bound) {
+        return false;
+    }
+    among(observations, &minimum.motion, deviation)
+}
+
+/// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in
+/// the minimum's axes.
+pub(crate) fn departure(minimum: &Minimum, better: &Efficient) -> Matrix5 {
+    let along: Vector2<f64> = minimum.tangent * better.motion.u();
+    let turn = better.motion.w() - minimum.motion.w();
+    let apart = Vector5::from_column_slice(&[along.x, along.y, turn.x, turn.y, turn.z]);
+    let axes: Matrix2<f64> = minimum.tangent * better.tangent.transpose();
+    let mut into = Matrix5::identity();
+    into.fixed_view_mut::<2, 2>(0, 0).copy_from(&axes);
+    let error = into * better.covariance * into.transpose() + apart * apart.transpose();
+    0.5 * (error + error.transpose())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::motion3d::tests::scenes::Scene;
-    use nalgebra::SMatrix;
 
     #[test]
     fn the_slope_of_the_equation_is_its_own() {
@@ -242,7 +258,7 @@ mod tests {
         let (_, slope) = equation.at(&at, &axes);
         for axis in 0..5 {
             let value = |by: f64| {
-                let mut step = SMatrix::<f64, 5, 1>::zeros();
+                let mut step = Vector5::zeros();
                 step[axis] = by;
                 equation.at(&at.stepped(&axes, &step), &axes).0
             };

@@ -5,18 +5,18 @@
 //! of them ([`turned`](crate::motion3d::model::derotation)) have none. Where the rest would move an estimate by a small share of
 //! its deviation, nothing is turned.
 
-use super::likelihood::{close, different};
+use super::likelihood::{cost_tolerance, different};
 use super::refine::{Effort, Minimum, refine};
 use super::starts::at_most;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
-use crate::motion3d::diagnostics::correlated_noise::slopes;
-use crate::motion3d::kernels::depths;
+use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::derotation::HalfTurn;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
 use crate::motion3d::model::whitening::Intake;
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -65,7 +65,7 @@ const TURNS: usize = 3;
 /// sample of them.
 fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
     let few = at_most(points, SAMPLED, CounterRng::new(0));
-    let (here, turned) = (depths(&few, motion), intake.turned(&few, HalfTurn::of(motion)));
+    let (here, turned) = (depths(&few, motion), intake.turned(&few, motion.derotation()));
     let changes = if few.turn.is_some() {
         let there = depths(&turned, motion);
         there.e.iter().zip(&here.e).map(|(there, here)| there - here).take(few.n).collect()
@@ -95,7 +95,7 @@ pub(crate) fn shift(intake: &Intake<'_>, points: &Observations, motion: &Motion)
     let (few, changes) = changes(intake, points, motion);
     let tangent = tangents(&motion.u());
     let nu = depths(&few, motion).nu;
-    let (mut h, mut g) = (SMatrix::<f64, 5, 5>::zeros(), SMatrix::<f64, 5, 1>::zeros());
+    let (mut h, mut g) = (Matrix5::zeros(), Vector5::zeros());
     for (k, change) in changes.iter().enumerate() {
         let row = slopes(&few, motion, &tangent, nu[k], k);
         h += row * row.transpose();
@@ -188,7 +188,7 @@ pub(crate) fn settle(
     let follow = |minimum: &Minimum| follow(intake, inliers, *minimum, unknown);
     let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
     let own = follow(lead);
-    let limit = |cost: f64| cost + close(inliers.n) * noise(cost, inliers.n, unknown);
+    let limit = |cost: f64| cost + cost_tolerance(inliers.n) * noise(cost, inliers.n, unknown);
     let before = inliers.turn.map_or_else(Vector3::zeros, |turn| turn.rotation);
     let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
     let (again, turned) = if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
@@ -246,7 +246,7 @@ fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unkn
         {
             break;
         }
-        let next = intake.turned(here, HalfTurn::of(&minimum.motion));
+        let next = intake.turned(here, minimum.motion.derotation());
         minimum = refine(&next, minimum.motion, None, Effort::of(next.n));
         turned = Some(next);
         negligible = settled;

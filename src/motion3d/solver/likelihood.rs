@@ -1,13 +1,18 @@
 //! Maximum likelihood over all motions, and which of several minima it was.
 
+use super::covariance::direction_deviation;
+use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{Effort, FEWER, MANY, Minimum, refine};
-use super::smoothing::{DepthSmoother, Smoother};
+use super::smoothing::DepthSmoother;
 use super::starts::{Searched, sample};
 use crate::math::random::CounterRng;
-use crate::motion3d::diagnostics::degenerate::by_chance;
-use crate::motion3d::kernels::depths;
+use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::options::{MotionOptions, Smoother};
+use crate::motion3d::model::result::Alternative;
+use crate::motion3d::model::rows::tangents;
+use crate::motion3d::model::statistics::by_chance;
 use rayon::prelude::*;
 
 /// Minima that are then refined on all points, beside the one with the smoothest depths and the first where
@@ -62,7 +67,7 @@ pub(crate) fn minima(observations: &Observations, unknown: bool, rng: CounterRng
         refined(observations, starts, rng)
     };
     let found = led(searched.starts());
-    let free = observations.n.saturating_sub(5) as f64 / observations.shared;
+    let free = observations.n.saturating_sub(5) as f64 / observations.points_per_independent_sample;
     let noise = |best: &Minimum| by_chance(best.equations.cost, free);
     if unknown || free <= 0.0 || found.first().is_none_or(noise) {
         return found;
@@ -94,7 +99,7 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         // depths.)
         let left = |finalist: &Candidate| finalist.minimum.equations.cost;
         let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
-        let limit = least + close(fewer.n) * (least / fewer.n as f64).max(1.0);
+        let limit = least + cost_tolerance(fewer.n) * (least / fewer.n as f64).max(1.0);
         finalists.retain(|finalist| left(finalist) <= limit);
         let followed =
             |candidate: &Candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n));
@@ -120,7 +125,7 @@ pub(crate) fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
 }
 
 /// By how much the costs of two minima of `n` points may differ by chance.
-pub(crate) fn close(n: usize) -> f64 {
+pub(crate) fn cost_tolerance(n: usize) -> f64 {
     8.0 * (n as f64).sqrt() + 25.0
 }
 
@@ -140,7 +145,8 @@ pub(crate) fn choose(
     let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
     let least = candidates.iter().map(Candidate::without_noise).fold(f64::INFINITY, f64::min);
     let rival = |candidate: &Candidate| {
-        candidate.cost < best + close(observations.n) || candidate.without_noise() < least + close(observations.n)
+        candidate.cost < best + cost_tolerance(observations.n)
+            || candidate.without_noise() < least + cost_tolerance(observations.n)
     };
     let (mut rivals, others): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|one| rival(one));
     if rivals.len() < 2 {
@@ -155,4 +161,74 @@ pub(crate) fn choose(
     rivals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     rivals.extend(others);
     (rivals, Some(smoother))
+}
+
+/// Most minima from which smoothed weights are tried.
+pub(crate) const TRIED: usize = 3;
+
+/// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
+/// are as likely.
+pub(crate) const UNDECIDED: f64 = 1.5;
+
+/// Solutions nearer than so many deviations are one.
+pub(crate) const DISTINCT: f64 = 3.0;
+
+/// The likeliest solution, and another that is about as likely.
+pub(crate) struct Trial {
+    pub best: Efficient,
+    pub undecided: Option<Alternative>,
+}
+
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum,
+/// whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a motion is
+/// easier to judge.
+pub(crate) fn smoothed(
+    inliers: &Observations,
+    options: &MotionOptions,
+    candidates: &[Candidate],
+    made: Option<DepthSmoother>,
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> Option<Trial> {
+    let starts = near_best(candidates, inliers.n);
+    if let Some(depths) = &options.weight_depths {
+        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
+        nu.resize(inliers.stride, 0.0);
+        let known = |start: &Candidate| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone()));
+        return starts.iter().find_map(known).map(|best| Trial { best, undecided: None });
+    }
+    let mut smoother = made.unwrap_or_else(smoother);
+    let mut found: Vec<Efficient> = starts
+        .iter()
+        .take(TRIED)
+        .filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(&mut smoother)))
+        .collect();
+    if found.len() < 2 {
+        return found.pop().map(|best| Trial { best, undecided: None });
+    }
+    let costs: Vec<f64> = found.iter().map(|found| cost_of(inliers, &smoother, &found.motion)).collect();
+    let best = (1..found.len()).fold(0, |best, k| if costs[k] < costs[best] { k } else { best });
+    let undecided = undecided(&found, &costs, best, inliers.n);
+    Some(Trial { best: found.swap_remove(best), undecided })
+}
+
+/// The likeliest of the other solutions, if it is about as likely as the best.
+pub(crate) fn undecided(found: &[Efficient], costs: &[f64], best: usize, n: usize) -> Option<Alternative> {
+    let deviation = DISTINCT * direction_deviation(&found[best].covariance);
+    let other = |k: &usize| found[best].motion.angle_to(&found[*k].motion).to_degrees() > deviation;
+    let next = (0..found.len()).filter(other).min_by(|&a, &b| costs[a].total_cmp(&costs[b]))?;
+    let excess = costs[next] - costs[best];
+    (excess < UNDECIDED * (n as f64).sqrt()).then_some(Alternative { motion: found[next].motion, excess })
+}
+
+/// `J`, the depths behind the camera and the depth map's roughness.
+pub(crate) fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
+    let at = equations(observations, motion, &tangents(&motion.u()), None);
+    at.cost + at.behind + smoother.cost(&depths(observations, motion))
+}
+
+/// The chosen minimum and those that come close to it.
+pub(crate) fn near_best(candidates: &[Candidate], n: usize) -> &[Candidate] {
+    let limit = candidates[0].cost + cost_tolerance(n);
+    let count = candidates.iter().take_while(|other| other.cost < limit).count();
+    &candidates[..count.max(1)]
 }

@@ -1,16 +1,15 @@
 //! Estimates the motion of points that all have the same one, in this order.
 //!
-//! `starts` searches the half sphere of directions, `refine` descends from there, `likelihood` collects the
-//! minima. `neighbours`, `regression` and `smoothing` predict depths from those nearby; `efficient` solves the
-//! estimating equation with these in its weights, `minima` chooses among its solutions, `covariance` and
-//! `profile_likelihood` say how well the direction is known. `finite_rotation` repeats this with the rotation
-//! taken out of the displacements.
+//! `starts` searches the half sphere of directions and `refine` descends from there. `neighbours`, `regression`
+//! and `smoothing` predict inverse depths from those nearby; `efficient` solves the estimating equation with
+//! these in its weights; `likelihood` chooses among minima and solutions. `covariance` and `profile_likelihood`
+//! say how well the direction is known. `finite_rotation` repeats this with the rotation taken out of the
+//! displacements.
 
 pub(crate) mod covariance;
 pub(crate) mod efficient;
 pub(crate) mod finite_rotation;
 pub(crate) mod likelihood;
-pub(crate) mod minima;
 pub(crate) mod neighbours;
 pub(crate) mod profile_likelihood;
 pub(crate) mod refine;

@@ -8,12 +8,11 @@
 //! not an estimate there). The deviation that has these ends is told, with the bend of the valley that they
 //! show, and with what the other unknowns are known to there.
 
-use super::covariance::{Matrix5, direction_block, direction_deviation, inverse};
-use super::efficient::damping;
-use crate::motion3d::diagnostics::nonlinearity::among;
+use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use crate::motion3d::kernels::{Bilinear, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::Matrix5;
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
 /// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where
@@ -51,8 +50,7 @@ const KURTOSIS: f64 = 3.0;
 const SIMPSON: f64 = 1.0 / 6.0;
 
 type Vector4 = SMatrix<f64, 4, 1>;
-type Vector5 = SMatrix<f64, 5, 1>;
-
+use crate::motion3d::model::rows::Vector5;
 /// An estimate whose covariance is asked.
 pub(crate) struct Valley<'a> {
     pub observations: &'a Observations,
@@ -279,4 +277,18 @@ fn spread(points: &[[f64; 3]]) -> f64 {
     let n = few().count().max(1) as f64;
     let middle: Vector3<f64> = few().sum::<Vector3<f64>>() / n;
     (few().map(|at| (at - middle).norm_squared()).sum::<f64>() / n).sqrt()
+}
+
+/// Deviations of the direction within which the epipole may lie.
+pub(crate) const REACH: f64 = 3.0;
+
+/// Whether the epipole may lie among the points, of a direction known to `deviation` degrees.
+pub(crate) fn among(observations: &Observations, motion: &Motion, deviation: f64) -> bool {
+    let reach = (REACH * deviation.to_radians()).powi(2);
+    let u = motion.u();
+    // On average over its two rows, |G u| is |G| / sqrt 2 for a u across the line of sight.
+    (0..observations.n).any(|k| {
+        let g = observations.row(k).g;
+        (g * u).norm_squared() < reach * 0.5 * g.norm_squared()
+    })
 }

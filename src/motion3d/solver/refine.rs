@@ -1,8 +1,9 @@
 //! Levenberg-Marquardt on the five unknowns of a motion.
 
 use crate::motion3d::kernels::{Equations, equations};
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
 use nalgebra::{Matrix2x3, SMatrix};
 
 /// Points from which on there are many: so that a search takes no longer, it begins with fewer of them.
@@ -66,9 +67,9 @@ impl Minimum {
 ///
 /// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they
 /// would leave the share `P / H` of the way, and are taken without it.
-fn step(equations: &Equations, n: usize, damping: f64) -> Option<SMatrix<f64, 5, 1>> {
+fn step(equations: &Equations, n: usize, damping: f64) -> Option<Vector5> {
     let Equations { h, p, gradient, .. } = equations;
-    let solved = |matrix: SMatrix<f64, 5, 5>| {
+    let solved = |matrix: Matrix5| {
         let damped = matrix + SMatrix::from_diagonal(&(h.diagonal() * damping));
         let step = damped.cholesky()?.solve(gradient);
         step.iter().all(|value| value.is_finite()).then_some(step)
@@ -79,7 +80,7 @@ fn step(equations: &Equations, n: usize, damping: f64) -> Option<SMatrix<f64, 5,
 }
 
 /// The square of a step in deviations of what is found, as far as residuals of `n` points tell these.
-fn squared_deviations(equations: &Equations, step: &SMatrix<f64, 5, 1>, n: usize) -> f64 {
+fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
     step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }
 
@@ -131,7 +132,7 @@ mod tests {
             for axis in 0..5 {
                 let h = 1e-6;
                 let cost = |by: f64| {
-                    let mut step = SMatrix::<f64, 5, 1>::zeros();
+                    let mut step = Vector5::zeros();
                     step[axis] = by;
                     Minimum::at(&observations, at.stepped(&here.tangent, &step), cut).equations.cost
                 };

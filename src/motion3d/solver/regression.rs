@@ -1,7 +1,7 @@
 //! Depths predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
 
 use super::neighbours::Neighbours;
-use crate::motion3d::model::motion::tangents;
+use crate::motion3d::model::rows::tangents;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use nalgebra::{Matrix2x3, Vector3};
 use rayon::prelude::*;

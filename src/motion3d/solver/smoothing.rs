@@ -7,6 +7,7 @@ use super::starts::sample;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::Depths;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::options::Smoother;
 use crate::simd::Level;
 
 /// Most points that predictors are compared on.
@@ -17,18 +18,6 @@ const CAP: f64 = 25.0;
 
 /// Rounds of the excess variance of one prior.
 const PRIOR_ROUNDS: usize = 50;
-
-/// Which predictors may be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Smoother {
-    /// The better of both on these points.
-    #[default]
-    Auto,
-    /// One normal distribution of all inverse depths.
-    Prior,
-    /// Local-linear regression on the 8, 16, 32 or 64 nearest points.
-    Neighbours,
-}
 
 /// What predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

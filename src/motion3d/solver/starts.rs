@@ -3,8 +3,9 @@
 use super::refine::{Effort, refine};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
-use crate::motion3d::model::motion::{Motion, tangents};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::rows::tangents;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;

@@ -65,11 +65,11 @@ fn it_is_no_smaller_than_that_of_independent_points() {
     let points = points();
     let flow: Vec<[f64; 2]> = points.iter().map(|&at| motion.plane_flow(at, 1.0 + at[0] * at[1])).collect();
     let given = Flow::Plane { points: &points, flow: &flow, camera: None };
-    let told = |length, shared| {
+    let told = |length, points_per_independent_sample| {
         let options = MotionOptions {
             placement: Placement::Start,
             correlation_length: length,
-            shared,
+            points_per_independent_sample,
             ..MotionOptions::default()
         };
         estimate_motion(&given, &Noise::Sigma(SIGMA), &options).unwrap().direction_std

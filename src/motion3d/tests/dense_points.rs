@@ -21,9 +21,14 @@ fn dense(motion: Motion, n: usize, scale: f64, seed: u64) -> Scene {
 }
 
 /// As a field gives its points: with their errors' covariance times how many share it.
-fn run(scene: &Scene, shared: Option<f64>, robust: bool) -> MotionEstimate {
+fn run(scene: &Scene, points_per_independent_sample: Option<f64>, robust: bool) -> MotionEstimate {
     let noise = Noise::Sigma(OWN * (SHARED as f64).sqrt());
-    let options = MotionOptions { placement: Placement::Start, robust, shared, ..MotionOptions::default() };
+    let options = MotionOptions {
+        placement: Placement::Start,
+        robust,
+        points_per_independent_sample,
+        ..MotionOptions::default()
+    };
     estimate_motion(&scene.flow(), &noise, &options).unwrap()
 }
 
@@ -58,9 +63,9 @@ fn little_translation_is_told_from_none() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
     let (mut found, mut without, mut none) = (0, 0, 0);
     for seed in 0..40 {
-        let still = |shared, scale| {
+        let still = |points_per_independent_sample, scale| {
             let scene = dense(motion, 600, scale, seed);
-            u32::from(run(&scene, shared, false).status == Status::RotationOnly)
+            u32::from(run(&scene, points_per_independent_sample, false).status == Status::RotationOnly)
         };
         found += 1 - still(ALL, 3.0 * OWN);
         without += 1 - still(None, 3.0 * OWN);
@@ -72,12 +77,15 @@ fn little_translation_is_told_from_none() {
 #[test]
 fn what_points_share_is_a_number_and_their_noise_is_known() {
     let scene = Scene::oblique(50, 0.1, 1);
-    let told = |noise: &Noise<'_>, shared| {
-        let options = MotionOptions { shared: Some(shared), ..MotionOptions::default() };
+    let told = |noise: &Noise<'_>, points_per_independent_sample| {
+        let options = MotionOptions {
+            points_per_independent_sample: Some(points_per_independent_sample),
+            ..MotionOptions::default()
+        };
         estimate_motion(&scene.flow(), noise, &options).unwrap_err().to_string()
     };
     for wrong in [0.5, f64::NAN, f64::INFINITY] {
-        assert!(told(&Noise::Sigma(0.1), wrong).starts_with("shared: "));
+        assert!(told(&Noise::Sigma(0.1), wrong).starts_with("points_per_independent_sample: "));
     }
-    assert!(told(&Noise::Unknown, 2.0).starts_with("shared: "));
+    assert!(told(&Noise::Unknown, 2.0).starts_with("points_per_independent_sample: "));
 }

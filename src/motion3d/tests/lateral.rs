@@ -3,7 +3,7 @@
 use crate::math::random::CounterRng;
 use crate::motion3d::*;
 
-const ALL: [SidewaysWeights; 3] = [SidewaysWeights::Likelihood, SidewaysWeights::Ones, SidewaysWeights::Shrunk];
+const ALL: [LateralWeights; 3] = [LateralWeights::Likelihood, LateralWeights::Ones, LateralWeights::Shrunk];
 
 fn depths(n: usize) -> Vec<f64> {
     (0..n).map(|k| 0.5 + k as f64 / (n - 1) as f64).collect()
@@ -29,7 +29,7 @@ fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [
     for seed in 0..trials {
         let flow = flow(&nu, angle, sigma, seed);
         for (k, weights) in ALL.into_iter().enumerate() {
-            let found = estimate_sideways(&flow, told, weights).unwrap();
+            let found = estimate_lateral(&flow, told, weights).unwrap();
             errors[k] += between(found.angle, angle).powi(2) / trials as f64;
             variances[k] += found.variance / trials as f64;
         }
@@ -41,7 +41,7 @@ fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [
 fn variances_are_those_of_theory() {
     // The mean of 3000 squares scatters by 2.6 %.
     for sigma in [0.1, 0.30369, 0.6, 1.0] {
-        let bound = sideways_bound(&depths(1000), sigma).unwrap();
+        let bound = lateral_bound(&depths(1000), sigma).unwrap();
         for told in [Some(sigma), None] {
             let (errors, variances) = squares(1000, sigma, told, 3000);
             for (k, want) in [bound.likelihood, bound.ones, bound.shrunk].into_iter().enumerate() {
@@ -56,7 +56,7 @@ fn variances_are_those_of_theory() {
 
 #[test]
 fn few_points_in_large_noise_exceed_the_first_order() {
-    let bound = sideways_bound(&depths(50), 1.0).unwrap();
+    let bound = lateral_bound(&depths(50), 1.0).unwrap();
     let (errors, _) = squares(50, 1.0, Some(1.0), 3000);
     assert!((1.1..1.5).contains(&(errors[0] / bound.likelihood)), "{}", errors[0] / bound.likelihood);
     assert!(errors[2] < 1.02 * errors[0].min(errors[1]), "{errors:?}");
@@ -67,9 +67,9 @@ fn few_points_in_large_noise_exceed_the_first_order() {
 #[test]
 fn the_lines_cross_where_they_are_said_to() {
     for depths in [depths(101), vec![0.4, 0.4, 1.6, 0.4, 1.6], vec![-0.2, 0.5, 2.0]] {
-        let crossover = sideways_bound(&depths, 1.0).unwrap().crossover;
+        let crossover = lateral_bound(&depths, 1.0).unwrap().crossover;
         for (factor, ones_win) in [(0.1, false), (0.99, false), (1.01, true), (10.0, true)] {
-            let told = sideways_bound(&depths, factor * crossover).unwrap();
+            let told = lateral_bound(&depths, factor * crossover).unwrap();
             assert_eq!(told.ones < told.likelihood, ones_win, "{factor}: {told:?}");
             assert!(told.bound < told.shrunk && told.shrunk < told.likelihood.min(told.ones), "{factor}: {told:?}");
         }
@@ -86,7 +86,7 @@ fn every_direction_comes_with_its_sign_and_depths() {
         exact.push([f64::NAN, 1.0]);
         for weights in ALL {
             for sigma in [Some(1e-6), None] {
-                let found = estimate_sideways(&exact, sigma, weights).unwrap();
+                let found = estimate_lateral(&exact, sigma, weights).unwrap();
                 assert!(between(found.angle, angle).abs() < 1e-12, "{weights:?} {angle}: {}", found.angle);
                 assert!(found.variance < 1e-12 && found.bound <= found.variance);
                 assert!(found.inverse_depth[40].is_nan());
@@ -108,12 +108,12 @@ fn estimates_solve_their_equations() {
         (flow.iter().map(|f| x * f[0] + y * f[1]).collect(), flow.iter().map(|f| x * f[1] - y * f[0]).collect())
     };
     let cost = |angle: f64| parts(angle).1.iter().map(|e| e * e).sum::<f64>();
-    let found = |weights| estimate_sideways(&flow, Some(0.4), weights).unwrap();
-    let likelihood = found(SidewaysWeights::Likelihood).angle;
+    let found = |weights| estimate_lateral(&flow, Some(0.4), weights).unwrap();
+    let likelihood = found(LateralWeights::Likelihood).angle;
     assert!((1..300).all(|k| cost(likelihood) < cost(likelihood + 0.01 * f64::from(k))));
-    let ones = found(SidewaysWeights::Ones).angle;
+    let ones = found(LateralWeights::Ones).angle;
     assert!(parts(ones).1.iter().sum::<f64>().abs() < 1e-9);
-    let shrunk = found(SidewaysWeights::Shrunk);
+    let shrunk = found(LateralWeights::Shrunk);
     let (along, across) = parts(shrunk.angle);
     let mean = along.iter().sum::<f64>() / 60.0;
     let scatter = along.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 59.0 - 0.16;
@@ -121,7 +121,7 @@ fn estimates_solve_their_equations() {
     assert!(along.iter().zip(&across).map(|(m, e)| weight(*m) * e).sum::<f64>().abs() < 1e-6);
     assert_eq!(shrunk.sigma, 0.4);
     assert!(
-        (found(SidewaysWeights::Ones).variance - 0.16 / (60.0 * (mean * mean - 0.16 / 60.0))).abs()
+        (found(LateralWeights::Ones).variance - 0.16 / (60.0 * (mean * mean - 0.16 / 60.0))).abs()
             < 0.1 * shrunk.variance
     );
 }
@@ -133,7 +133,7 @@ fn noise_alone_is_told_by_its_variance() {
         let noise = flow(&[0.0; 100], 0.0, 1.0, seed);
         for weights in ALL {
             // A uniform angle has the deviation pi / sqrt(3); half a radian would be something known.
-            sure += u32::from(estimate_sideways(&noise, Some(1.0), weights).unwrap().variance < 0.05);
+            sure += u32::from(estimate_lateral(&noise, Some(1.0), weights).unwrap().variance < 0.05);
         }
     }
     assert!(sure <= 6, "{sure}");
@@ -143,24 +143,24 @@ fn noise_alone_is_told_by_its_variance() {
 fn mistakes_are_told_by_name() {
     let refused = |flow: &[[f64; 2]], sigma, word: &str| {
         for weights in ALL {
-            let error = estimate_sideways(flow, sigma, weights).unwrap_err().to_string();
+            let error = estimate_lateral(flow, sigma, weights).unwrap_err().to_string();
             assert!(error.starts_with(word), "{error}");
         }
     };
     for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
         refused(&[[1.0, 0.0]; 9], Some(sigma), "sigma: ");
-        assert!(sideways_bound(&[1.0], sigma).unwrap_err().to_string().starts_with("sigma: "));
+        assert!(lateral_bound(&[1.0], sigma).unwrap_err().to_string().starts_with("sigma: "));
     }
     refused(&[], Some(0.1), "flow: ");
     refused(&[[1.0, 0.0]], None, "flow: ");
     refused(&[[1.0, 0.0], [f64::NAN, 0.0]], None, "flow: ");
     refused(&[[1e200, 0.0], [1.0, 0.0]], None, "flow: ");
     refused(&[[0.0, 0.0]; 9], Some(0.1), "not observable: ");
-    let cancel = estimate_sideways(&[[1.0, 0.0], [-1.0, 0.0]], Some(0.1), SidewaysWeights::Ones).unwrap_err();
+    let cancel = estimate_lateral(&[[1.0, 0.0], [-1.0, 0.0]], Some(0.1), LateralWeights::Ones).unwrap_err();
     assert!(cancel.to_string().starts_with("not observable: "), "{cancel}");
-    assert!(sideways_bound(&[f64::NAN], 0.1).unwrap_err().to_string().starts_with("inv_depth: "));
-    assert!(sideways_bound(&[0.0; 3], 0.1).unwrap_err().to_string().starts_with("not observable: "));
-    let cancel = sideways_bound(&[1.0, -1.0], 0.1).unwrap();
+    assert!(lateral_bound(&[f64::NAN], 0.1).unwrap_err().to_string().starts_with("inv_depth: "));
+    assert!(lateral_bound(&[0.0; 3], 0.1).unwrap_err().to_string().starts_with("not observable: "));
+    let cancel = lateral_bound(&[1.0, -1.0], 0.1).unwrap();
     assert!(cancel.ones.is_infinite() && cancel.crossover.is_infinite());
     // Around a mean of nothing there is nothing to be drawn to.
     assert!((cancel.shrunk / cancel.likelihood - 1.0).abs() < 1e-12, "{cancel:?}");

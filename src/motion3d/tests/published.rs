@@ -64,7 +64,7 @@ fn the_bound_is_that_of_pixels_too() {
 #[test]
 fn one_unknown_has_its_closed_forms() {
     let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
-    let bound = sideways_bound(&depths, 0.3).unwrap();
+    let bound = lateral_bound(&depths, 0.3).unwrap();
     near(bound.likelihood, 8.8940e-4, "(29)");
     near(bound.ones, 8.9109e-4, "(31)");
     near(bound.bound, 8.2128e-4, "bound");
@@ -76,7 +76,7 @@ fn one_unknown_has_its_closed_forms() {
     let observations =
         crate::motion3d::model::whitening::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
-    let tangent = crate::motion3d::model::motion::tangents(&motion.u());
+    let tangent = crate::motion3d::model::rows::tangents(&motion.u());
     let mut nu = depths.clone();
     nu.resize(observations.stride, 0.0);
     let m = crate::motion3d::kernels::information(&observations, &motion, &tangent, &nu, 0.0);

@@ -63,7 +63,7 @@ pub struct EgomotionPlan {
     pub motion: MotionOptions,
     /// What the thing in the field options' region may turn by itself, rad/frame: its rotation is then known
     /// beforehand as that of the rest of the scene. `None`: nothing is known of it.
-    pub turning: Option<f64>,
+    pub object_rotation_std: Option<f64>,
     /// Where rows go.
     pub target: TableTarget,
     /// Where other motions go that explain the flow about as well, one row each.
@@ -103,7 +103,7 @@ impl Egomotion {
         let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
         let options = MotionOptions {
             rotation_prior,
-            shared: Some(points.shared),
+            points_per_independent_sample: Some(points.points_per_independent_sample),
             correlation_length: Some(points.correlation_length),
             common: points.common,
             ..self.plan.motion.clone()
@@ -113,9 +113,11 @@ impl Egomotion {
 
     /// The motion of the scene around the region, where a thing that moves by itself lies in this.
     fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<(MotionEstimate, f64)>> {
-        let (Some(turning), Some(region)) = (self.plan.turning, self.plan.field.region) else { return Ok(None) };
+        let (Some(object_rotation_std), Some(region)) = (self.plan.object_rotation_std, self.plan.field.region) else {
+            return Ok(None);
+        };
         let rest = field_points(field, &FieldOptions::default())?.outside(region);
-        Ok(Some((self.motion(&rest, None)?, turning)))
+        Ok(Some((self.motion(&rest, None)?, object_rotation_std)))
     }
 
     fn row(
@@ -217,7 +219,9 @@ impl<T: Real> Sink<T> for Egomotion {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let points = field_points(step.field, &self.plan.field)?;
         let scene = self.scene(step.field)?;
-        let known = scene.as_ref().and_then(|(scene, turning)| RotationPrior::of_scene(scene, *turning));
+        let known = scene
+            .as_ref()
+            .and_then(|(scene, object_rotation_std)| RotationPrior::of_scene(scene, *object_rotation_std));
         let found = self.motion(&points, known)?;
         let status = scene.map(|(scene, _)| scene.status);
         let frame = step.field.layout.frame_index;

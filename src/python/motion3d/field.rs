@@ -36,7 +36,13 @@ pub fn motion3d_field_points<'py>(
         matrix(py, &found.points)?.into_any(),
         matrix(py, &found.flow)?.into_any(),
         arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
-        [found.spacing, found.shared, found.correlation_length, found.common.scale, found.common.offset],
+        [
+            found.spacing,
+            found.points_per_independent_sample,
+            found.correlation_length,
+            found.common.scale,
+            found.common.offset,
+        ],
     ))
 }
 

@@ -52,13 +52,17 @@ pub fn motion3d_beside<'py>(
     rotation: &Any<'py>,
     tangent: &Any<'py>,
     covariance: &Any<'py>,
-    turning: f64,
+    object_rotation_std: f64,
 ) -> PyResult<Option<(Any<'py>, Any<'py>)>> {
-    if !(turning.is_finite() && turning > 0.0) {
-        return Err(Error::argument("turning", "a positive number", turning).into());
+    if !(object_rotation_std.is_finite() && object_rotation_std > 0.0) {
+        return Err(Error::argument("object_rotation_std", "a positive number", object_rotation_std).into());
     }
     let (_, covariance) = spread(tangent, covariance)?;
-    let Some(known) = RotationPrior::beside(triple("scene", rotation)?, &covariance, turning) else { return Ok(None) };
+    let Some(known) =
+        RotationPrior::from_scene_covariance(triple("scene", rotation)?, &covariance, object_rotation_std)
+    else {
+        return Ok(None);
+    };
     Ok(Some((vector(py, known.rotation)?.into_any(), matrix(py, &known.covariance)?.into_any())))
 }
 

@@ -3,13 +3,13 @@
 mod field;
 mod flow;
 mod given;
+mod lateral;
 mod options;
-mod sideways;
 mod told;
 
 pub use field::{motion3d_contact_map, motion3d_field_patches, motion3d_field_points};
 pub use flow::{motion3d_beside, motion3d_essential, motion3d_focus, motion3d_predict};
-pub use sideways::{motion3d_sideways, motion3d_sideways_bound};
+pub use lateral::{motion3d_lateral, motion3d_lateral_bound};
 
 use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
 use given::{Given, GivenPatches, Layout, rows, triple};

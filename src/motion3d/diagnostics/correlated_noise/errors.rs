@@ -3,11 +3,11 @@
 //! A field's correlation length is that of its windows. What a scene does to flow (edges in depth, a texture
 //! that smoothing reaches across) goes together farther, and differs from field to field.
 
-use super::{REACH, Vector5, Weighted, correlation, slopes};
-use crate::motion3d::kernels::depths;
+use super::{REACH, Weighted, correlation};
+use crate::motion3d::kernels::{depths, slopes};
+use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::Flow;
-use crate::motion3d::solver::covariance::Matrix5;
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 

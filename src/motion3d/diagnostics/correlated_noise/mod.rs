@@ -9,12 +9,13 @@
 mod errors;
 
 use crate::motion3d::kernels::information;
+use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::Flow;
-use crate::motion3d::solver::covariance::{Matrix5, inverse};
+use crate::motion3d::model::rows::Matrix5;
+use crate::motion3d::solver::covariance::inverse;
 use errors::{Errors, Neighbourhood};
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, SymmetricEigen, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, SymmetricEigen, Vector3};
 
 /// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows
 /// stop sharing pixels, the rest over so many correlation lengths.
@@ -23,8 +24,6 @@ const TAIL: f64 = 3.75;
 
 /// Correlation lengths at which what is left, one hundredth, no longer counts.
 const REACH: f64 = 15.0;
-
-type Vector5 = SMatrix<f64, 5, 1>;
 
 /// Correlation of the errors of windowed flow at a distance, in correlation lengths: `0.4 exp(-d^2 / 4) + 0.6
 /// exp(-d / 3.75)`.
@@ -102,20 +101,6 @@ fn positive(matrix: &Matrix5) -> Matrix5 {
 /// has too much for each point's own where several share one error.
 fn excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
     points.different(errors.stretch) * errors.variance + points.squares() * (errors.variance - 1.0)
-}
-
-/// The row `D(nu)` of point `k`, 0 at the epipole.
-pub(crate) fn slopes(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: f64, k: usize) -> Vector5 {
-    let point = points.row(k);
-    let t = point.g * motion.u();
-    let s = t.norm();
-    if s * s <= points.floor {
-        return Vector5::zeros();
-    }
-    let across = nalgebra::RowVector2::new(t.y, -t.x) / s;
-    let psi = across * point.g * tangent.transpose() * nu;
-    let turn = across * point.r;
-    Vector5::new(psi.x, psi.y, turn.x, turn.y, turn.z)
 }
 
 #[cfg(test)]

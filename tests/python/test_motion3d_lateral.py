@@ -18,7 +18,7 @@ def flow(n=200, angle=2.2, sigma=0.3, seed=2):
 
 
 def test_published_figures():
-    bound = motion3d.sideways_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
+    bound = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
     got = (bound.ml_variance, bound.ones_variance, bound.crlb, bound.crossover)
     assert [float(f"{value:.4e}") for value in got] == [8.8940e-4, 8.9109e-4, 8.2128e-4, 3.0369e-1]
 
@@ -40,7 +40,7 @@ def test_variances_of_many_trials_are_those_of_theory():
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_estimates_are_what_they_say(weights):
     nu, seen = flow()
-    found = motion3d.estimate_sideways(seen, sigma=0.3, weights=weights)
+    found = motion3d.estimate_lateral(seen, sigma=0.3, weights=weights)
     moments = seen.T @ seen
     written = {
         "ml": 0.5 * np.arctan2(2 * moments[0, 1], moments[0, 0] - moments[1, 1]),
@@ -54,9 +54,9 @@ def test_estimates_are_what_they_say(weights):
     assert found.angle_std == pytest.approx(np.degrees(np.sqrt(found.variance)))
     assert_allclose(found.translation, [np.cos(found.angle), np.sin(found.angle), 0])
     assert_allclose(found.inv_depth, seen @ found.translation[:2])
-    unknown = motion3d.estimate_sideways(seen, weights=weights)
+    unknown = motion3d.estimate_lateral(seen, weights=weights)
     assert unknown.sigma == pytest.approx(0.3, rel=0.15)
-    bound = motion3d.sideways_bound(nu, sigma=0.3)
+    bound = motion3d.lateral_bound(nu, sigma=0.3)
     assert found.variance == pytest.approx({"shrunk": bound.shrunk_variance, "ml": bound.ml_variance, "ones": bound.ones_variance}[weights], rel=0.2)
 
 
@@ -66,21 +66,21 @@ def test_it_agrees_with_the_general_estimate():
     nu, seen = flow(400, 0.6, 0.02)
     rng.shuffle(seen)
     general = motion3d.estimate_motion(rng.uniform(-0.6, 0.6, (400, 2)), seen, sigma=0.02, placement="start", rotation_prior=(np.zeros(3), 1e-12 * np.eye(3)), method="ml")
-    found = motion3d.estimate_sideways(seen, sigma=0.02, weights="ml")
+    found = motion3d.estimate_lateral(seen, sigma=0.02, weights="ml")
     assert scores.angle(general.translation, found.translation) < 4 * general.direction_std < 2
     assert np.arctan2(general.translation[1], general.translation[0]) == pytest.approx(found.angle, abs=2 * np.sqrt(found.variance))
 
 
 def test_arrays_of_any_kind():
     _, seen = flow()
-    usual = motion3d.estimate_sideways(seen)
+    usual = motion3d.estimate_lateral(seen)
     wide = np.full((400, 4), np.nan)
     wide[::2, ::2] = seen
     for other in (wide[::2, ::2], np.asfortranarray(seen), seen.tolist()):
-        assert_array_equal(motion3d.estimate_sideways(other).inv_depth, usual.inv_depth)
-    assert motion3d.estimate_sideways(seen.astype("f4")).angle == pytest.approx(usual.angle, abs=1e-6)
+        assert_array_equal(motion3d.estimate_lateral(other).inv_depth, usual.inv_depth)
+    assert motion3d.estimate_lateral(seen.astype("f4")).angle == pytest.approx(usual.angle, abs=1e-6)
     dirty = np.insert(seen, 3, [np.nan, 1.0], axis=0)
-    found = motion3d.estimate_sideways(dirty)
+    found = motion3d.estimate_lateral(dirty)
     assert found.angle == usual.angle and np.isnan(found.inv_depth[3])
 
 
@@ -103,15 +103,15 @@ def test_arrays_of_any_kind():
 )
 def test_mistakes_are_refused_by_name(change, word, kind):
     with pytest.raises(kind, match=f"^{word}: "):
-        motion3d.estimate_sideways(**{"flow": np.ones((5, 2)), **change})
+        motion3d.estimate_lateral(**{"flow": np.ones((5, 2)), **change})
 
 
 def test_bounds_refuse_by_name_too():
     for wrong, word in (({"inv_depth": np.ones((3, 2))}, "inv_depth"), ({"inv_depth": [np.nan]}, "inv_depth"), ({"sigma": 0.0}, "sigma")):
         with pytest.raises(ValueError, match=f"^{word}: "):
-            motion3d.sideways_bound(**{"inv_depth": np.ones(3), "sigma": 0.1, **wrong})
+            motion3d.lateral_bound(**{"inv_depth": np.ones(3), "sigma": 0.1, **wrong})
     with pytest.raises(TypeError, match="^sigma: "):
-        motion3d.sideways_bound(np.ones(3), sigma="much")
-    for nothing in (lambda: motion3d.sideways_bound(np.zeros(3), sigma=0.1), lambda: motion3d.estimate_sideways(np.zeros((5, 2)))):
+        motion3d.lateral_bound(np.ones(3), sigma="much")
+    for nothing in (lambda: motion3d.lateral_bound(np.zeros(3), sigma=0.1), lambda: motion3d.estimate_lateral(np.zeros((5, 2)))):
         with pytest.raises(jacoflow.NotObservableError):
             nothing()

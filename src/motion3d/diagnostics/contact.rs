@@ -1,34 +1,19 @@
 //! Time to contact: how fast points come nearer, with what is known of that.
 
-use super::diagnostics::systematic_errors::CommonEffect;
-use super::field::measured;
-use super::model::camera::Intrinsics;
-use super::model::derotation::{HalfTurn, HalfWay};
-use super::model::motion::Motion;
-use super::model::observations::Row;
-use super::model::options::Placement;
-use super::model::whitening::{plane_row, turned_row};
-use super::solver::covariance::Matrix5;
 use crate::error::Result;
 use crate::math::Real;
+use crate::motion3d::field::measured;
+use crate::motion3d::model::camera::Intrinsics;
+use crate::motion3d::model::derotation::{HalfTurn, HalfWay};
+use crate::motion3d::model::input::Placement;
+use crate::motion3d::model::observations::Row;
+use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
+use crate::motion3d::model::rows::{Matrix5, Vector5};
+use crate::motion3d::model::whitening::{plane_row, turned_row};
 use crate::parallel::Threads;
 use crate::types::{FlowField, Status};
-use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, RowVector2, Vector2, Vector3};
 use rayon::prelude::*;
-
-/// A motion as far as times to contact take it: that of a [`MotionEstimate`](super::MotionEstimate) by
-/// [`uncertain`](super::MotionEstimate::uncertain).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UncertainMotion {
-    /// The motion of the scene relative to the camera.
-    pub motion: Motion,
-    /// Axes of `psi`: two unit vectors perpendicular to `u`.
-    pub tangent: [[f64; 3]; 2],
-    /// Covariance of `(psi, w)`, rad and rad/frame.
-    pub covariance: [[f64; 5]; 5],
-    /// What is in it of errors that all flow has in common, those of the points whose times are wanted too.
-    pub common: CommonEffect,
-}
 
 /// Rates of approach `nu u_z` under a motion.
 pub(crate) struct Rates {
@@ -44,7 +29,7 @@ pub(crate) struct Rates {
 /// 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Slopes {
-    motion: SMatrix<f64, 5, 1>,
+    motion: Vector5,
     flow: RowVector2<f64>,
 }
 
@@ -76,13 +61,13 @@ impl Rates {
         let inverse = if s2 > 0.0 { s2.recip() } else { 0.0 };
         let turn: Vector2<f64> = self.tangent * row.g.transpose() * t * (-nu * inverse);
         let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-        let motion = SMatrix::<f64, 5, 1>::new(turn.x, turn.y, spin.x, spin.y, spin.z);
+        let motion = Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z);
         // The first columns of `G` are those of the identity: they whiten.
         self.slopes_of(nu, (motion, t.transpose() * row.g.fixed_columns::<2>(0) * inverse))
     }
 
     /// From the slopes of a depth `nu`.
-    pub fn slopes_of(&self, nu: f64, (mut motion, flow): (SMatrix<f64, 5, 1>, RowVector2<f64>)) -> Slopes {
+    pub fn slopes_of(&self, nu: f64, (mut motion, flow): (Vector5, RowVector2<f64>)) -> Slopes {
         motion *= self.u.z;
         motion[0] += nu * self.tangent[(0, 2)];
         motion[1] += nu * self.tangent[(1, 2)];
@@ -151,7 +136,7 @@ pub fn contact_map<T: Real>(
     measured(field)?;
     let (rates, motion) = (Rates::new(known), &known.motion);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
-    let turn = (placement == Placement::Midpoint).then(|| HalfTurn::of(motion));
+    let turn = (placement == Placement::Midpoint).then(|| motion.derotation());
     let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
     let at = |site: usize| -> [f64; 3] {
         let Some(row) = site_row(field, camera, turn.as_ref(), site) else { return [f64::NAN; 3] };
@@ -194,7 +179,7 @@ mod tests {
     use super::*;
     use crate::motion3d::model::result::{UNKNOWN, axes};
     use crate::motion3d::tests::scenes::{Scene, smooth};
-    use crate::motion3d::{MotionOptions, Noise, estimate_motion};
+    use crate::motion3d::{Motion, MotionOptions, Noise, estimate_motion};
     use crate::types::{FieldLayout, MOTION_NAMES, SamplingGrid};
 
     /// The same depth everywhere, seen by a camera of 100 px, with deviations of 0.05 px.
@@ -259,7 +244,7 @@ mod tests {
     fn slopes_are_those_of_the_rate() {
         let scene = Scene::oblique(20, 0.1, 5);
         let observations = scene.observations();
-        let tangent = crate::motion3d::model::motion::tangents(&scene.motion.u());
+        let tangent = crate::motion3d::model::rows::tangents(&scene.motion.u());
         let known = UncertainMotion {
             motion: scene.motion,
             tangent: axes(&tangent),
@@ -268,7 +253,7 @@ mod tests {
         };
         let rates = Rates::new(&known);
         let row = observations.row(3);
-        let rate = |step: &SMatrix<f64, 5, 1>| {
+        let rate = |step: &Vector5| {
             let motion = scene.motion.stepped(&tangent, step);
             let t = row.g * motion.u();
             t.dot(&(row.f - row.r * motion.w())) / t.norm_squared() * motion.u().z
@@ -278,7 +263,7 @@ mod tests {
         let slopes = rates.slopes(&row, nu).motion;
         // Along the epipolar line alone: the part across moves the depth in second order only at the truth.
         for axis in 2..5 {
-            let mut step = SMatrix::<f64, 5, 1>::zeros();
+            let mut step = Vector5::zeros();
             step[axis] = 1e-6;
             let numeric = (rate(&step) - rate(&-step)) / 2e-6;
             assert!((numeric - slopes[axis]).abs() < 1e-5 * slopes.norm(), "{axis}: {numeric} {}", slopes[axis]);

@@ -8,14 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._jacoflow import _motion3d_sideways, _motion3d_sideways_bound
+from .._jacoflow import _motion3d_lateral, _motion3d_lateral_bound
 from ._checks import number, word
 
-__all__ = ["SidewaysBound", "SidewaysEstimate", "estimate_sideways", "sideways_bound"]
+__all__ = ["LateralBound", "LateralEstimate", "estimate_lateral", "lateral_bound"]
 
 
 @dataclass(frozen=True, eq=False)
-class SidewaysEstimate:
+class LateralEstimate:
     """The direction of a translation along the image plane, an angle in rad, with its variance and the inverse depths (N,)."""
 
     angle: float
@@ -41,7 +41,7 @@ class SidewaysEstimate:
 
 
 @dataclass(frozen=True)
-class SidewaysBound:
+class LateralBound:
     """Variances of the angle of a translation along the image plane, rad^2, for known depths."""
 
     crlb: float
@@ -56,7 +56,7 @@ class SidewaysBound:
     """Noise, units of flow, above which weights of 1 beat maximum likelihood: `sqrt(m2) std(nu) / |mean(nu)|`."""
 
 
-def estimate_sideways(flow: ArrayLike, *, sigma: float | None = None, weights: Literal["shrunk", "ml", "ones"] = "shrunk") -> SidewaysEstimate:
+def estimate_lateral(flow: ArrayLike, *, sigma: float | None = None, weights: Literal["shrunk", "ml", "ones"] = "shrunk") -> LateralEstimate:
     """The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow at N points, wherever they are.
 
     Source: section 5 of T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion Estimation from Noisy Optical Flow". The variances are of first order: they hold while they are small beside 1 rad^2.
@@ -77,15 +77,15 @@ def estimate_sideways(flow: ArrayLike, *, sigma: float | None = None, weights: L
     NotObservableError
         When all flow is zero, or with "ones" its sum.
 
-    >>> round(float(np.degrees(estimate_sideways([[0.9, 0.9], [1.1, 1.1]], sigma=0.01).angle)))
+    >>> round(float(np.degrees(estimate_lateral([[0.9, 0.9], [1.1, 1.1]], sigma=0.01).angle)))
     45
     """
     word("weights", weights)
-    return SidewaysEstimate(**_motion3d_sideways(flow, None if sigma is None else number("sigma", sigma), weights))
+    return LateralEstimate(**_motion3d_lateral(flow, None if sigma is None else number("sigma", sigma), weights))
 
 
-def sideways_bound(inv_depth: ArrayLike, *, sigma: float) -> SidewaysBound:
-    """What any estimator, and each of those of `estimate_sideways`, makes of points with these true inverse depths: variances in rad^2, for the design of an experiment.
+def lateral_bound(inv_depth: ArrayLike, *, sigma: float) -> LateralBound:
+    """What any estimator, and each of those of `estimate_lateral`, makes of points with these true inverse depths: variances in rad^2, for the design of an experiment.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def sideways_bound(inv_depth: ArrayLike, *, sigma: float) -> SidewaysBound:
     NotObservableError
         When all points are infinitely far.
 
-    >>> round(sideways_bound(np.linspace(0.5, 1.5, 101), sigma=0.3).crossover, 5)
+    >>> round(lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3).crossover, 5)
     0.30369
     """
-    return SidewaysBound(**_motion3d_sideways_bound(inv_depth, number("sigma", sigma)))
+    return LateralBound(**_motion3d_lateral_bound(inv_depth, number("sigma", sigma)))

@@ -9,8 +9,17 @@
 //! plane's by what the motion is off, and by more than their own noise where that is small along the epipolar
 //! lines.
 
+use crate::math::random::CounterRng;
+use crate::motion3d::kernels::{Depths, depths};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Row};
+use crate::motion3d::model::rows::Rows;
+use crate::motion3d::model::statistics::{RARE, by_chance, chi2_deviation};
+use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::starts::at_most;
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
+use std::borrow::Cow;
 
 /// Numbers of a plane's flow.
 const NUMBERS: usize = 8;
@@ -118,12 +127,148 @@ fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize)
     (Matrix3::from_fn(|i, j| if i == 2 && j == 2 { 0.0 } else { change[3 * i + j] }), rank)
 }
 
+/// Times that a plane's other rotation is taken out of displacements.
+pub(crate) const TURNS: usize = 5;
+
+/// Points that are asked first whether they are a plane.
+pub(crate) const FEW: usize = 1000;
+
+/// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n|
+/// u`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Twin {
+    pub motion: Motion,
+    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a
+    /// known rotation.
+    pub behind: f64,
+}
+
+/// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is
+/// not, or where both motions are the same.
+///
+/// `distinct`: least angle between both directions, rad, that is no mere error of the estimate; `unknown`:
+/// the noise is what the motion leaves.
+pub(crate) fn twin(
+    intake: &Intake<'_>,
+    observations: &Observations,
+    motion: &Motion,
+    distinct: f64,
+    unknown: bool,
+) -> Option<Twin> {
+    // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much
+    // more than one alone.
+    let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
+    let fits = |plane: &PlaneFlow| {
+        chi2_deviation(plane.chi2, plane.free / observations.points_per_independent_sample) < usual * RARE
+    };
+    // What is far from a plane is so for few points already.
+    if observations.n > FEW {
+        PlaneFlow::fit(&at_most(observations, FEW, CounterRng::new(0))).filter(fits)?;
+    }
+    let plane = PlaneFlow::fit(observations).filter(fits)?;
+    let Depths { mut nu, s2, .. } = depths(observations, motion);
+    if let Some(turn) = &observations.turn {
+        let middle = turn.middle(&motion.u());
+        for nu in &mut nu {
+            *nu = middle.depth(*nu);
+        }
+    }
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
+        let eta = place(observations, motion, k, nu[k]);
+        normal += s2[k] * eta * eta.transpose();
+        right += s2[k] * nu[k] * eta;
+    }
+    let n = normal.cholesky()?.solve(&right);
+    let u = motion.u();
+    // What a plane leaves of each depth.
+    let rest = |k: usize| (observations.row(k).g * u).dot(&plane.rest[k]) / s2[k];
+    if n.norm() <= 0.0 || bent(observations, &s2, rest) {
+        return None;
+    }
+    let (other, seen) = other_motion(intake, observations, motion, &n)?;
+    let behind = |motion: &Motion| -> f64 {
+        let at = depths(&seen, motion);
+        let behind: f64 = (0..seen.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
+        behind + seen.pulled(&motion.w())
+    };
+    let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
+    let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });
+    let better = if signs[1].behind < signs[0].behind { signs[1] } else { signs[0] };
+    (angle > distinct).then_some(better)
+}
+
+/// A point's `eta`, where `nu = n . eta` holds for a plane. Half way along a displacement it is the picture
+/// of the point half way, which a displacement that changes the depth has at `m + nu^2 t_z / 4 G(m) t`.
+pub(crate) fn place(observations: &Observations, motion: &Motion, k: usize, nu: f64) -> Vector3<f64> {
+    let [x, y, z] = observations.position[k];
+    if observations.spherical {
+        return Vector3::new(x, y, z);
+    }
+    let Some(turn) = observations.turn else { return Vector3::new(x, y, 1.0) };
+    let t = turn.mean * motion.u();
+    let along = Rows::plane([x, y]).g * t * (0.25 * nu * nu * t.z);
+    Vector3::new(x + along.x, y + along.y, 1.0)
+}
+
+/// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken
+/// out, where another one was.
+pub(crate) fn other_motion<'a>(
+    intake: &Intake<'_>,
+    observations: &'a Observations,
+    motion: &Motion,
+    n: &Vector3<f64>,
+) -> Option<(Motion, Cow<'a, Observations>)> {
+    let Some(turn) = observations.turn else {
+        let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
+        // What the estimate is off by is in the plane, too.
+        let other = refine(observations, other, None, Effort::FULL).motion;
+        return Some((other, Cow::Borrowed(observations)));
+    };
+    // In the axes half way the translation is V' u and rotations are V' w.
+    let back = turn.mean.try_inverse()?;
+    let w = motion.w() + back * n.cross(&(turn.mean * motion.u()));
+    let mut other = Motion::of(&(back * n).normalize(), &w);
+    let mut seen = observations.clone();
+    for _ in 0..TURNS {
+        seen = intake.turned(&seen, other.derotation());
+        other = refine(&seen, other, None, Effort::FULL).motion;
+    }
+    Some((other, Cow::Owned(seen)))
+}
+
+/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the
+/// motion would have it: all depths together tell that with less certainty.
+///
+/// `rest`: what a plane leaves of each depth.
+pub(crate) fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {
+    const TERMS: usize = 9;
+    let terms = if observations.spherical { TERMS } else { 6 };
+    let mut sums = nalgebra::SMatrix::<f64, TERMS, { TERMS + 1 }>::zeros();
+    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
+        let [x, y, z] = observations.position[k];
+        let height = if observations.spherical { z } else { 1.0 };
+        let row = [height, x, y, x * x, x * y, y * y, x * z, y * z, z * z, rest(k)];
+        for i in 0..terms {
+            for j in (i..terms).chain([TERMS]) {
+                sums[(i, j)] += s2[k] * row[i] * row[j];
+            }
+        }
+    }
+    let normal = nalgebra::DMatrix::from_fn(terms, terms, |i, j| sums[(i.min(j), i.max(j))]);
+    let right = nalgebra::DVector::from_fn(terms, |i, _| sums[(i, TERMS)]);
+    // Without a solution (points on a line) nothing is known of the bending.
+    let Some(factor) = normal.cholesky() else { return false };
+    let explained = right.dot(&factor.solve(&right));
+    !by_chance(explained, (terms - 3 + 5) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::motion3d::model::derotation::HalfTurn;
+    use crate::motion3d::model::input::{Flow, Noise, Placement};
     use crate::motion3d::model::motion::Motion;
-    use crate::motion3d::model::options::{Flow, Noise, Placement};
     use crate::motion3d::model::whitening::Intake;
     use crate::motion3d::tests::scenes::{Scene, W};
 
@@ -160,7 +305,7 @@ mod tests {
         let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
         let intake = Intake::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
         let start = intake.whitened();
-        for taken in [turn, HalfTurn::of(&motion), HalfTurn::new(&Vector3::new(0.0, 0.1, -0.1))] {
+        for taken in [turn, motion.derotation(), HalfTurn::new(&Vector3::new(0.0, 0.1, -0.1))] {
             let fit = PlaneFlow::fit(&intake.turned(&start, taken)).unwrap();
             assert!(fit.chi2 < 1e-12 && fit.free == 192.0, "{}", fit.chi2);
         }

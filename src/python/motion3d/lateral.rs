@@ -2,18 +2,18 @@
 
 use super::given::{rows, word};
 use crate::error::Error;
-use crate::motion3d::{SidewaysBound, SidewaysEstimate, SidewaysWeights, estimate_sideways, sideways_bound};
+use crate::motion3d::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 use crate::python::arrays;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 /// Weights by the words of the Python function.
-const WEIGHTS: [(&str, SidewaysWeights); 3] =
-    [("shrunk", SidewaysWeights::Shrunk), ("ml", SidewaysWeights::Likelihood), ("ones", SidewaysWeights::Ones)];
+const WEIGHTS: [(&str, LateralWeights); 3] =
+    [("shrunk", LateralWeights::Shrunk), ("ml", LateralWeights::Likelihood), ("ones", LateralWeights::Ones)];
 
 /// An estimate.
 #[derive(IntoPyObject)]
-pub struct ToldSideways<'py> {
+pub struct PyLateral<'py> {
     angle: f64,
     variance: f64,
     crlb: f64,
@@ -23,7 +23,7 @@ pub struct ToldSideways<'py> {
 
 /// A bound.
 #[derive(IntoPyObject)]
-pub struct ToldSidewaysBound {
+pub struct ToldLateralBound {
     crlb: f64,
     ml_variance: f64,
     ones_variance: f64,
@@ -32,35 +32,35 @@ pub struct ToldSidewaysBound {
 }
 
 #[pyfunction]
-#[pyo3(name = "_motion3d_sideways")]
-pub fn motion3d_sideways<'py>(
+#[pyo3(name = "_motion3d_lateral")]
+pub fn motion3d_lateral<'py>(
     py: Python<'py>,
     flow: &Bound<'py, PyAny>,
     sigma: Option<f64>,
     weights: &str,
-) -> PyResult<ToldSideways<'py>> {
+) -> PyResult<PyLateral<'py>> {
     let weights = word("weights", weights, &WEIGHTS)?;
     let (shape, values) = arrays::doubles("flow", flow)?;
     let flow: Vec<[f64; 2]> = rows("flow", &shape, &values)?;
-    let SidewaysEstimate { angle, variance, bound, sigma, inverse_depth } =
-        py.detach(|| estimate_sideways(&flow, sigma, weights))?;
+    let LateralEstimate { angle, variance, bound, sigma, inverse_depth } =
+        py.detach(|| estimate_lateral(&flow, sigma, weights))?;
     let inv_depth = arrays::owned(py, &[inverse_depth.len()], inverse_depth)?;
-    Ok(ToldSideways { angle, variance, crlb: bound, sigma, inv_depth })
+    Ok(PyLateral { angle, variance, crlb: bound, sigma, inv_depth })
 }
 
 #[pyfunction]
-#[pyo3(name = "_motion3d_sideways_bound")]
-pub fn motion3d_sideways_bound(
+#[pyo3(name = "_motion3d_lateral_bound")]
+pub fn motion3d_lateral_bound(
     py: Python<'_>,
     inverse_depth: &Bound<'_, PyAny>,
     sigma: f64,
-) -> PyResult<ToldSidewaysBound> {
+) -> PyResult<ToldLateralBound> {
     let (shape, depths) = arrays::doubles("inv_depth", inverse_depth)?;
     if shape.len() != 1 {
         return Err(Error::argument("inv_depth", "shape (N,)", format!("shape {shape:?}")).into());
     }
-    let SidewaysBound { bound, likelihood, ones, shrunk, crossover } = py.detach(|| sideways_bound(&depths, sigma))?;
-    Ok(ToldSidewaysBound {
+    let LateralBound { bound, likelihood, ones, shrunk, crossover } = py.detach(|| lateral_bound(&depths, sigma))?;
+    Ok(ToldLateralBound {
         crlb: bound,
         ml_variance: likelihood,
         ones_variance: ones,

@@ -1,0 +1,161 @@
+//! A motion found on the inliers, and what a linear theory of independent points leaves out of its covariance.
+
+use super::correlated_noise::{Weighted, together};
+use super::rotation_prior::{Grown, contradiction};
+use crate::motion3d::kernels::{depths, equations, information, slopes};
+use crate::motion3d::model::camera::to_plane;
+use crate::motion3d::model::input::Flow;
+use crate::motion3d::model::motion::Motion;
+use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::options::CommonErrors;
+use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
+use crate::motion3d::model::rows::Matrix5;
+use crate::motion3d::robust::{Consensus, Told, among_strays};
+use crate::motion3d::solver::covariance::{Plugged, inverse};
+use crate::motion3d::solver::efficient::{Efficient, departure};
+use crate::motion3d::solver::likelihood::Candidate;
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, RowVector2};
+use std::borrow::Cow;
+
+/// A motion found on the inliers.
+pub(crate) struct Solution {
+    pub motion: Motion,
+    pub tangent: Matrix2x3<f64>,
+    /// `None` where nothing is known.
+    pub covariance: Option<Matrix5>,
+    /// What is in it of errors that all flow has in common.
+    pub common: CommonEffect,
+    /// What it was made of.
+    grown: Option<Grown>,
+    pub status: Status,
+    pub alternatives: Vec<Alternative>,
+    pub likelihood: Likelihood,
+    /// Depths in the weights, where they were smoothed, and their variances where these are known.
+    pub smooth: Option<Vec<f64>>,
+    pub variance: Option<Vec<f64>>,
+    pub fell_back: bool,
+}
+
+impl Solution {
+    /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
+    /// maximum likelihood's covariance.
+    pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
+        let minimum = &chosen.minimum;
+        let likelihood = Likelihood {
+            motion: minimum.motion,
+            covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
+            tangent: axes(&minimum.tangent),
+            cost: minimum.equations.cost,
+        };
+        let plain = Self {
+            motion: minimum.motion,
+            tangent: minimum.tangent,
+            covariance: plugged.map(|plugged| plugged.likelihood),
+            common: CommonEffect::default(),
+            grown: None,
+            status: Status::Ok,
+            alternatives: Vec::new(),
+            likelihood,
+            smooth: None,
+            variance: None,
+            fell_back: wanted && improved.is_none(),
+        };
+        match improved {
+            Some(improved) if wanted => Self {
+                motion: improved.motion,
+                tangent: improved.tangent,
+                covariance: Some(improved.covariance),
+                smooth: Some(improved.smooth),
+                variance: improved.variance,
+                ..plain
+            },
+            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
+            None => plain,
+        }
+    }
+
+    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the
+    /// weights, which may be wrong, the motion stays.
+    pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
+        let Some(covariance) = self.covariance else { return };
+        let from = Told { motion: self.motion, tangent: self.tangent, covariance };
+        let smooth = self.smooth.as_deref().filter(|_| !given);
+        let Some(told) = among_strays(all, known, &from, smooth, !given) else { return };
+        (self.motion, self.tangent) = (told.motion, told.tangent);
+        self.covariance = Some(told.covariance);
+    }
+
+    /// Takes errors into the covariance that go together over a length, in the unit of the points.
+    pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
+        let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
+        let nu = self.weights(inliers);
+        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
+        self.covariance = together(&covariance, inliers, &at, flow, length);
+    }
+
+    /// What errors do that all flow has in common.
+    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
+        let Some(covariance) = self.covariance else { return CommonEffect::default() };
+        let nu = self.weights(inliers);
+        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
+        let moved = if common.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
+        common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera())))
+    }
+
+    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
+    pub fn widen(&mut self, wider: f64, common: CommonEffect) {
+        self.grown = self.covariance.map(|own| Grown { own, wider, common: common.added() });
+        self.covariance = self.grown.as_ref().map(Grown::covariance);
+        self.common = common;
+    }
+
+    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as
+    /// far as the motion that the flow tells by itself.
+    pub fn contradicted(&mut self, inliers: &Observations) -> bool {
+        let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
+        let told = if let Some(nu) = &self.smooth {
+            information(inliers, &self.motion, &self.tangent, nu, 0.0)
+        } else {
+            let here = equations(inliers, &self.motion, &self.tangent, None);
+            here.h - here.p
+        };
+        let Some(apart) = contradiction(known, &self.motion.w(), &told, grown) else { return false };
+        self.covariance = Some(grown.covariance() + apart * apart.transpose());
+        true
+    }
+
+    /// The depths in the weights, as long as the planes.
+    fn weights(&self, inliers: &Observations) -> Cow<'_, [f64]> {
+        let own = || Cow::Owned(depths(inliers, &self.motion).nu);
+        self.smooth.as_deref().map_or_else(own, Cow::Borrowed)
+    }
+}
+
+/// What one displacement of all flow does to a rotation alone, of this covariance.
+pub(crate) fn rotation_shift(points: &Observations, covariance: &Matrix3<f64>) -> Matrix3x2<f64> {
+    let mut sum = Matrix3x2::zeros();
+    for k in (0..points.n).filter(|_| !points.spherical) {
+        let row = points.row(k);
+        sum += row.r.transpose() * row.g.fixed_columns::<2>(0);
+    }
+    covariance * sum
+}
+
+/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`,
+/// `L_k^-1` whitening point `k`; what is known beforehand of the rotation is in `W^t W`. Nothing on the
+/// sphere, where flow at different places has no common direction.
+pub(crate) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
+    let mut sum = Moved::zeros();
+    if inliers.spherical {
+        return sum;
+    }
+    for k in 0..inliers.n {
+        let g = inliers.row(k).g;
+        let t = g * at.motion.u();
+        let across = RowVector2::new(t.y, -t.x) / t.norm().max(f64::MIN_POSITIVE);
+        // The first columns of `G` are those of the identity.
+        sum += slopes(inliers, at.motion, at.tangent, at.nu[k], k) * (across * g.fixed_columns::<2>(0));
+    }
+    let told = information(inliers, at.motion, at.tangent, at.nu, 0.0);
+    inverse(&told).map_or(Moved::zeros(), |inverse| inverse * sum)
+}
